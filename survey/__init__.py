@@ -1,4 +1,5 @@
-"""Stability maps of mechanical systems: every point with an error bar, and a verdict that respects it.
+"""Stability maps of mechanical systems: every point with an error bar, and a verdict that respects
+it.
 
     import survey
     ds = survey.run("workflows/satellite_prolate.toml")          # a workflow file -> netCDF file and dataset
@@ -25,7 +26,11 @@ __version__ = "0.1.0"
 
 _HOME = {name: "survey.api" for name in ("run", "evaluate", "open", "describe")}
 _HOME |= {name: "survey.request.user_scene" for name in ("hill", "abel", "floquet", "orbit")}
-_HOME |= {"concat": "survey.analysis.join", "edge": "survey.analysis.edge", "Model": "survey.model.reader"}
+_HOME |= {
+    "concat": "survey.analysis.join",
+    "edge": "survey.analysis.edge",
+    "Model": "survey.model.reader",
+}
 _HOME |= {
     "SurveyError": "survey.errors",
     "BadInput": "survey.errors",
@@ -41,7 +46,9 @@ class _AfterXarray:
     def find_spec(self, name, path=None, target=None):
         if name != "xarray":
             return None
-        specs = (finder.find_spec(name, path, target) for finder in sys.meta_path if finder is not self)
+        specs = (
+            finder.find_spec(name, path, target) for finder in sys.meta_path if finder is not self
+        )
         spec = next(filter(None, specs), None)
         if spec is not None:
             spec.loader.exec_module = self._registering(spec.loader.exec_module)

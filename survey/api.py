@@ -21,7 +21,13 @@ from survey.file.labels import count, layout
 from survey.file.labels import describe as labelled
 from survey.grid import Grid, fixed, lines
 from survey.request import earlier, physical, trust, user_scene
-from survey.request.checks import check_options, check_parameters, check_request, is_number, methods_of
+from survey.request.checks import (
+    check_options,
+    check_parameters,
+    check_request,
+    is_number,
+    methods_of,
+)
 from survey.request.function_scene import FunctionScene
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
@@ -72,14 +78,24 @@ def run(
     checked = (read if isinstance(workflow, (str, os.PathLike)) else check)(workflow, output=output)
     number: Any = workers
     if number is not None and (not isinstance(number, int) or number < 1):
-        raise BadInput(f"workers = {shown(workers)}: it must be a positive integer, or None for threads")
+        raise BadInput(
+            f"workers = {shown(workers)}: it must be a positive integer, or None for threads"
+        )
     if block_timeout is not None and not (is_number(block_timeout) and 0 < block_timeout < np.inf):
-        raise BadInput(f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None")
+        raise BadInput(
+            f"block_timeout = {shown(block_timeout)}: it must be a positive number of seconds, or None"
+        )
     held = earlier.find(checked, reuse, fresh)[0] if reuse is not None else None
     silent = not announce.is_watched()
     with Progress(announce.console(), checked, silent) as progress:
         engine.run(
-            checked, workers, scheduler, fresh, None if silent else progress, block_timeout=block_timeout, earlier=held
+            checked,
+            workers,
+            scheduler,
+            fresh,
+            None if silent else progress,
+            block_timeout=block_timeout,
+            earlier=held,
         )
     ds = reading.load(checked.path)
     draw(ds, checked)
@@ -87,7 +103,8 @@ def run(
 
 
 def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
-    """Draw the workflow's figures beside its output; returns their paths: `OUT.png`, further ones `OUT_NAME.png`.
+    """Draw the workflow's figures beside its output; returns their paths: `OUT.png`, further ones
+    `OUT_NAME.png`.
 
     In the style "paper" they are PDF files.
     """
@@ -97,7 +114,9 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
 
     first, suffix = workflow.figures[0], ".pdf" if workflow.style == "paper" else ".png"
     paths = {
-        name: workflow.path.with_name(f"{workflow.path.stem}{'' if name == first else f'_{name}'}{suffix}")
+        name: workflow.path.with_name(
+            f"{workflow.path.stem}{'' if name == first else f'_{name}'}{suffix}"
+        )
         for name in workflow.figures
     }
     for name, path in paths.items():
@@ -147,14 +166,20 @@ def evaluate(
     ('k',)
     """
     if isinstance(scene, (xr.Dataset, xr.DataArray)):
-        raise BadInput("evaluate: this is a dataset, not a scene; give a scene's name first, such as 'satellite'")
+        raise BadInput(
+            "evaluate: this is a dataset, not a scene; give a scene's name first, such as 'satellite'"
+        )
     scene, module = user_scene.find(scene)
     names = {option.name for option in module.OPTIONS}
     named = {key: value for key, value in parameters.items() if key not in names}
     known = {p.name for p in module.PARAMETERS}
     resolved = physical.resolved(module, named)
-    given = {key: _labelled(key, value) if key in known else value for key, value in resolved.items()}
-    options = check_options(module, {key: parameters[key] for key in parameters if key in names}, given)
+    given = {
+        key: _labelled(key, value) if key in known else value for key, value in resolved.items()
+    }
+    options = check_options(
+        module, {key: parameters[key] for key in parameters if key in names}, given
+    )
     used = check_parameters(module, scene, options, given)
     if variables is not None:
         variables = _as_list(variables)
@@ -168,7 +193,9 @@ def evaluate(
     grid = _grid(used, given)
     user_scene.check(module, grid)
     try:
-        with watched(scene, module, grid.points, lambda: _seconds(module, request, grid)) as progress:
+        with watched(
+            scene, module, grid.points, lambda: _seconds(module, request, grid)
+        ) as progress:
             found = solve.compute(grid, module, request, progress=progress)
         ds = count(labelled(grid, module, scene, request, found), found)
         ds.attrs["complete"] = 1  # also when it is saved
@@ -182,14 +209,15 @@ def evaluate(
 
 
 def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Dataset:
-    """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes more than 256 MiB.
+    """The dataset in the netCDF file `path`: in memory and the file closed; or lazy, if it takes
+    more than 256 MiB.
 
-    Opening a file runs no code from it. A survey of your own equation names a Python file, which has to run where
-    points are solved (`ds.survey.trajectory`, `zoom`, the reason for a verdict): it does if you have run the same text
-    here before; `trust_scene=True` allows it in this process.
+    Opening a file runs no code from it. A survey of your own equation names a Python file, which
+    has to run where points are solved (`ds.survey.trajectory`, `zoom`, the reason for a verdict):
+    it does if you have run the same text here before; `trust_scene=True` allows it in this process.
 
-    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it is incomplete or
-    its contents are not valid.
+    Raises survey.BadInput if there is no such file or survey did not write it, survey.Damaged if it
+    is incomplete or its contents are not valid.
     """
     ds = reading.load(path)
     if trust_scene:
@@ -213,7 +241,8 @@ def _as_list(variables: Any) -> list[Any]:
 @functools.cache
 def _a_number() -> xr.DataArray:
     """A DataArray of one number: to copy it takes less time than to make another."""
-    return xr.DataArray(0.0)  # not where this module is loaded: xarray imports dask.array here, 0.3 s
+    # not where this module is loaded: xarray imports dask.array here, 0.3 s
+    return xr.DataArray(0.0)
 
 
 def _labelled(key: str, value: Any) -> xr.DataArray:
@@ -224,7 +253,9 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
     unnamed = not isinstance(value, xr.DataArray)
     array = _array(key, value) if unnamed and not hasattr(value, "dask") else value
     if unnamed and array.ndim > 1:
-        raise BadInput(f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray")
+        raise BadInput(
+            f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray"
+        )
     if array.dtype.kind not in "iuf":  # xarray itself may fail on whole numbers beyond floats
         raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
     if array.size == 0:
@@ -233,7 +264,11 @@ def _labelled(key: str, value: Any) -> xr.DataArray:
         return _a_number().copy(data=np.array(array, dtype=float))
     if unnamed:
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
-    return value.astype(float) if _is_lazy(value) else value.copy(data=np.array(value.values, dtype=float))
+    return (
+        value.astype(float)
+        if _is_lazy(value)
+        else value.copy(data=np.array(value.values, dtype=float))
+    )
 
 
 def _is_lazy(array: xr.DataArray) -> bool:
@@ -252,11 +287,15 @@ def _array(key: str, value: Any) -> npt.NDArray[Any]:
 
 
 def _not_real(key: str, value: Any) -> BadInput:
-    return BadInput(f"{short(key, 40)} = {shown(value)}: it must be a real number or an array of real numbers")
+    return BadInput(
+        f"{short(key, 40)} = {shown(value)}: it must be a real number or an array of real numbers"
+    )
 
 
 def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
-    """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name of an output."""
+    """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name
+    of an output.
+    """
     wide = [array for array in given.values() if array.dims]
     if not wide:
         return
@@ -267,17 +306,31 @@ def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
         ) from None
-    outputs = {output.name for output in module.OUTPUTS} | {"status", *getattr(module, "DIMENSIONS", ())}
+    outputs = {output.name for output in module.OUTPUTS} | {
+        "status",
+        *getattr(module, "DIMENSIONS", ()),
+    }
     for key, array in given.items():
-        for dim in set(array.dims) & (outputs | {name for name, other in given.items() if not other.ndim}) - {key}:
-            what = "an output or its dimension" if dim in outputs else "a parameter that is a single number"
+        for dim in set(array.dims) & (
+            outputs | {name for name, other in given.items() if not other.ndim}
+        ) - {key}:
+            what = (
+                "an output or its dimension"
+                if dim in outputs
+                else "a parameter that is a single number"
+            )
             raise BadInput(f"{key}: its dimension {dim!r} clashes with {what}; rename it")
 
 
 def _check_domains(
-    used: dict[str, Parameter], given: dict[str, xr.DataArray], request: Request, named: Iterable[str]
+    used: dict[str, Parameter],
+    given: dict[str, xr.DataArray],
+    request: Request,
+    named: Iterable[str],
 ) -> None:
-    """Raise BadInput for a single value outside its domain; warn of arrays with such that look like degrees."""
+    """Raise BadInput for a single value outside its domain; warn of arrays with such that look like
+    degrees.
+    """
     for key, array in given.items():
         if _is_lazy(array) or (array.ndim and used[key].units != "rad"):
             continue
@@ -287,7 +340,9 @@ def _check_domains(
         value = float(array.values[outside][0])
         hint = physical.hint(used[key], value, named)
         if array.ndim == 0:
-            raise BadInput(f"{key} = {value:g} is outside its domain; allowed: {used[key].domain}{hint}")
+            raise BadInput(
+                f"{key} = {value:g} is outside its domain; allowed: {used[key].domain}{hint}"
+            )
         if hint and f"{key}{physical.DEGREES}" not in named:
             what = f"{counted(outside.sum(), 'value')} outside the domain, such as {value:g}"
             warnings.warn(f"evaluate: {key} has {what}{hint}", stacklevel=3)
@@ -305,11 +360,15 @@ def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
         for dim, size in array.sizes.items():
             if sizes.setdefault(dim, size) != size:
                 here = counted(size, "value")
-                raise BadInput(f"{key}: dimension {dim!r} has {here} here and {sizes[dim]:,} in another parameter")
+                raise BadInput(
+                    f"{key}: dimension {dim!r} has {here} here and {sizes[dim]:,} in another parameter"
+                )
     return Grid(
         sizes=sizes,
         parameters={key: (array.dims, array.values) for key, array in given.items()},
-        uncut=frozenset(dim for key, array in given.items() if used[key].uncut for dim in array.dims),
+        uncut=frozenset(
+            dim for key, array in given.items() if used[key].uncut for dim in array.dims
+        ),
     )
 
 
@@ -342,29 +401,38 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
         dask="parallelized",
         output_dtypes=[dtype for dtype, _, _ in table.values()],
         output_core_dims=[o.dims if o else () for o in extra],
-        dask_gufunc_kwargs={"output_sizes": {d: len(module.DIMENSIONS[d]) for o in extra if o for d in o.dims}},
+        dask_gufunc_kwargs={
+            "output_sizes": {d: len(module.DIMENSIONS[d]) for o in extra if o for d in o.dims}
+        },
     )
     arrays = dict(zip(table, results, strict=True))
     sizes = dict(zip(results[-1].dims, results[-1].shape, strict=True))
     values = {key: (array.dims, array.data) for key, array in given.items()}
     data = {name: array.data for name, array in arrays.items()}
-    return labelled(Grid(sizes, values), module, scene, request, data).assign_coords(_own_coordinates(given))
+    return labelled(Grid(sizes, values), module, scene, request, data).assign_coords(
+        _own_coordinates(given)
+    )
 
 
 def scene(name: Any) -> dict[str, Any]:
-    """Everything a user needs of one scene: equations, parameters, options, outputs, status, methods, sources."""
+    """Everything a user needs of one scene: equations, parameters, options, outputs, status,
+    methods, sources.
+    """
     name, module = user_scene.find(name)
     return {
         "name": name,
         "title": module.TITLE,
         "about": inspect.cleandoc(module.__doc__),
-        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS} | physical.described(module),
+        "parameters": {p.name: _parameter_line(module, p) for p in module.PARAMETERS}
+        | physical.described(module),
         "options": {
             o.name: f"{o.long_name}: {' | '.join(o.choices)} (default {o.default}){_option_condition(o)}"
             for o in module.OPTIONS
         },
         "outputs": {
-            o.name: _outputs_line(module, [other for other in module.OUTPUTS if other.name == o.name])
+            o.name: _outputs_line(
+                module, [other for other in module.OUTPUTS if other.name == o.name]
+            )
             for o in module.OUTPUTS
         },
         "status": {key: sentence for key, (_, sentence) in status.table(module).items()},
@@ -382,7 +450,11 @@ class Description(dict[str, Any]):
         for heading in ("parameters", "options", "outputs", "status", "methods"):
             rows = self[heading]
             width = max(map(len, rows), default=0)
-            lines += ["", f"{heading}:", *(f"  {key:<{width}}  {text}" for key, text in rows.items())] if rows else []
+            lines += (
+                ["", f"{heading}:", *(f"  {key:<{width}}  {text}" for key, text in rows.items())]
+                if rows
+                else []
+            )
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
@@ -394,17 +466,23 @@ class Description(dict[str, Any]):
 
 
 def describe(scene: Any) -> Description:
-    """A scene's parameters, options, outputs, statuses and methods, shown as a table: `survey.describe("satellite")`.
+    """A scene's parameters, options, outputs, statuses and methods, shown as a table:
+    `survey.describe("satellite")`.
 
-    `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under "about".
+    `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under
+    "about".
     """
     return Description(globals()["scene"](scene))
 
 
 def _option_condition(option: Option) -> str:
     text = f"; only with {option.only_with}" if option.only_with else ""
-    text += "".join(f"; only when {name} = {' | '.join(allowed)}" for name, allowed in option.when.items())
-    return text + (f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else "")
+    text += "".join(
+        f"; only when {name} = {' | '.join(allowed)}" for name, allowed in option.when.items()
+    )
+    return text + (
+        f"; not with {option.replaced_by}, which replaces it" if option.replaced_by else ""
+    )
 
 
 def _parameter_line(module: Any, p: Parameter) -> str:
@@ -430,7 +508,9 @@ def _outputs_line(module: Any, same: list[Output]) -> str:
 
 
 def _output_text(module: Any, o: Output) -> str:
-    what = ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
+    what = (
+        ", ".join(f"{name} {code}" for name, code in o.flags.items()) if o.flags is not None else ""
+    )
     untold = o.flags is not None or o.integer or (o.units == "1" and hasattr(module, "RATIOS"))
     unit = "" if untold else _unit(o.units, module)
     asked = "on request" if o.on_request else ""
@@ -438,7 +518,9 @@ def _output_text(module: Any, o: Output) -> str:
 
 
 def _unit(units: str, module: Any, ratio: bool = False) -> str:
-    """The unit of a parameter or an output, in parentheses; an own scene does not tell unless it names one."""
+    """The unit of a parameter or an output, in parentheses; an own scene does not tell unless it
+    names one.
+    """
     if units != "1":
         return f" ({units})"
     if isinstance(module, FunctionScene):
@@ -448,6 +530,9 @@ def _unit(units: str, module: Any, ratio: bool = False) -> str:
 
 def _method_line(module: Any, name: str) -> str:
     method = measures.method(name)
-    docstring, when = inspect.cleandoc(method.__doc__), condition(module, getattr(method, "WHEN", {}))
+    docstring, when = (
+        inspect.cleandoc(method.__doc__),
+        condition(module, getattr(method, "WHEN", {})),
+    )
     first = getattr(method, "ABOUT", {}).get(module.FAMILY, docstring.splitlines()[0])
     return first.removesuffix(".") + when if when else first

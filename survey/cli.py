@@ -26,11 +26,14 @@ TRUST = "Allow the survey's own scene, a Python file, to run: only if you have r
 
 
 def main(arguments=None):
-    """Run the program and exit: 0 done, 1 points failed, 2 bad input, 3 damaged, 4 stopped, 130/143 interrupted."""
+    """Run the program and exit: 0 done, 1 points failed, 2 bad input, 3 damaged, 4 stopped, 130/143
+    interrupted.
+    """
     for stream in (sys.stdout, sys.stderr):  # a pipe on Windows knows few characters
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")
-    gc.set_threshold(100_000)  # measured: otherwise garbage collection takes a tenth of the time of compiling kernels
+    # measured: otherwise garbage collection takes a tenth of the time of compiling kernels
+    gc.set_threshold(100_000)
     try:
         arguments = sys.argv[1:] if arguments is None else arguments
         code = program.main(arguments or ["--help"], prog_name="survey", standalone_mode=False)
@@ -44,14 +47,20 @@ def main(arguments=None):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 0
     except OSError as error:
-        code = complain(f"{error.filename or 'the program'}: {error.strerror or error}; fix this and try again", 4)
+        code = complain(
+            f"{error.filename or 'the program'}: {error.strerror or error}; fix this and try again",
+            4,
+        )
     gc.freeze()  # measured: without it, the collections at exit take 0.35 s
     sys.exit(code or 0)
 
 
 def _usage(error):
     """What is wrong with the command line, and where to find its usage, in one line."""
-    message, context = error.format_message().replace("\n", " ").removesuffix("."), getattr(error, "ctx", None)
+    message, context = (
+        error.format_message().replace("\n", " ").removesuffix("."),
+        getattr(error, "ctx", None),
+    )
     message = re.sub(r"is not a valid (integer|float) range", r"is not a valid \1", message)
     message = re.sub(r"is not in the range (\S+)<=x<=(\S+)", r"is not from \1 to \2", message)
     message = re.sub(r"is not in the range x>=(\S+)", r"is below \1", message)
@@ -103,7 +112,9 @@ WORKFLOW = _Files(".toml")
 
 @program.command()
 @click.argument("scene", shell_complete=_scene_names)
-@click.option("-o", "--output", metavar="FILE.toml", help="The workflow file; by default SCENE.toml.")
+@click.option(
+    "-o", "--output", metavar="FILE.toml", help="The workflow file; by default SCENE.toml."
+)
 def init(scene, output):
     """Write a commented workflow of the scene to start from; it runs as it is."""
     from survey.file.disk import check_folder
@@ -131,18 +142,41 @@ def schema():
 
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
-@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
-@click.option("--workers", type=click.IntRange(1), help="Worker processes; by default threads of this process.")
-@click.option("--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, or its scheduler file.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.nc",
+    help="The netCDF file, instead of the workflow's output.path.",
+)
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Replace a key, such as axes.k.num=40.",
+)
+@click.option(
+    "--workers",
+    type=click.IntRange(1),
+    help="Worker processes; by default threads of this process.",
+)
+@click.option(
+    "--scheduler", metavar="ADDRESS", help="A dask.distributed scheduler, or its scheduler file."
+)
 @click.option(
     "--block-timeout",
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
     help="Replace a worker that takes longer for a block; by default 20 times the longest so far, at least 5 minutes.",
 )
-@click.option("--fresh", is_flag=True, help="Replace what earlier runs left: the file or its blocks.")
-@click.option("--reuse", metavar="FILE.nc", help="Take the points that this file of an earlier run holds from it.")
+@click.option(
+    "--fresh", is_flag=True, help="Replace what earlier runs left: the file or its blocks."
+)
+@click.option(
+    "--reuse",
+    metavar="FILE.nc",
+    help="Take the points that this file of an earlier run holds from it.",
+)
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, reuse, quiet):
     """Run, or resume, a sweep; write OUT.nc and the pictures that the workflow requests."""
@@ -156,19 +190,34 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
         err.print(plain(told), markup=False)
 
     def start(progress, resume_command):
-        return engine.run(checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held)
+        return engine.run(
+            checked, workers, scheduler, fresh, progress, resume_command, block_timeout, held
+        )
 
     return _carry_out(checked, quiet, start)
 
 
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
-@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's with _proved added.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: refine.width=0.01.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.nc",
+    help="The netCDF file, instead of the workflow's with _proved added.",
+)
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Replace a key: refine.width=0.01.",
+)
 @click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def prove(workflow, output, overrides, fresh, quiet):
-    """Prove the cells of a map, or the edges along one axis; OUT.cert is what `survey-check` verifies by itself."""
+    """Prove the cells of a map, or the edges along one axis; OUT.cert is what `survey-check`
+    verifies by itself.
+    """
     from dataclasses import replace
 
     from survey.request.workflow import read
@@ -179,7 +228,9 @@ def prove(workflow, output, overrides, fresh, quiet):
         checked = replace(checked, path=checked.path.with_stem(f"{checked.path.stem}_proved"))
     proofs.equation_of(checked)  # refuses what cannot be proved
     certificate = checked.path.with_suffix(".cert")
-    code = _carry_out(checked, quiet, lambda *more: engine.run(checked, None, None, fresh, *more), [certificate])
+    code = _carry_out(
+        checked, quiet, lambda *more: engine.run(checked, None, None, fresh, *more), [certificate]
+    )
     if not quiet:
         err.print(f"verify it, also on another machine: survey-check {certificate}", markup=False)
     return code
@@ -187,11 +238,25 @@ def prove(workflow, output, overrides, fresh, quiet):
 
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
-@click.option("-o", "--output", metavar="OUT.model", help="The model; by default beside the output, .model.")
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key: solver.rtol=1e-12.")
-@click.option("--proof", metavar="PROVED.nc", help="The proof of this map (survey prove): the model carries it.")
+@click.option(
+    "-o", "--output", metavar="OUT.model", help="The model; by default beside the output, .model."
+)
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Replace a key: solver.rtol=1e-12.",
+)
+@click.option(
+    "--proof",
+    metavar="PROVED.nc",
+    help="The proof of this map (survey prove): the model carries it.",
+)
 def model(workflow, output, overrides, proof):
-    """Write the map's series, which answer anywhere with error bars: survey.Model reads them, with numpy alone."""
+    """Write the map's series, which answer anywhere with error bars: survey.Model reads them, with
+    numpy alone.
+    """
     from pathlib import Path
 
     from survey import api
@@ -208,29 +273,53 @@ def model(workflow, output, overrides, proof):
     proof = proved.matching(api.open(proof), checked) if proof else None
     with Progress(err, checked) as progress:
         size = build.model(checked, path, proof, progress)
-    err.print(plain(f"wrote {path} ({size:,} bytes); in Python: survey.Model({path!r})"), markup=False)
+    err.print(
+        plain(f"wrote {path} ({size:,} bytes); in Python: survey.Model({path!r})"), markup=False
+    )
     out.print(plain(path), markup=False)
 
 
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
-@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Replace a key, such as axes.k.num=40.")
-@click.option("-o", "--output", metavar="OUT.nc", help="The netCDF file, instead of the workflow's output.path.")
+@click.option(
+    "--set",
+    "overrides",
+    multiple=True,
+    metavar="KEY=VALUE",
+    help="Replace a key, such as axes.k.num=40.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.nc",
+    help="The netCDF file, instead of the workflow's output.path.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no kernel is called."""
+    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no
+    kernel is called.
+    """
     from survey.request.workflow import read
     from survey.sweep import plan
 
     planned = plan.plan(read(workflow, overrides, output))
-    numbers = () if as_json else ("bytes", "estimated_seconds")  # of which the size and the time are the words
+    # of which the size and the time are the words
+    numbers = () if as_json else ("bytes", "estimated_seconds")
     _show({key: value for key, value in planned.items() if key not in numbers}, as_json)
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("--points", type=click.IntRange(0), default=20, show_default=True, help="Points to solve again.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of the random points.")
+@click.option(
+    "--points", type=click.IntRange(0), default=20, show_default=True, help="Points to solve again."
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(0),
+    default=0,
+    show_default=True,
+    help="Seed of the random points.",
+)
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def verify(path, points, seed, trust_scene):
     """Check digest, completeness and counts; solve N random points again by another method. Bundles too."""
@@ -293,7 +382,11 @@ def _may_run(untrusted):
     if not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
     what = f"The scene of this survey is a Python file that you have not run here before: {untrusted.path}"
-    for line in (what, f"sha256 {untrusted.digest}", f"Read it first: {untrusted.reading(untrusted.path)}"):
+    for line in (
+        what,
+        f"sha256 {untrusted.digest}",
+        f"Read it first: {untrusted.reading(untrusted.path)}",
+    ):
         err.print(plain(line), markup=False)
     return click.confirm("It can do anything that you can do. Run it?", default=False, err=True)
 
@@ -314,7 +407,9 @@ def _audited(report):
 @click.argument("path", metavar="OUT.nc")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def info(path, as_json):
-    """Contents of the file: axes, variables, counts, provenance; and what an unfinished run has left beside it."""
+    """Contents of the file: axes, variables, counts, provenance; and what an unfinished run has
+    left beside it.
+    """
     from survey.file import reading, unfinished
     from survey.file.summary import summary  # without the engine, which takes a second to import
 
@@ -330,13 +425,28 @@ def info(path, as_json):
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("-o", "--output", metavar="OUT.png", help="The picture, .png, .pdf or .svg; by default beside the file.")
-@click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
-@click.option("--style", type=click.Choice(["screen", "paper"]), default="screen", help="paper: PDF, hatched.")
 @click.option(
-    "--width", type=click.Choice(["single", "double"]), default="single", help="Column width, for style paper."
+    "-o",
+    "--output",
+    metavar="OUT.png",
+    help="The picture, .png, .pdf or .svg; by default beside the file.",
 )
-@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Draw this plane, row or well instead of the first.")
+@click.option("--var", metavar="NAME", help="The variable; by default the verdict.")
+@click.option(
+    "--style", type=click.Choice(["screen", "paper"]), default="screen", help="paper: PDF, hatched."
+)
+@click.option(
+    "--width",
+    type=click.Choice(["single", "double"]),
+    default="single",
+    help="Column width, for style paper.",
+)
+@click.option(
+    "--at",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Draw this plane, row or well instead of the first.",
+)
 def plot(path, output, var, style, width, at):
     """Draw the stability map, or the named variable."""
     from pathlib import Path
@@ -366,10 +476,14 @@ def plot(path, output, var, style, width, at):
 @program.command()
 @click.argument("path", metavar="OUT.nc")
 @click.option("-o", "--output", metavar="OUT.html", help="The page; by default beside the file.")
-@click.option("--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map of more axes.")
+@click.option(
+    "--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map of more axes."
+)
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def share(path, output, at, trust_scene):
-    """Write the map as one HTML file that opens anywhere, offline: zoom without end, values with error bars."""
+    """Write the map as one HTML file that opens anywhere, offline: zoom without end, values with
+    error bars.
+    """
     from pathlib import Path
     from types import SimpleNamespace
 
@@ -381,18 +495,29 @@ def share(path, output, at, trust_scene):
     target = output or f"{path.removesuffix('.nc')}.html"
     with Progress(err, SimpleNamespace(name=Path(path).stem, scene=None)) as progress:
         told = page.write(ds, target, dict(part.partition("=")[::2] for part in at), progress)
-    how = "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
+    how = (
+        "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
+    )
     err.print(plain(f"{target}: {told['bytes']:,} bytes, {how}"), markup=False)
     out.print(plain(target), markup=False)
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("-o", "--output", metavar="OUT.zip", help="The .zip file or folder; by default OUT.zip beside the file.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="OUT.zip",
+    help="The .zip file or folder; by default OUT.zip beside the file.",
+)
 @click.option("--author", default="", metavar="NAME", help="Who computed it, for the description.")
-@click.option("--license", "license_url", default="", metavar="URL", help="The licence of the data.")
+@click.option(
+    "--license", "license_url", default="", metavar="URL", help="The licence of the data."
+)
 def bundle(path, output, author, license_url):
-    """Write a folder or zip for an archive: data, workflow, scene, pictures, versions, RO-Crate; `verify` checks it."""
+    """Write a folder or zip for an archive: data, workflow, scene, pictures, versions, RO-Crate;
+    `verify` checks it.
+    """
     from survey.share import bundle as bundles
 
     target = output or f"{path.removesuffix('.nc')}.zip"
@@ -404,28 +529,52 @@ def bundle(path, output, author, license_url):
 
 @program.command()
 @click.argument("paths", metavar="A.nc B.nc...", nargs=-1, required=True)
-@click.option("-o", "--output", metavar="C.nc", required=True, help="The netCDF file to write; it must not exist.")
+@click.option(
+    "-o",
+    "--output",
+    metavar="C.nc",
+    required=True,
+    help="The netCDF file to write; it must not exist.",
+)
 def merge(paths, output):
     """Join surveys that differ in the values of one axis, or in one fixed parameter, into one file."""
     from survey.analysis import join
 
     joined, left_out = join.merge(paths, output)
     of_parts = f"; {left_out}" if left_out else ""
-    err.print(plain(f"{output}: {counted(joined.status.size, 'point')} of {len(paths)} files{of_parts}"), markup=False)
+    err.print(
+        plain(f"{output}: {counted(joined.status.size, 'point')} of {len(paths)} files{of_parts}"),
+        markup=False,
+    )
     out.print(plain(str(output)), markup=False)
 
 
 @program.command()
 @click.argument("path", metavar="OUT.nc")
-@click.option("--port", type=click.IntRange(0, 65535), default=5006, show_default=True, help="0 for any free port.")
+@click.option(
+    "--port",
+    type=click.IntRange(0, 65535),
+    default=5006,
+    show_default=True,
+    help="0 for any free port.",
+)
 @click.option("--link", default="", help="The address of an earlier view, to open it again.")
 @click.option("--no-browser", is_flag=True, help="Only print the address.")
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def view(path, port, link, no_browser, trust_scene):
-    """Show the map in the browser, on this machine only: zoom, values with error bars, the motion at a point."""
+    """Show the map in the browser, on this machine only: zoom, values with error bars, the motion
+    at a point.
+    """
     from survey.viewer.server import serve
 
-    serve(path, port, link, lambda line: err.print(plain(line), markup=False), not no_browser, trust_scene)
+    serve(
+        path,
+        port,
+        link,
+        lambda line: err.print(plain(line), markup=False),
+        not no_browser,
+        trust_scene,
+    )
 
 
 @program.command()
@@ -447,8 +596,17 @@ def scenes(name, as_json):
 
 @program.command()
 @click.argument("scene", shell_complete=_scene_names)
-@click.option("--peers", is_flag=True, help="Also measure the best other programs, where installed.")
-@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for CSV, JSON and PNG.")
+@click.option(
+    "--peers", is_flag=True, help="Also measure the best other programs, where installed."
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="DIR",
+    default=".",
+    show_default=True,
+    help="Folder for CSV, JSON and PNG.",
+)
 def precision(scene, peers, output):
     """The work-precision chart: error against time for every method that applies."""
     from survey.precision import write
@@ -459,8 +617,21 @@ def precision(scene, peers, output):
 
 @program.command()
 @click.argument("scene", shell_complete=_scene_names)
-@click.option("--share", type=float, default=1.0, metavar="S", help="Of the points along each axis: below 1 coarser.")
-@click.option("-o", "--output", metavar="DIR", default=".", show_default=True, help="Folder for JSON, page and PNG.")
+@click.option(
+    "--share",
+    type=float,
+    default=1.0,
+    metavar="S",
+    help="Of the points along each axis: below 1 coarser.",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="DIR",
+    default=".",
+    show_default=True,
+    help="Folder for JSON, page and PNG.",
+)
 def failures(scene, share, output):
     """Where each method fails: its true error and its error bar over the planes on which it should break."""
     from survey.failures import write
@@ -494,7 +665,11 @@ def _describe(scene):
         if not scene[heading]:
             continue
         click.echo(f"{heading}:")
-        rows = scene[heading] if isinstance(scene[heading], dict) else {item: "" for item in scene[heading]}
+        rows = (
+            scene[heading]
+            if isinstance(scene[heading], dict)
+            else {item: "" for item in scene[heading]}
+        )
         width = max(map(len, rows))
         for key, text in rows.items():
             click.echo(f"  {key:<{width}}  {text}".rstrip())
@@ -502,20 +677,25 @@ def _describe(scene):
 
 
 def _carry_out(checked, quiet, start, further=()):
-    """Run the engine by `start(progress, resume_command)`, draw, and say what was written; the exit code.
+    """Run the engine by `start(progress, resume_command)`, draw, and say what was written; the exit
+    code.
 
     `further`: paths of other files that it writes.
     """
     from survey.sweep.progress import Progress
 
-    finished, resume_command = None, shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
+    finished, resume_command = (
+        None,
+        shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")]),
+    )
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:
             finished = start(progress, resume_command)
             pictures = _draw(checked)
     except KeyboardInterrupt as stop:
-        traceback.clear_frames(stop.__traceback__)  # the semaphores they hold would be reported as leaked
+        # the semaphores they hold would be reported as leaked
+        traceback.clear_frames(stop.__traceback__)
         _end_interrupted(stop.args[0] if stop.args else 130, checked.path, finished, resume_command)
     if not quiet:
         _summarise(finished, [checked.path, *further, *pictures])
@@ -553,21 +733,33 @@ def _summarise(finished, paths):
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
     if attributes.get("surfaces_left_out"):
         lost = counted(attributes["surfaces_left_out"], "triangle")
-        err.print(f"surfaces: {lost} left out, of which a corner is not certain (at edges and tips)")
+        err.print(
+            f"surfaces: {lost} left out, of which a corner is not certain (at edges and tips)"
+        )
     if attributes.get("curves_unexplained"):
         segments = counted(attributes["curves_unexplained"], "segment")
-        err.print(f"edges: along {segments} of lines across the map a curve is missing (curves_unexplained)")
+        err.print(
+            f"edges: along {segments} of lines across the map a curve is missing (curves_unexplained)"
+        )
     if "edge_left_out" in attributes:
-        err.print(f"edges: not searched for {attributes['edge_left_out']}, where they accumulate", markup=False)
+        err.print(
+            f"edges: not searched for {attributes['edge_left_out']}, where they accumulate",
+            markup=False,
+        )
     if finished.already_complete:
         return
-    times = {"compiling": finished.compiling, "kernels": finished.computing, "file": finished.writing}
+    times = {
+        "compiling": finished.compiling,
+        "kernels": finished.computing,
+        "file": finished.writing,
+    }
     times |= {"edges and cells": finished.edges_and_cells} if finished.edges_and_cells else {}
     err.print(", ".join(f"{name} {seconds:.1f} s" for name, seconds in times.items()))
 
 
 def _end_interrupted(code, path, finished, resume_command):
-    """Say what is safe and how to resume (`finished`: only the pictures are missing), and end the process at once.
+    """Say what is safe and how to resume (`finished`: only the pictures are missing), and end the
+    process at once.
 
     Threads inside a kernel cannot be interrupted, and there is no need to wait for them.
     """
@@ -576,7 +768,9 @@ def _end_interrupted(code, path, finished, resume_command):
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     done, blocks = unfinished.finished(path)
-    state = f"finished blocks are safe: {done:,} of {blocks:,}" if done else "no block was finished yet"
+    state = (
+        f"finished blocks are safe: {done:,} of {blocks:,}" if done else "no block was finished yet"
+    )
     state += f"; resume with: {resume_command}"
     if finished:
         state = f"{path} is complete, its pictures are not; draw them with: survey plot {path}"

@@ -1,6 +1,8 @@
-"""What a module of a folder must offer: a table of its public names, checked when the module is loaded.
+"""What a module of a folder must offer: a table of its public names, checked when the module is
+loaded.
 
-A module's public names are those at its top level, imports and names with a leading underscore apart.
+A module's public names are those at its top level, imports and names with a leading underscore
+apart.
 """
 
 import ast
@@ -16,8 +18,8 @@ from survey.errors import BadInput
 
 @dataclass(frozen=True)
 class Value:
-    """A public constant: its type (or types), what it means, and whether every module must have it, or those modules
-    for which `needed(module)` is true.
+    """A public constant: its type (or types), what it means, and whether every module must have it,
+    or those modules for which `needed(module)` is true.
     """
 
     meaning: str
@@ -27,8 +29,8 @@ class Value:
 
 @dataclass(frozen=True)
 class Function:
-    """A public function: what it does, the names of its first arguments (None: any), and whether every module must
-    have it, as in `Value`. Further arguments need defaults.
+    """A public function: what it does, the names of its first arguments (None: any), and whether
+    every module must have it, as in `Value`. Further arguments need defaults.
     """
 
     meaning: str
@@ -46,7 +48,11 @@ def check(module, table, where, elsewhere=lambda name: ""):
         if name not in table:
             near = get_close_matches(name, table, n=1, cutoff=0.6)
             hint = elsewhere(name) or (f"; did you mean {near[0]!r}?" if near else "")
-            refuse(module, f"{name} is not in the table{hint} (a helper's name begins with an underscore)", where)
+            refuse(
+                module,
+                f"{name} is not in the table{hint} (a helper's name begins with an underscore)",
+                where,
+            )
     check_offered(module, table, where)
 
 
@@ -59,7 +65,11 @@ def check_offered(module, table, where):
         elif isinstance(entry, Function):
             _check_function(module, name, getattr(module, name), entry, where)
         elif not isinstance(getattr(module, name), entry.kind):
-            refuse(module, f"{name} = {getattr(module, name)!r:.60} must be of type {_named(entry.kind)}", where)
+            refuse(
+                module,
+                f"{name} = {getattr(module, name)!r:.60} must be of type {_named(entry.kind)}",
+                where,
+            )
 
 
 @lru_cache(maxsize=256)
@@ -71,7 +81,12 @@ def public(path):
             names.append(node.name)
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            names += [name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)]
+            names += [
+                name.id
+                for target in targets
+                for name in ast.walk(target)
+                if isinstance(name, ast.Name)
+            ]
     return tuple(dict.fromkeys(name for name in names if not name.startswith("_")))
 
 
@@ -81,7 +96,8 @@ def _check_function(module, name, function, entry, where):
         refuse(module, f"{name} must be a function", where)
     parameters = inspect.signature(function).parameters.values()
     given = tuple(p.name for p in parameters)
-    more = [p for p in list(parameters)[len(entry.arguments or ()) :] if p.default is p.empty]  # callers give none
+    # callers give none
+    more = [p for p in list(parameters)[len(entry.arguments or ()) :] if p.default is p.empty]
     if entry.arguments is not None and (given[: len(entry.arguments)] != entry.arguments or more):
         words = f"{name}({', '.join(given)}) must be {name}({', '.join(entry.arguments)})"
         refuse(module, words, where)

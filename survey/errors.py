@@ -19,7 +19,9 @@ class SurveyError(Exception):
 
 
 class BadInput(SurveyError, ValueError):
-    """The input is refused before any work: the line names the key, the value, what is allowed and what to do."""
+    """The input is refused before any work: the line names the key, the value, what is allowed and
+    what to do.
+    """
 
     exit_code = 2
 

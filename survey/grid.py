@@ -13,7 +13,8 @@ from survey.errors import BadInput
 
 @dataclass(frozen=True)
 class Grid:
-    """Parameters on named dimensions: {name: (its dimensions, float64 values)}; a fixed number has no dimension.
+    """Parameters on named dimensions: {name: (its dimensions, float64 values)}; a fixed number has
+    no dimension.
 
     `sizes` holds the dimensions in order. Dimensions in `uncut` are never cut.
     """
@@ -46,14 +47,16 @@ class Grid:
         return fixed(self.parameters)
 
     def blocks(self, points_per_block):
-        """Blocks, slices per dimension, of at most `points_per_block` points: the first dimensions are cut first."""
+        """Blocks, slices per dimension, of at most `points_per_block` points: the first dimensions
+        are cut first.
+        """
         return self._within([slice(0, size) for size in self.shape], points_per_block)
 
     def tiled(self, points_per_block, points_per_region, points_per_tile):
         """(lengths of a tile, [(region, its blocks)]): no tile or block belongs to two regions.
 
-        Regions and blocks are slices per dimension, of at most these numbers of points, as far as `uncut` dimensions
-        allow.
+        Regions and blocks are slices per dimension, of at most these numbers of points, as far as
+        `uncut` dimensions allow.
         """
         region = self._lengths(points_per_region)
         tile = halved(region, points_per_tile)
@@ -66,7 +69,9 @@ class Grid:
     def _within(self, region, points_per_block):
         """The blocks of a region."""
         spans = [range(cut.start, cut.stop) for cut in region]
-        lengths = replace(self, sizes=dict(zip(self.sizes, map(len, spans), strict=True)))._lengths(points_per_block)
+        lengths = replace(self, sizes=dict(zip(self.sizes, map(len, spans), strict=True)))._lengths(
+            points_per_block
+        )
         return list(product(*map(_even_cuts, spans, lengths)))
 
     def _lengths(self, points):
@@ -82,14 +87,18 @@ class Grid:
         return tuple(lengths.values())
 
     def point(self, block):
-        """{name: array} for `block` (a tuple of slices): every array has one axis per dimension (some of length 1)."""
+        """{name: array} for `block` (a tuple of slices): every array has one axis per dimension
+        (some of length 1).
+        """
         where = dict(zip(self.sizes, block, strict=True))
         aligned = {}
         for name, (dims, values) in self.parameters.items():
             part = values[tuple(where[dim] for dim in dims)]
             order = [dims.index(dim) for dim in self.sizes if dim in dims]
             part = part.transpose(order)
-            part = part.reshape([part.shape[order.index(dims.index(dim))] if dim in dims else 1 for dim in where])
+            part = part.reshape(
+                [part.shape[order.index(dims.index(dim))] if dim in dims else 1 for dim in where]
+            )
             aligned[name] = part.copy()
         return aligned
 
@@ -97,7 +106,8 @@ class Grid:
 def lines(parameters):
     """{name: (number, least, greatest)} of each parameter that has an axis which no other shares.
 
-    `parameters` is {name: (its dimensions, its values)}; least and greatest are those of the finite values.
+    `parameters` is {name: (its dimensions, its values)}; least and greatest are those of the finite
+    values.
     """
     found = {}
     for name, (dims, values) in parameters.items():
@@ -151,12 +161,18 @@ def coordinates(start, stop, num, spacing="linear"):
     if num == 1 and start != stop:
         raise BadInput(f"num = 1 cannot reach stop = {stop:g}; give num >= 2, or a single number")
     if num > 1 and start == stop:
-        raise BadInput(f"start and stop are both {start:g}, with num = {num}; give a single number, or another stop")
+        raise BadInput(
+            f"start and stop are both {start:g}, with num = {num}; give a single number, or another stop"
+        )
     if isinf(float(stop) - float(start)):
-        raise BadInput(f"start = {start:g}, stop = {stop:g}: they differ by more than the largest number, 1.8e308")
+        raise BadInput(
+            f"start = {start:g}, stop = {stop:g}: they differ by more than the largest number, 1.8e308"
+        )
     if spacing == "log":
         if not (start > 0 and stop > 0):
-            raise BadInput(f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive")
+            raise BadInput(
+                f"start = {start:g}, stop = {stop:g} with spacing = 'log': both must be positive"
+            )
         return np.geomspace(start, stop, num)
     return np.linspace(start, stop, num)
 
@@ -164,7 +180,9 @@ def coordinates(start, stop, num, spacing="linear"):
 def positions(values):
     """Coordinates as floats; labels by their number, counted from 0."""
     values = np.asarray(values)
-    return values.astype(float) if values.dtype.kind in "iufb" else np.arange(values.size, dtype=float)
+    return (
+        values.astype(float) if values.dtype.kind in "iufb" else np.arange(values.size, dtype=float)
+    )
 
 
 def logarithmic(values):
@@ -181,7 +199,9 @@ def check_axis(key, values):
         raise BadInput(f"{key}: an axis needs at least one value; give values or num >= 1")
     bad = np.flatnonzero(~np.isfinite(values))
     if bad.size:
-        raise BadInput(f"{key}: value {bad[0] + 1} is {values[bad[0]]:g}; every value must be a finite number")
+        raise BadInput(
+            f"{key}: value {bad[0] + 1} is {values[bad[0]]:g}; every value must be a finite number"
+        )
     steps = np.diff(values)
     same = np.flatnonzero(steps == 0)
     if same.size:

@@ -38,7 +38,8 @@ def load(package, name, what, further=()):
     if not isinstance(name, str):
         raise BadInput(unknown(what, name, [*names(package), *further]))
     path = f"{package.__name__}.{name}"
-    if str(name).isidentifier() and path in sys.modules:  # the folder is not read again for every block
+    # the folder is not read again for every block
+    if str(name).isidentifier() and path in sys.modules:
         return import_module(path)  # waits for another thread that has begun to import it
     known = names(package)
     if name not in known:
@@ -47,7 +48,8 @@ def load(package, name, what, further=()):
 
 
 def unknown(what, name, known, more=()):
-    """One line for an unknown name: what it should name, the nearest known one, and those that are allowed.
+    """One line for an unknown name: what it should name, the nearest known one, and those that are
+    allowed.
 
     `more`: names that stand elsewhere and may be meant, too.
     """

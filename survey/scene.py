@@ -39,7 +39,8 @@ class Parameter:
     whole: bool = False
 
     def holds(self, values: npt.ArrayLike, outputs: Collection[str] = ()) -> npt.NDArray[np.bool_]:
-        """True where `values` (any shape) lie in the domain, that of `outputs` alone if these are given.
+        """True where `values` (any shape) lie in the domain, that of `outputs` alone if these are
+        given.
 
         NaN and infinities do not.
         """
@@ -49,7 +50,9 @@ class Parameter:
         inside = np.isfinite(values) & above & below
         if self.whole:
             inside = inside & (values == np.floor(values))
-        if self.excluded and not (self.but_for and outputs and all(name.startswith(self.but_for) for name in outputs)):
+        if self.excluded and not (
+            self.but_for and outputs and all(name.startswith(self.but_for) for name in outputs)
+        ):
             for value in self.excluded:
                 inside = inside & (values != value)
         return inside
@@ -57,8 +60,12 @@ class Parameter:
     @property
     def domain(self) -> str:
         """The domain in words, such as `0 <= k <= 10, k != 1`."""
-        low = f"{self.minimum:g} {'<' if self.open_minimum else '<='} " if self.minimum > -inf else ""
-        high = f" {'<' if self.open_maximum else '<='} {self.maximum:g}" if self.maximum < inf else ""
+        low = (
+            f"{self.minimum:g} {'<' if self.open_minimum else '<='} " if self.minimum > -inf else ""
+        )
+        high = (
+            f" {'<' if self.open_maximum else '<='} {self.maximum:g}" if self.maximum < inf else ""
+        )
         words = [f"{low}{self.name}{high}"] if low or high else []
         words += [f"{self.name} != {value:g}" for value in self.excluded]
         words += ["a whole number"] * self.whole
@@ -71,8 +78,8 @@ class Parameter:
 class Option:
     """A switch of the scene; the first choice is the default unless `default` says otherwise.
 
-    It exists only with the parameter `only_with`, only where other options have the values that `when` allows, and not
-    beside the parameter `replaced_by`, which specifies the same.
+    It exists only with the parameter `only_with`, only where other options have the values that
+    `when` allows, and not beside the parameter `replaced_by`, which specifies the same.
     """
 
     name: str
@@ -89,11 +96,12 @@ class Option:
 
 @dataclass(frozen=True)
 class Output:
-    """A result per point. A float comes with `NAME_error`; one with `flags` is an int8 code, else an int32 count.
+    """A result per point. A float comes with `NAME_error`; one with `flags` is an int8 code, else
+    an int32 count.
 
-    `applies` states when the output applies; where it does not, a float is NaN and an integer is `fill`.
-    `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`. One that is `on_request` is
-    given only if it is named.
+    `applies` states when the output applies; where it does not, a float is NaN and an integer is
+    `fill`. `dims` names extra (padded) dimensions, whose coordinates are the scene's `DIMENSIONS`.
+    One that is `on_request` is given only if it is named.
     """
 
     name: str
@@ -128,17 +136,20 @@ class Request:
     ranges: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
-        """(number, least, greatest) of the full axis of the parameter `name`, which no other shares; or None.
+        """(number, least, greatest) of the full axis of the parameter `name`, which no other
+        shares; or None.
 
-        What depends on an axis depends on all of it, never on the block, so that the bits do not depend on blocks.
+        What depends on an axis depends on all of it, never on the block, so that the bits do not
+        depend on blocks.
         """
         return self.lines.get(name)
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """One point solved in time: `data` as xarray.Dataset takes it, {name: (dimensions, values, attributes)}, and how
-    `survey.show.portrait` draws it: `panels`, each its kind and the names of the variables that it shows.
+    """One point solved in time: `data` as xarray.Dataset takes it, {name: (dimensions, values,
+    attributes)}, and how `survey.show.portrait` draws it: `panels`, each its kind and the names of
+    the variables that it shows.
     """
 
     data: Mapping[str, tuple[Any, ...]]
@@ -156,7 +167,9 @@ def named(answer: Any, name: str) -> str:
 
 
 def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") -> str:
-    """When the parameter `own` exists, in words: `; only with l; only when question = fate | portrait`; or nothing."""
+    """When the parameter `own` exists, in words: `; only with l; only when question = fate |
+    portrait`; or nothing.
+    """
     words, options = [], {option.name: option for option in scene.OPTIONS}
     for name, allowed in when.items():
         beside = options[name].only_with

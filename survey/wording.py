@@ -13,7 +13,8 @@ def counted(number, noun):
 
 
 def plain(text, most=LINE, lines=False):
-    """The text with control and invisible characters escaped, such as \\x1b, and the middle of a long one left out.
+    """The text with control and invisible characters escaped, such as \\x1b, and the middle of a
+    long one left out.
 
     `most`: characters that are kept. `lines`: are line breaks kept?
     """
@@ -22,7 +23,10 @@ def plain(text, most=LINE, lines=False):
         text = f"{text[:half]} [... {len(text) - 2 * half:,} characters ...] {text[-half:]}"
     if text.isprintable():
         return text
-    return "".join(c if _is_seen(c) or (lines and c == "\n") else c.encode("unicode_escape").decode() for c in text)
+    return "".join(
+        c if _is_seen(c) or (lines and c == "\n") else c.encode("unicode_escape").decode()
+        for c in text
+    )
 
 
 def short(text, most=SHOWN):
@@ -55,7 +59,9 @@ def listed(names):
     first = len(names)
     while first > 1 and len(", ".join(names[:first])) > LISTED:
         first -= 1
-    return ", ".join(names[:first]) + (f" and {len(names) - first} more" if first < len(names) else "")
+    return ", ".join(names[:first]) + (
+        f" and {len(names) - first} more" if first < len(names) else ""
+    )
 
 
 def _is_seen(character):

@@ -1,15 +1,22 @@
-"""The whole gyrostat by other means, with mpmath: motions by Taylor series, multipliers from motions beside them."""
+"""The whole gyrostat by other means, with mpmath: motions by Taylor series, multipliers from
+motions beside them.
+"""
 
 import flow_truth
 import mpmath as mp
 
 
 def tensors(body):
-    """A, B, C as matrices and lambda, s as lists, of the scene's parameters; what is not given has its default."""
+    """A, B, C as matrices and lambda, s as lists, of the scene's parameters; what is not given has
+    its default.
+    """
     given = {name: mp.mpf(value) for name, value in body.items()}
 
     def matrix(name):
-        entry = {key: given.get(f"{name}{key}", mp.mpf(1 if name == "A" and key[0] == key[1] else 0)) for key in KEYS}
+        entry = {
+            key: given.get(f"{name}{key}", mp.mpf(1 if name == "A" and key[0] == key[1] else 0))
+            for key in KEYS
+        }
         return mp.matrix(
             [[entry["11"], entry["12"], entry["31"]], [entry["12"], entry["22"], entry["23"]],
              [entry["31"], entry["23"], entry["33"]]]
@@ -23,7 +30,9 @@ KEYS = ("11", "22", "33", "12", "23", "31")
 
 
 def turned(body, Q):
-    """The body's parameters, as mpf, in axes in which its vectors v become Q v; `body` may hold omega and gamma too."""
+    """The body's parameters, as mpf, in axes in which its vectors v become Q v; `body` may hold
+    omega and gamma too.
+    """
     A, B, C, moment, s = tensors(body)
     out = {}
     for name, tensor in zip("ABC", (A, B, C), strict=True):
@@ -48,7 +57,9 @@ def rotation(a, b, c, d):
 
 
 def _series(body, inverse, state, order):
-    """Taylor coefficients of w and nu: A w' = (A w + lambda) x w + (B w) x nu + nu x (C nu) + s x nu, nu' = nu x w."""
+    """Taylor coefficients of w and nu: A w' = (A w + lambda) x w + (B w) x nu + nu x (C nu) + s x
+    nu, nu' = nu x w.
+    """
     A, B, C, moment, s = body
     w, nu = [[x] for x in state[:3]], [[x] for x in state[3:]]
     Aw, Bw, Cnu = ([], [], []), ([], [], []), ([], [], [])
@@ -86,7 +97,9 @@ def motion(body, state, t, digits=40):
         inverse = system[0] ** -1
         while left:
             rows = _series(system, inverse, state, digits)
-            largest = max(abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:])
+            largest = max(
+                abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:]
+            )
             step = mp.sign(left) * min(abs(left), 1 / (10 * largest))
             state = [_value(row, step) for row in rows]
             left -= step
@@ -94,13 +107,20 @@ def motion(body, state, t, digits=40):
 
 
 def returned(six, phi, w, rotates, digits=40):
-    """(time, phi, w) at which the reduced motion has made a turn, or (from w = 0) comes to rest for the second time."""
+    """(time, phi, w) at which the reduced motion has made a turn, or (from w = 0) comes to rest for
+    the second time.
+    """
     with mp.workdps(digits):
         six, phi, w, t = [mp.mpf(x) for x in six], mp.mpf(phi), mp.mpf(w), mp.mpf(0)
         target, sign, rests = phi + 2 * mp.pi * mp.sign(w), None, 0
         while True:
             rows = flow_truth.series(six, phi, w, digits)
-            step = 1 / (10 * max(abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:]))
+            step = 1 / (
+                10
+                * max(
+                    abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:]
+                )
+            )
             at = [_value(row, step) for row in rows]
             ahead = _value(rows[1], step / 1000) if sign is None else sign
             turned_back = not rotates and ahead * at[1] < 0
@@ -128,7 +148,8 @@ def cycle(six, phi, w, rotates, digits=40):
 
 
 def multipliers(body, Q, theta, phi, w, period, digits=40):
-    """Eigenvalues of the map of (w2, w3, eta) over the period, from motions beside it, in axes turned by Q.
+    """Eigenvalues of the map of (w2, w3, eta) over the period, from motions beside it, in axes
+    turned by Q.
 
     theta = None stands for pi/2.
     """
@@ -153,8 +174,11 @@ def multipliers(body, Q, theta, phi, w, period, digits=40):
             return [w_end[1], w_end[2], nu_end[0] / sin]
 
         base = end([0, 0, 0])
-        assert max(abs(base[0]), abs(base[1]), abs(base[2] - cos / sin)) < mp.mpf(10) ** (-digits // 2 - 4)
+        assert max(abs(base[0]), abs(base[1]), abs(base[2] - cos / sin)) < mp.mpf(10) ** (
+            -digits // 2 - 4
+        )
         columns = [
-            [(a - b) / h for a, b in zip(end([h * (i == j) for i in range(3)]), base, strict=True)] for j in range(3)
+            [(a - b) / h for a, b in zip(end([h * (i == j) for i in range(3)]), base, strict=True)]
+            for j in range(3)
         ]
         return sorted(mp.eig(mp.matrix(columns).T, left=False, right=False), key=lambda x: -abs(x))

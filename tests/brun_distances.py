@@ -1,9 +1,10 @@
-"""Writes survey/reference/brun_distances.json: states at distances from a separatrix, a pole and a double root.
+"""Writes survey/reference/brun_distances.json: states at distances from a separatrix, a pole and a
+double root.
 
     python tests/brun_distances.py
 
-60 digits by `survey.truth.brun_digits` from the exact binary64 numbers of each state; 40 are kept. `floors`: the
-changes of the outputs that half-ulp changes of the seven numbers add up to.
+60 digits by `survey.truth.brun_digits` from the exact binary64 numbers of each state; 40 are kept.
+`floors`: the changes of the outputs that half-ulp changes of the seven numbers add up to.
 """
 
 import json
@@ -54,7 +55,8 @@ def row(family, distance):
 def main():
     with mp.workdps(60):
         families = {
-            family: [row(family, distance) for distance in DISTANCES] for family in ("separatrix", "pole", "precession")
+            family: [row(family, distance) for distance in DISTANCES]
+            for family in ("separatrix", "pole", "precession")
         }
     path = Path(__file__).parent.parent / "survey" / "reference" / "brun_distances.json"
     path.write_text(json.dumps({"meta": META} | families, indent=1) + "\n")

@@ -31,7 +31,8 @@ path    = "small.nc"
 figures = ["w"]
 """
 
-if sys.platform == "win32":  # what they try is signals, links, pipes, modes, shells and mounts of POSIX
+# what they try is signals, links, pipes, modes, shells and mounts of POSIX
+if sys.platform == "win32":
     collect_ignore = [
         "test_files_from_others.py",
         "test_promises.py",
@@ -41,8 +42,8 @@ if sys.platform == "win32":  # what they try is signals, links, pipes, modes, sh
         "sweep/test_faults.py",
     ]
 
-# Tests of one family run in one worker, before all others, so that two workers seldom compile the same kernels.
-# (xdist's groups by marks do not work with pytest 9.)
+# Tests of one family run in one worker, before all others, so that two workers seldom compile the
+# same kernels. (xdist's groups by marks do not work with pytest 9.)
 FAMILIES = {
     "cylinder": "cylinder|gyrostat|(?<!l)abel|(?<!work)(?<!over)flow|junction",
     "hill": "hill|satellite|mathieu|taylor16|user_scene|damped|test_lie",
@@ -55,7 +56,10 @@ FAMILIES = {
 def _group(nodeid):
     """The family of a test, or its file."""
     name = nodeid.removeprefix("tests/").lower()
-    return next((family for family, words in FAMILIES.items() if re.search(words, name)), name.partition("::")[0])
+    return next(
+        (family for family, words in FAMILIES.items() if re.search(words, name)),
+        name.partition("::")[0],
+    )
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -74,14 +78,18 @@ def pytest_collection_modifyitems(items):
     groups = {}
     for item in items:
         groups.setdefault(_group(item.nodeid), []).append(item)
-    order = [*FAMILIES, *sorted(groups.keys() - FAMILIES, key=lambda name: (-len(groups[name]), name))]
+    order = [
+        *FAMILIES,
+        *sorted(groups.keys() - FAMILIES, key=lambda name: (-len(groups[name]), name)),
+    ]
     items[:] = [item for name in order for item in groups.get(name, [])]
 
 
 hypothesis.settings.register_profile("untimed", deadline=None)
 hypothesis.settings.load_profile("untimed")
 gc.set_threshold(100_000)  # as the program does: a tenth of the time in which kernels are compiled
-# Coverage's tracer would look at each line of numba's compiler: a kernel takes half as long again with it.
+# Coverage's tracer would look at each line of numba's compiler: a kernel takes half as long again
+# with it.
 _compile = Dispatcher.compile
 
 
@@ -99,7 +107,9 @@ Dispatcher.compile = _compile_untraced
 
 @pytest.fixture(autouse=True, scope="session")
 def state(tmp_path_factory):
-    """A state folder of the tests' own, in processes that they start too: no test learns what the user has run."""
+    """A state folder of the tests' own, in processes that they start too: no test learns what the
+    user has run.
+    """
     folder = tmp_path_factory.mktemp("state")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(folder))
@@ -113,7 +123,9 @@ def program(tmp_path):
     def run(*arguments, **keywords):
         command = [sys.executable, "-m", "survey", *map(str, arguments)]
         environment = os.environ | keywords.pop("env", {})
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, env=environment, **keywords)
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, env=environment, **keywords
+        )
 
     run.folder = tmp_path
     return run

@@ -1,4 +1,6 @@
-"""Danby's map in multiprecision: the factors that decide, the verdict and the collision by the multipliers' angles."""
+"""Danby's map in multiprecision: the factors that decide, the verdict and the collision by the
+multipliers' angles.
+"""
 
 from mpmath import mp, mpf
 
@@ -39,7 +41,8 @@ def decided(mu, e):
         ab, cd, t, k = found["A"] * found["B"], found["C"] * found["D"], found["t"], found["KC"]
         if k < 0:
             return 0, 2
-        first, second = ((t + sign * mp.sqrt(k)) / 2 for sign in (1, -1))  # w = -sin^2(theta / 2) is this less 1
+        # w = -sin^2(theta / 2) is this less 1
+        first, second = ((t + sign * mp.sqrt(k)) / 2 for sign in (1, -1))
         if not (ab > 0 and cd > 0 and 0 < t < 2):
             return 0, 1 if min(first, second) < 0 else 0
         if found["B"] * found["D"] > 0:

@@ -1,4 +1,6 @@
-"""Traces of monodromy matrices of Hill's equations with spikes, by a formula of order 8 in many even steps."""
+"""Traces of monodromy matrices of Hill's equations with spikes, by a formula of order 8 in many
+even steps.
+"""
 
 import numpy as np
 
@@ -19,7 +21,9 @@ def traces(z, points, period, steps):
 
 
 def beyond(z, points, period, found, bar):
-    """Which of the traces `found` (N) are off by more than their bars and what the truth itself may be off (N)."""
+    """Which of the traces `found` (N) are off by more than their bars and what the truth itself may
+    be off (N).
+    """
     (trace, _), (finer, size) = (traces(z, points, period, steps) for steps in (512, 1024))
     doubt = abs(trace - finer) + 1e-12 * (1 + size)
     assert np.median(doubt / (1 + size)) < 1e-9

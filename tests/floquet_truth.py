@@ -1,7 +1,8 @@
 """Linear periodic systems whose multipliers are known exactly, for tests.
 
-x = R(t) y with y' = B y, R(t) turning the planes of states (0, 1), (2, 3), ... once in 2 pi: x' = A(t) x with
-A = R' R^-1 + R B R^-1, and the multipliers are exp(2 pi l), l the eigenvalues of B: any matrix, normal or not.
+x = R(t) y with y' = B y, R(t) turning the planes of states (0, 1), (2, 3), ... once in 2 pi: x' =
+A(t) x with A = R' R^-1 + R B R^-1, and the multipliers are exp(2 pi l), l the eigenvalues of B: any
+matrix, normal or not.
 """
 
 import math
@@ -49,7 +50,9 @@ def multipliers(B):
 
 
 def hard(n, number, seed):
-    """Matrices B (number, n, n): simple, oscillating, next to the edge of stability, defective, far from normal."""
+    """Matrices B (number, n, n): simple, oscillating, next to the edge of stability, defective, far
+    from normal.
+    """
     rng = np.random.default_rng(seed)
     B = np.empty((number, n, n))
     for k in range(number):
@@ -67,6 +70,10 @@ def hard(n, number, seed):
             block[0, 1] = 1.0
         basis = np.linalg.qr(rng.normal(size=(n, n)))[0]
         if kind == 4:
-            basis = basis @ np.diag(10.0 ** rng.uniform(-2, 2, n)) @ np.linalg.qr(rng.normal(size=(n, n)))[0]
+            basis = (
+                basis
+                @ np.diag(10.0 ** rng.uniform(-2, 2, n))
+                @ np.linalg.qr(rng.normal(size=(n, n)))[0]
+            )
         B[k] = basis @ block @ np.linalg.inv(basis)
     return B

@@ -1,4 +1,6 @@
-"""The flow on the cylinder by other means: Taylor series with mpmath; polar coordinates about a focus, by SciPy."""
+"""The flow on the cylinder by other means: Taylor series with mpmath; polar coordinates about a
+focus, by SciPy.
+"""
 
 import math
 from itertools import pairwise
@@ -15,7 +17,8 @@ def series(six, phi, w, order):
     sine, cosine, phi, w = [mp.sin(phi)], [mp.cos(phi)], [phi], [w]
     for n in range(order):
         cw, sw, cs, cc, ss = (
-            mp.fdot(x, y[::-1]) for x, y in ((cosine, w), (sine, w), (cosine, sine), (cosine, cosine), (sine, sine))
+            mp.fdot(x, y[::-1])
+            for x, y in ((cosine, w), (sine, w), (cosine, sine), (cosine, cosine), (sine, sine))
         )
         rate = b12 * cw - b31 * sw - d * cs - c23 * (cc - ss) + s2 * cosine[n] - s3 * sine[n]
         for row, value in zip((sine, cosine, phi, w), (cw, -sw, w[n], rate), strict=True):
@@ -29,7 +32,9 @@ def exact(six, phi, w, t, digits=30, float_out=True):
         six, phi, w, left = list(map(mp.mpf, six)), mp.mpf(phi), mp.mpf(w), mp.mpf(t)
         while left:
             rows = series(six, phi, w, digits)
-            largest = max(abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:])
+            largest = max(
+                abs(c) ** (mp.mpf(1) / n) for row in rows for n, c in list(enumerate(row))[-2:]
+            )
             step = mp.sign(left) * min(abs(left), 1 / (10 * largest))
             phi, w = (mp.fdot(row, [step**n for n in range(digits + 1)]) for row in rows)
             left -= step
@@ -37,10 +42,11 @@ def exact(six, phi, w, t, digits=30, float_out=True):
 
 
 def zeros_beside_a_focus(six, phi, w, times):
-    """How often w changes sign before each time: in time to t = 10, then as the angle about the focus reached tells.
+    """How often w changes sign before each time: in time to t = 10, then as the angle about the
+    focus reached tells.
 
-    With x = rho cos a, w = rho sin a, u = ln rho, about the focus at e: g(e + x) without cancellation, so that rho may
-    be as small as it likes.
+    With x = rho cos a, w = rho sin a, u = ln rho, about the focus at e: g(e + x) without
+    cancellation, so that rho may be as small as it likes.
     """
     b12, b31, d, c23, s2, s3 = six
 
@@ -48,7 +54,10 @@ def zeros_beside_a_focus(six, phi, w, times):
         """f(e + x), and g(e + x) / x as sin and cos differ from those at e."""
         half, whole = math.sin(x / 2) / x, math.sin(x) / x
         sine, cosine = 2 * math.cos(e + x / 2) * half, -2 * math.sin(e + x / 2) * half
-        double_sine, double_cosine = 2 * math.cos(2 * e + x) * whole, -2 * math.sin(2 * e + x) * whole
+        double_sine, double_cosine = (
+            2 * math.cos(2 * e + x) * whole,
+            -2 * math.sin(2 * e + x) * whole,
+        )
         g = -d / 2 * double_sine - c23 * double_cosine + s2 * cosine - s3 * sine
         return b12 * math.cos(e + x) - b31 * math.sin(e + x), g
 
@@ -68,7 +77,9 @@ def zeros_beside_a_focus(six, phi, w, times):
         (0, first), [phi, w], "DOP853", rtol=1e-13, atol=1e-13, dense_output=True,
     )  # fmt: skip
     sign = np.sign(early.sol(np.linspace(0, first, 20001))[1])
-    counts = [int(np.count_nonzero(np.diff(sign[: 1 + int(2000 * t)]))) for t in times if t <= first]
+    counts = [
+        int(np.count_nonzero(np.diff(sign[: 1 + int(2000 * t)]))) for t in times if t <= first
+    ]
     x, v = early.y[:, -1]
     lattice = np.linspace(x - 1.5, x + 1.5, 301)
     falls = [(a, b) for a, b in pairwise(lattice) if force(a) > 0 > force(b)]
@@ -79,11 +90,15 @@ def zeros_beside_a_focus(six, phi, w, times):
     run = solve_ivp(rates, (first, late[-1]), [angle, math.log(math.hypot(x - e, v))], "DOP853",
                     t_eval=late, rtol=1e-12, atol=1e-12)  # fmt: skip
     base = int(np.count_nonzero(np.diff(sign)))
-    return counts + [base + int(abs(math.floor(a / math.pi) - math.floor(angle / math.pi))) for a in run.y[0]]
+    return counts + [
+        base + int(abs(math.floor(a / math.pi) - math.floor(angle / math.pi))) for a in run.y[0]
+    ]
 
 
 def roots(six):
-    """The complex angles at which g = 0, a root as often as its multiplicity says: from a polynomial in exp(i phi)."""
+    """The complex angles at which g = 0, a root as often as its multiplicity says: from a
+    polynomial in exp(i phi).
+    """
     with mp.workdps(60):
         d, c23, s2, s3 = map(mp.mpf, six[2:])
         a, b = mp.mpc(-c23, d / 2) / 2, mp.mpc(s2, s3) / 2

@@ -27,13 +27,19 @@ def solve(body="prolate", method="auto", rtol=1e-10, **point):
 
 
 def factors(body, rho, low=0.0, **modulus):
-    """The ten results of one point of the satellite, by the double-double kernel itself (held against mpmath)."""
+    """The ten results of one point of the satellite, by the double-double kernel itself (held
+    against mpmath).
+    """
     shared = satellite.moduli({name: np.array([[value]]) for name, value in modulus.items()})
     row = satellite.Motion(*(np.ravel(values) for values in shared), body == "oblate")
     problem = satellite._problem(row, np.array([[rho]]))
     phase, distance = taylor_double.hill_density()
-    steps = 2 * np.ceil(0.5 * row.period / 2 * np.maximum(phase * (abs(rho) + row.k + 1), distance * row.rate))
-    return problem.exact(np.zeros(1, int), np.array([rho]), np.array([low]), steps.astype(np.int64))[0]
+    steps = 2 * np.ceil(
+        0.5 * row.period / 2 * np.maximum(phase * (abs(rho) + row.k + 1), distance * row.rate)
+    )
+    return problem.exact(
+        np.zeros(1, int), np.array([rho]), np.array([low]), steps.astype(np.int64)
+    )[0]
 
 
 def truth(case):
@@ -49,7 +55,9 @@ def truth(case):
     with mp.workdps(40):
         known = {name: mpf(case[key]) for name, key in names.items()}
         known["exponent"] = mpf(0) if case["stable"] else mp.acosh(abs(known["discriminant"]) / 2)
-        known["rotation_number"] = rotation(known["discriminant"], case["zeros_y1_half"] + case["zeros_y2_half"])
+        known["rotation_number"] = rotation(
+            known["discriminant"], case["zeros_y1_half"] + case["zeros_y2_half"]
+        )
     return known
 
 
@@ -73,8 +81,16 @@ def mathieu(a, q, half_periods=1):
         out[:, :, 0] = -2 * q[rows][:, None, None] * np.cos(2 * t)
         return out
 
-    rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
-    rule = np.where((q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0), ON_EDGE, NO_RULE)
+    rule = np.where(
+        (q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0),
+        ON_EDGE,
+        NO_RULE,
+    )
+    rule = np.where(
+        (q[:, None] == 0) & (np.sqrt(abs(a)) == np.rint(np.sqrt(abs(a)))) & (a >= 0),
+        ON_EDGE,
+        NO_RULE,
+    )
     return monodromy.Problem(
         p=a.copy(), span=np.full(len(a), half), rate=np.full(len(a), 2.0), c2=0.0, sample=sample,
         bound=np.column_stack([2 * abs(q), np.ones(len(a)), np.zeros(len(a))]), rule=rule.astype(np.int8),
@@ -82,9 +98,11 @@ def mathieu(a, q, half_periods=1):
 
 
 def mp_factors(family, k, rho, digits=30):
-    """y1, y1', y2, y2' at T/2 and the zeros of y1, y2 inside, by Taylor series with mpmath: nothing shared with survey.
+    """y1, y1', y2, y2' at T/2 and the zeros of y1, y2 inside, by Taylor series with mpmath: nothing
+    shared with survey.
 
-    sn, cn, dn and both solutions are carried by their own differential equations, to an order of one for each digit.
+    sn, cn, dn and both solutions are carried by their own differential equations, to an order of
+    one for each digit.
     """
     with mp.workdps(digits):
         k, rho, order = mpf(k), mpf(rho), digits
@@ -98,7 +116,9 @@ def mp_factors(family, k, rho, digits=30):
         zeros = [0, 0]
         for _ in range(steps):
             new = _mp_step(state, h, scale, m, k, rho, c, rotates, order)
-            zeros = [n + ((new[i] < 0) != (state[i] < 0)) for n, i in zip(zeros, (3, 5), strict=True)]
+            zeros = [
+                n + ((new[i] < 0) != (state[i] < 0)) for n, i in zip(zeros, (3, 5), strict=True)
+            ]
             state = new
         return (*state[3:], *zeros)
 

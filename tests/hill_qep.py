@@ -1,7 +1,7 @@
 """Edges of tongues by the Fourier quadratic eigenproblem (scenes/satellite.md): no integrator.
 
-y = sum of a_j cos or sin(f_j u), z = g(u) + 2 rho w(u) + rho^2 with g, w by their cosine series: in each of the four
-classes (A0 + rho A1 + rho^2) a = 0, linearised to twice its size.
+y = sum of a_j cos or sin(f_j u), z = g(u) + 2 rho w(u) + rho^2 with g, w by their cosine series: in
+each of the four classes (A0 + rho A1 + rho^2) a = 0, linearised to twice its size.
 """
 
 from functools import cache
@@ -36,7 +36,9 @@ def eigenvalues(period, w, g, kind, harmonics):
 
 
 def coefficients(body, k, number):
-    """The period, and c_0, c_1, ... of w and of z at rho = 0, as series c_0 + 2 c_1 cos ..., by mpmath's cn, dn."""
+    """The period, and c_0, c_1, ... of w and of z at rho = 0, as series c_0 + 2 c_1 cos ..., by
+    mpmath's cn, dn.
+    """
     samples = 4 * number
     period, w = motion(k, samples)
     with mp.workdps(20):

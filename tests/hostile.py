@@ -1,4 +1,5 @@
-"""Files as strangers might write them: mutations of a small sound survey, and every question that is asked of one.
+"""Files as strangers might write them: mutations of a small sound survey, and every question that
+is asked of one.
 
 python tests/hostile.py 1000 3      # mutations 1000, 1001, 1002: what each is, and what was found
 """
@@ -66,21 +67,36 @@ NAMES = (
 OF_HDF5 = (
     "CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates", "_NCProperties",
 )  # fmt: skip
-MORE = ["_FillValue", "scale_factor", "_Encoding", "units", "calendar", "missing_value", "coordinates", "symbol"]
+MORE = [
+    "_FillValue",
+    "scale_factor",
+    "_Encoding",
+    "units",
+    "calendar",
+    "missing_value",
+    "coordinates",
+    "symbol",
+]
 NUMBERS = (np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324, 0.0, -1.0, 99.0)
 # What Matplotlib 3.8 calls in a newer pyparsing; Python shows users none of these.
 OLDER = {"category": DeprecationWarning, "message": r"'\w+' (argument is )?deprecated"}
 
 
 def base(folder, scene="evil.py"):
-    """A sound file in the folder that names this scene, and the file `evil.py` beside it; the sentinel's path."""
+    """A sound file in the folder that names this scene, and the file `evil.py` beside it; the
+    sentinel's path.
+    """
     sentinel = folder.parent / "owned"
     text = EVIL.format(sentinel=str(sentinel))
     (folder / "evil.py").write_text(text)
     shutil.copy(GOLDEN, folder / "base.nc")
     if scene != "mathieu":
         with netCDF4.Dataset(folder / "base.nc", "a") as file:
-            attributes = {"scene": scene, "scene_text": text, "scene_hash": hashlib.sha256(text.encode()).hexdigest()}
+            attributes = {
+                "scene": scene,
+                "scene_text": text,
+                "scene_hash": hashlib.sha256(text.encode()).hexdigest(),
+            }
             file.setncatts(attributes)
     digest(folder / "base.nc")
     return sentinel
@@ -97,7 +113,8 @@ def mutate(source, path, seed):
     rng = np.random.default_rng(seed)
     kinds = [attribute, attribute, attribute, lost, lost, variable, variable, axis, dimension]
     changed = []
-    path.unlink(missing_ok=True)  # HDF5 knows an open file by its inode, and would go on showing the one before
+    # HDF5 knows an open file by its inode, and would go on showing the one before
+    path.unlink(missing_ok=True)
     shutil.copy(source, path)
     for _ in range(1 + int(rng.integers(5) == 0)):
         changed.append(kinds[rng.integers(len(kinds))](path, rng))
@@ -122,7 +139,11 @@ def attribute(path, rng):
         names = [name for name in place.attrs if name not in OF_HDF5]
         name = _pick(rng, names + MORE * (not names or not rng.integers(4)))
         value = _pick(rng, TEXTS if rng.integers(3) else VALUES)
-        value = np.array([value] * 2, h5py.string_dtype()) if isinstance(value, str) and not rng.integers(8) else value
+        value = (
+            np.array([value] * 2, h5py.string_dtype())
+            if isinstance(value, str) and not rng.integers(8)
+            else value
+        )
         try:
             place.attrs[name] = value
         except (ValueError, TypeError, OSError, RuntimeError):
@@ -158,7 +179,9 @@ def _again(path, change):
 
 def variable(path, rng):
     """A variable that is missing, of another type, shape or name, or has other values."""
-    how = _pick(rng, ["drop", "float", "text", "wide", "transpose", "rename", "values", "codes", "more"])
+    how = _pick(
+        rng, ["drop", "float", "text", "wide", "transpose", "rename", "values", "codes", "more"]
+    )
     changed = []
 
     def change(ds):
@@ -175,10 +198,20 @@ def variable(path, rng):
         if how == "wide":
             return ds.assign({name: ds[name].expand_dims("wide", -1)})
         if how in ("float", "text"):
-            return ds.assign({name: ds[name].astype(float if how == "float" else str).assign_attrs(ds[name].attrs)})
+            return ds.assign(
+                {
+                    name: ds[name]
+                    .astype(float if how == "float" else str)
+                    .assign_attrs(ds[name].attrs)
+                }
+            )
         values = np.array(ds[name].values)
         some = rng.random(values.shape) < 0.3
-        values[some] = _pick(rng, NUMBERS) if values.dtype.kind == "f" else int(_pick(rng, [-128, -1, 9, 99, 127]))
+        values[some] = (
+            _pick(rng, NUMBERS)
+            if values.dtype.kind == "f"
+            else int(_pick(rng, [-128, -1, 9, 99, 127]))
+        )
         return ds.assign({name: (ds[name].dims, values, ds[name].attrs)})
 
     return f"{how} " + (_again(path, change) or " ".join(map(str, changed)))
@@ -212,14 +245,17 @@ def dimension(path, rng):
         if how == "rename":
             return ds.rename({dim: _pick(rng, NAMES)})
         if how == "twice":
-            return xr.concat([ds, ds], dim, data_vars="minimal", coords="minimal", compat="override")
+            return xr.concat(
+                [ds, ds], dim, data_vars="minimal", coords="minimal", compat="override"
+            )
         return ds.isel({dim: slice(0, int(how == "one"))})
 
     return f"{how} " + (_again(path, change) or " ".join(map(str, changed)))
 
 
 def ask(path, sentinel, points=0, solve=False, draw=True):
-    """What the commands and `ds.survey` say of the file: [(question, what is wrong with the answer)].
+    """What the commands and `ds.survey` say of the file: [(question, what is wrong with the
+    answer)].
 
     `solve`: those that solve points, too. `draw`: those that draw, which take longest, too.
     """
@@ -232,7 +268,10 @@ def ask(path, sentinel, points=0, solve=False, draw=True):
     if opened:
         commands += [["info", at], ["info", at, "--json"]]
     if opened and draw:
-        commands += [["plot", at, "-o", str(picture)], ["plot", at, "--var", "exponent", "-o", str(picture)]]
+        commands += [
+            ["plot", at, "-o", str(picture)],
+            ["plot", at, "--var", "exponent", "-o", str(picture)],
+        ]
     for words in commands:
         found += [(" ".join(words), wrong) for wrong in command(words)]
     for ds in opened:
@@ -240,7 +279,9 @@ def ask(path, sentinel, points=0, solve=False, draw=True):
             found += [(what, wrong) for wrong in answered(call, what in ("point's HTML", "page"))]
     picture.unlink(missing_ok=True)
     left = {file.name for file in set(path.parent.iterdir()) ^ before}
-    found += [("all", f"wrote {left}")] * bool(left) + [("all", "ran the scene")] * sentinel.exists()
+    found += [("all", f"wrote {left}")] * bool(left) + [
+        ("all", "ran the scene")
+    ] * sentinel.exists()
     return found
 
 
@@ -313,8 +354,13 @@ def questions(ds, path, solve, draw):
         return "\n".join(shown.under(shown.read(""), (0, 0))).replace("\n", " ")
 
     def reused():
-        axes = {"a": {"start": 0.5, "stop": 9.5, "num": 4}, "q": {"start": 0.0, "stop": 5.0, "num": 3}}
-        ours = workflow.check({"scene": "mathieu", "axes": axes}, output=path.parent.parent / "reused.nc")
+        axes = {
+            "a": {"start": 0.5, "stop": 9.5, "num": 4},
+            "q": {"start": 0.0, "stop": 5.0, "num": 3},
+        }
+        ours = workflow.check(
+            {"scene": "mathieu", "axes": axes}, output=path.parent.parent / "reused.nc"
+        )
         return earlier.find(ours, path)[1]
 
     asked = {

@@ -17,7 +17,20 @@ DIGITS = 80
 def factors(w1, w2):
     """The FORM_FACTORS from frequencies of any type; exchanging w1 and -w2 exchanges the two modes."""
     u, v = w1 * w1, w2 * w2
-    return w1, w2, u, v, u - v, 1 - 5 * u, 1 - 5 * v, 1 - 10 * u, 1 - 10 * v, 4 - u, 4 - v, 9 - 4 * u * v
+    return (
+        w1,
+        w2,
+        u,
+        v,
+        u - v,
+        1 - 5 * u,
+        1 - 5 * v,
+        1 - 10 * u,
+        1 - 10 * v,
+        4 - u,
+        4 - v,
+        9 - 4 * u * v,
+    )
 
 
 def form(name, w1, w2):
@@ -56,7 +69,9 @@ def on_ray(mu, ray=2):
         root = mp.sqrt(a11 * a11 - 4 * a20 * a02) * (1 if ray == 1 else -1)
         alpha = (root - a11) / (2 * a20)
         beta = w2 - alpha * w1
-        return sum(c[label] * alpha ** int(label[0]) * beta ** int(label[2]) for label in LABELS[6:])
+        return sum(
+            c[label] * alpha ** int(label[0]) * beta ** int(label[2]) for label in LABELS[6:]
+        )
 
 
 def masses(number, seed=0):
@@ -64,7 +79,9 @@ def masses(number, seed=0):
     random = np.random.default_rng(seed)
     parts = [random.uniform(0, 0.0385, number), 10 ** random.uniform(-9, -1.42, number)]
     for critical in map(float, CRITICAL):
-        parts += [critical * (1 + side * 10 ** -random.uniform(1, 15.5, number)) for side in (-1, 1)]
+        parts += [
+            critical * (1 + side * 10 ** -random.uniform(1, 15.5, number)) for side in (-1, 1)
+        ]
         parts.append([critical])
     mu = np.concatenate([*parts, [1e-9, 1e-100]])
     return mu[mu < float(CRITICAL[2])]

@@ -1,7 +1,9 @@
-"""The normal form at L4 once more, slow and plain: Deprit's triangle on dictionaries, 40 digits, no symmetry used.
+"""The normal form at L4 once more, slow and plain: Deprit's triangle on dictionaries, 40 digits, no
+symmetry used.
 
-Independent of `survey/kernels/lie*`: another expansion (Legendre's recurrence, in normal modes that are found from the
-linear equations), another transformation (one generator, all of its terms), another arithmetic.
+Independent of `survey/kernels/lie*`: another expansion (Legendre's recurrence, in normal modes that
+are found from the linear equations), another transformation (one generator, all of its terms),
+another arithmetic.
 """
 
 from math import comb, factorial
@@ -57,7 +59,9 @@ def modes(mu):
         columns.append([c / mp.sqrt(size) for c in column])
     half = 1 / mp.sqrt(2)
     columns.append([0, 0, half, 0, 0, mpc(0, half)])
-    return omega, columns + [[mpc(0, 1) * mp.conj(mpmathify(c)) for c in column] for column in columns]
+    return omega, columns + [
+        [mpc(0, 1) * mp.conj(mpmathify(c)) for c in column] for column in columns
+    ]
 
 
 def hamiltonian(mu, top):
@@ -65,7 +69,8 @@ def hamiltonian(mu, top):
     omega, columns = modes(mu)
     units = [tuple(int(i == j) for i in range(6)) for j in range(6)]
     xi, eta, zeta = (
-        {m: column[i] for m, column in zip(units, columns, strict=True) if column[i] != 0} for i in range(3)
+        {m: column[i] for m, column in zip(units, columns, strict=True) if column[i] != 0}
+        for i in range(3)
     )
     square = combine((1, multiply(xi, xi)), (1, multiply(eta, eta)), (1, multiply(zeta, zeta)))
     H = {2: {tuple(int(i % 3 == j) for i in range(6)): mpc(0, omega[j]) for j in range(3)}}
@@ -73,7 +78,10 @@ def hamiltonian(mu, top):
         s = combine((mpf(sign) / 2, xi), (mp.sqrt(3) / 2, eta))
         before, R = {(0,) * 6: mpc(1)}, s
         for n in range(1, top):
-            after = combine((mpf(2 * n + 1) / (n + 1), multiply(s, R)), (mpf(-n) / (n + 1), multiply(square, before)))
+            after = combine(
+                (mpf(2 * n + 1) / (n + 1), multiply(s, R)),
+                (mpf(-n) / (n + 1), multiply(square, before)),
+            )
             before, R = R, after
             if n + 1 > 2:
                 H[n + 1] = combine((1, H.get(n + 1, {})), (mass * -((-1) ** (n + 1)), R))
@@ -84,7 +92,8 @@ def normal_form(mu, order):
     """{(i, j, k): complex coefficient of r1^i r2^j r3^k} of degrees 4, ..., order, r_j = i x_j y_j."""
     omega, H = hamiltonian(mu, order)
     count = order - 2
-    F = {(n, 0): combine((factorial(n), H[n + 2])) for n in range(count + 1)}  # F[n, k]: column n, row k
+    # F[n, k]: column n, row k
+    F = {(n, 0): combine((factorial(n), H[n + 2])) for n in range(count + 1)}
     W, out = {}, {}
     for n in range(1, count + 1):
         W[n] = {}
@@ -94,7 +103,8 @@ def normal_form(mu, order):
             F[m, k] = combine((1, F[m + 1, k - 1]), *parts)
         known = F[0, n]
         off = {e: c for e, c in known.items() if e[:3] != e[3:]}
-        rate = {e: mpc(0, sum(omega[j] * (e[3 + j] - e[j]) for j in range(3))) for e in off}  # {H2, m} = rate m
+        # {H2, m} = rate m
+        rate = {e: mpc(0, sum(omega[j] * (e[3 + j] - e[j]) for j in range(3))) for e in off}
         W[n] = {e: -c / rate[e] for e, c in off.items()}
         for k in range(1, n + 1):
             F[n - k, k] = combine((1, F[n - k, k]), (-1, off))

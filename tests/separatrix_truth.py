@@ -12,7 +12,11 @@ def saddles(six):
     row = [-c23 - s2, 2 * (d - s3), 6 * c23, -2 * (d + s3), s2 - c23]
     found = [] if row[0] else [mp.pi]
     row = row[next((i for i, x in enumerate(row) if x), 4) :]
-    found += [2 * mp.atan(u.real) for u in mp.polyroots(row, 2000, extraprec=900) if abs(u.imag) < mp.mpf(10) ** -20]
+    found += [
+        2 * mp.atan(u.real)
+        for u in mp.polyroots(row, 2000, extraprec=900)
+        if abs(u.imag) < mp.mpf(10) ** -20
+    ]
     return sorted(x % (2 * mp.pi) for x in found if slope(six, x) > 0)
 
 
@@ -34,7 +38,10 @@ def branch(six, number, phi0, stable, left):
         f = [f0, -b12 * mp.sin(angle) - b31 * mp.cos(angle), -f0 / 2]
         double = d / 2 * mp.sin(2 * angle) + c23 * mp.cos(2 * angle)
         turned = d / 2 * mp.cos(2 * angle) - c23 * mp.sin(2 * angle)
-        one, other = s2 * mp.cos(angle) - s3 * mp.sin(angle), -s2 * mp.sin(angle) - s3 * mp.cos(angle)
+        one, other = (
+            s2 * mp.cos(angle) - s3 * mp.sin(angle),
+            -s2 * mp.sin(angle) - s3 * mp.cos(angle),
+        )
         g = [0, dg, -one / 2 + 2 * double, -other / 6 + mp.mpf(8) / 6 * turned]
         for n in (2, 3):
             known = (

@@ -1,4 +1,6 @@
-"""What stands in the README and the documentation, run as it stands: the fenced blocks of a page, in a small copy."""
+"""What stands in the README and the documentation, run as it stands: the fenced blocks of a page,
+in a small copy.
+"""
 
 import re
 from pathlib import Path

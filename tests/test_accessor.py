@@ -1,4 +1,6 @@
-"""`ds.survey`: each question asked of small surveys, and its answer compared with something it was not made from."""
+"""`ds.survey`: each question asked of small surveys, and its answer compared with something it was
+not made from.
+"""
 
 import json
 import math
@@ -34,12 +36,17 @@ def mathieu():
 
 @pytest.fixture(scope="module")
 def toy():
-    """A disc of radius 0.3 that is unstable, in the unit square; some points undecided, failed and outside."""
+    """A disc of radius 0.3 that is unstable, in the unit square; some points undecided, failed and
+    outside.
+    """
     x, y = np.linspace(0, 1, 101), np.linspace(0, 1, 81)
     verdict = np.where(np.hypot(x[:, None] - 0.5, y - 0.5) < 0.3, 0, 1).astype(np.int8)
     state = np.zeros(verdict.shape, np.int8)
     verdict[:3, :3], verdict[-5:, -5:], state[-5:, -5:] = -1, -1, status.STEP_LIMIT
-    flags = {"flag_values": np.array([-1, 0, 1], np.int8), "flag_meanings": "undecided unstable stable"}
+    flags = {
+        "flag_values": np.array([-1, 0, 1], np.int8),
+        "flag_meanings": "undecided unstable stable",
+    }
     return xr.Dataset(
         {"verdict": (("k", "rho"), verdict, flags), "status": (("k", "rho"), state)},
         {"k": x, "rho": y}, {"scene": "satellite", "options": "body=prolate", "title": "A toy map"},
@@ -47,7 +54,9 @@ def toy():
 
 
 def within(value, exact, bar):
-    """Is the true error within the bar, which is no wider than some thousand roundings of the motion's size?"""
+    """Is the true error within the bar, which is no wider than some thousand roundings of the
+    motion's size?
+    """
     return abs(mpmath.mpf(float(value)) - exact) <= float(bar) < 1e-9 * (1 + abs(exact))
 
 
@@ -108,10 +117,16 @@ def test_a_point_is_the_nearest_one_with_its_bars_and_reasons(mathieu):
         ("libration_elliptic", {"mu": 0.05, "e": 0.1}, "is not positive (at 0 two pairs meet)"),
         ("libration_elliptic", {"mu": 0.01, "e": 0.1}, "> 0, and so are"),
         pytest.param(
-            "brun", STATE | {"theta0": 1.0, "p_psi": 0.6, "p_phi": 0.4}, "beyond the error bars", marks=pytest.mark.slow
+            "brun",
+            STATE | {"theta0": 1.0, "p_psi": 0.6, "p_phi": 0.4},
+            "beyond the error bars",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
-            "brun", STATE | {"theta0": 1.0, "p_psi": 0.5, "p_phi": 0.5}, "passes a pole", marks=pytest.mark.slow
+            "brun",
+            STATE | {"theta0": 1.0, "p_psi": 0.5, "p_phi": 0.5},
+            "passes a pole",
+            marks=pytest.mark.slow,
         ),
         ("brun", {"l": 1.0, "alpha": 0.2, "beta": 0.1}, "separatrix_distance = "),
     ],
@@ -124,7 +139,10 @@ def test_every_scene_says_why(scene, given, words):
 
 def test_a_portrait_says_why():
     found = {"K": 0.06, "K_error": 1e-16, "stratum": "G", "verdict": "structurally_stable"}
-    found |= {"cycle_multiplier": np.array([np.nan, 1.1, 0.95]), "cycle_multiplier_error": np.full(3, 1e-12)}
+    found |= {
+        "cycle_multiplier": np.array([np.nan, 1.1, 0.95]),
+        "cycle_multiplier_error": np.full(3, 1e-12),
+    }
     words = "stratum G, K = 0.06 +- 1e-16, the multiplier nearest to 1 is 0.95 +- 1e-12: no margin is within"
     assert gyrostat.why(found).startswith(words)
 
@@ -141,7 +159,8 @@ def test_a_fate_says_why():
         ("mathieu", {"a": 3.0, "q": 0.7}),
         ("mathieu", {"a": 1.0, "q": 0.5}),
         ("satellite", {"k": 0.5, "rho": 1.2, "body": "oblate"}),
-        ("satellite", {"amplitude": 0.974, "inertia_ratio": 0.69}),  # 173 steps would do for half a period
+        # 173 steps would do for half a period
+        ("satellite", {"amplitude": 0.974, "inertia_ratio": 0.69}),
         ("satellite", {"one_minus_k": -0.5, "inertia_ratio": 0.6, "direction": "-1"}),
     ],
 )
@@ -153,7 +172,9 @@ def test_solutions_of_hills_equation_pass_through_the_factors(scene, given):
     assert abs(half[time] - 0.5 * known.period) < 1e-12
     for name in ("y1", "y2"):
         assert close(half[name], known[name], float(half[f"{name}_error"] + known[f"{name}_error"]))
-    assert close(motion.multiplier_real.sum(), known.discriminant, 2 * float(motion.multiplier_error.max()))
+    assert close(
+        motion.multiplier_real.sum(), known.discriminant, 2 * float(motion.multiplier_error.max())
+    )
     size = np.hypot(motion.multiplier_real, motion.multiplier_imag)
     assert (abs(size - 1) <= motion.multiplier_error).all() == (known.verdict == 1)
 
@@ -172,7 +193,9 @@ def test_ones_own_equation_has_points_trajectories_and_zooms():
 
 
 def test_options_without_a_motion_are_refused_in_one_line(monkeypatch):
-    monkeypatch.setattr("survey.scenes.mathieu.trajectory", lambda point, answer, options, time=None: None)
+    monkeypatch.setattr(
+        "survey.scenes.mathieu.trajectory", lambda point, answer, options, time=None: None
+    )
     with pytest.raises(survey.BadInput, match=r"^the scene mathieu draws no trajectory$"):
         survey.evaluate("mathieu", a=1.5, q=0.1).survey.trajectory()
 
@@ -182,7 +205,9 @@ def test_the_orbit_beside_l4_is_the_exponential_of_the_matrix(mu):
     motion = survey.evaluate("libration", mu=mu).survey.trajectory(figure=False)
     with mpmath.workdps(25):
         s = mpmath.sqrt(1 - 3 * mpmath.mpf(mu) * (1 - mpmath.mpf(mu)))
-        matrix = mpmath.matrix([[0, 0, 1, 0], [0, 0, 0, 1], [1.5 * (1 + s), 0, 0, 2], [0, 1.5 * (1 - s), -2, 0]])
+        matrix = mpmath.matrix(
+            [[0, 0, 1, 0], [0, 0, 0, 1], [1.5 * (1 + s), 0, 0, 2], [0, 1.5 * (1 - s), -2, 0]]
+        )
         for i in (1, motion.sizes["f"] // 2, -1):
             exact = mpmath.expm(matrix * mpmath.mpf(float(motion.f[i])))
             for j, name in enumerate(("xi", "eta")):
@@ -202,9 +227,13 @@ def test_the_second_solution_of_lames_equation_is_sn_within_its_bars(k):
 def test_solutions_of_mathieus_equation_are_within_their_bars(a, q):
     motion = survey.evaluate("mathieu", a=a, q=q).survey.trajectory(figure=False, time=2.0)
     with mpmath.workdps(25):
-        exact = mpmath.odefun(lambda t, y: [y[1], -(a - 2 * q * mpmath.cos(2 * t)) * y[0]], 0, [1, 0])
+        exact = mpmath.odefun(
+            lambda t, y: [y[1], -(a - 2 * q * mpmath.cos(2 * t)) * y[0]], 0, [1, 0]
+        )
         for i in (1, motion.sizes["t"] // 2, -1):
-            assert within(motion.y1[i], exact(mpmath.mpf(float(motion.t[i])))[0], motion.y1_error[i])
+            assert within(
+                motion.y1[i], exact(mpmath.mpf(float(motion.t[i])))[0], motion.y1_error[i]
+            )
 
 
 def test_multipliers_of_the_elliptic_problem_are_those_of_its_monodromy():
@@ -225,7 +254,9 @@ def test_multipliers_of_the_elliptic_problem_are_those_of_its_monodromy():
 
 
 def test_the_orbit_of_a_gyrostat_ends_where_its_reference_does():
-    case = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())["trajectories"][0]
+    case = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())[
+        "trajectories"
+    ][0]
     numbers = [float.fromhex(case[key]) for key in ("phi0_hex", "w0_hex")]
     given = dict(zip(GYROSTAT, [*map(float.fromhex, case["p_hex"]), *numbers], strict=True))
     ds = survey.evaluate("gyrostat", question="trajectory", t=1.0, **given)
@@ -251,8 +282,13 @@ def test_the_axis_of_a_body_moves_on_the_sphere_without_jumps(given):
     speed = np.linalg.norm(np.diff(path), axis=0) / np.diff(motion.t)
     np.testing.assert_allclose((path**2).sum(axis=0), 1.0, atol=1e-12)
     assert np.abs(np.diff(speed)).max() < 0.1 * speed.max()
-    low, high = float(np.nanmin(ds.u_min)), float(ds.u_max.values.ravel()[np.nanargmin(ds.u_min.values.ravel())])
-    assert motion.u.min() == pytest.approx(low, abs=1e-5) and motion.u.max() == pytest.approx(high, abs=1e-5)
+    low, high = (
+        float(np.nanmin(ds.u_min)),
+        float(ds.u_max.values.ravel()[np.nanargmin(ds.u_min.values.ravel())]),
+    )
+    assert motion.u.min() == pytest.approx(low, abs=1e-5) and motion.u.max() == pytest.approx(
+        high, abs=1e-5
+    )
 
 
 def test_the_boundary_between_points_holds_the_true_one(mathieu):
@@ -290,18 +326,30 @@ def test_the_boundary_in_a_file_is_told_by_class_and_index(tongues):
 def test_a_zoom_is_the_same_workflow_on_a_part(tongues, tmp_path):
     ds = survey.open(tongues)
     finer = ds.survey.zoom(q=(0.5, 1.0), num=3)
-    assert finer.sizes["q"] == 3 and finer.a.identical(ds.a) and {"curve_count", "area"} <= set(finer)
+    assert (
+        finer.sizes["q"] == 3 and finer.a.identical(ds.a) and {"curve_count", "area"} <= set(finer)
+    )
     written = finer.survey.zoom(q=(0.5, 0.75), num={"q": 2}, output=tmp_path / "part.nc")
-    assert survey.open(tmp_path / "part.nc").attrs["title"] == written.attrs["title"] == "Tongues, a part, a part"
+    assert (
+        survey.open(tmp_path / "part.nc").attrs["title"]
+        == written.attrs["title"]
+        == "Tongues, a part, a part"
+    )
     assert (finer.survey.compare(written).y1_excess <= 1).all()
     row = ds.survey.slice(q=0.8).survey.zoom(a=(3.0, 4.0))
-    assert row.sizes["a"] == 6 and set(row.edge_position.dims) == {"edge"} and float(row.q) == float(ds.q[1])
+    assert (
+        row.sizes["a"] == 6
+        and set(row.edge_position.dims) == {"edge"}
+        and float(row.q) == float(ds.q[1])
+    )
 
 
 def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
     inside = mathieu.survey.zoom(a=(-1.0, 5.0), num=3)
     assert not recwarn.list
-    with pytest.warns(UserWarning, match=r"zoom: a = \(4, 7\) extends beyond the map's -1 to 5; it is solved") as said:
+    with pytest.warns(
+        UserWarning, match=r"zoom: a = \(4, 7\) extends beyond the map's -1 to 5; it is solved"
+    ) as said:
         beyond = mathieu.survey.zoom(a=(4.0, 7.0), num=4)
     assert said[0].filename == __file__ and "\n" not in str(said[0].message)
     assert float(beyond.a.max()) == 7.0 and int(beyond.status.sum()) == 0 and inside.sizes["a"] == 3
@@ -312,7 +360,9 @@ def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
 def test_every_curve_lies_in_a_cell_that_is_left_undecided(tongues):
     ds = survey.open(tongues)
     curves = ds.survey.boundary()
-    cells = ds.drop_vars([name for name in ds if name.startswith(("edge_", "curve_", "fold_"))]).survey.boundary()
+    cells = ds.drop_vars(
+        [name for name in ds if name.startswith(("edge_", "curve_", "fold_"))]
+    ).survey.boundary()
     inside = np.ones((curves.sizes["place"], cells.sizes["place"]), bool)
     for axis in ds.status.dims:
         off = abs(curves[axis].values[:, None] - cells[axis].values)
@@ -329,16 +379,23 @@ def test_areas_of_points_and_cells(toy, tongues):
     undecided = found.sel(area_verdict="undecided")
     assert 0 < undecided.area - undecided.area_error + 1e-3 and undecided.area < 2e-3
     ds = survey.open(tongues)
-    cells, points = ds.survey.areas(), ds.drop_vars([name for name in ds if "area" in name]).survey.areas()
+    cells, points = (
+        ds.survey.areas(),
+        ds.drop_vars([name for name in ds if "area" in name]).survey.areas(),
+    )
     off = abs(cells.area - points.area).sel(area_verdict="stable")
     assert off <= (cells.area_error + points.area_error).sel(area_verdict="stable")
     assert float(cells.area.sum()) == pytest.approx(3.5, abs=float(2 * cells.area_error.sum()))
 
 
 def test_a_comparison_finds_what_is_beyond_the_bars_and_nothing_else(mathieu):
-    other = survey.evaluate("mathieu", a=mathieu.a.values[::2], q=mathieu.q.values, rtol=1e-9, method="dop853")
+    other = survey.evaluate(
+        "mathieu", a=mathieu.a.values[::2], q=mathieu.q.values, rtol=1e-9, method="dop853"
+    )
     same = mathieu.survey.compare(other)
-    assert same.sizes == {"a": 16, "q": 20} and same.attrs["summary"].endswith("are within their error bars")
+    assert same.sizes == {"a": 16, "q": 20} and same.attrs["summary"].endswith(
+        "are within their error bars"
+    )
     assert "method: auto and dop853" in same.attrs["unlike"] and (same.y1_excess <= 1).all()
     spoiled = other.copy(deep=True)
     bars = mathieu.y1_error.astype(float) + mathieu.y1_error
@@ -357,7 +414,13 @@ class Counted:
     """An array that counts what is read of it."""
 
     def __init__(self, array):
-        self.array, self.read, self.shape, self.dtype, self.ndim = array, 0, array.shape, array.dtype, array.ndim
+        self.array, self.read, self.shape, self.dtype, self.ndim = (
+            array,
+            0,
+            array.shape,
+            array.dtype,
+            array.ndim,
+        )
 
     def __getitem__(self, where):
         part = self.array[where]
@@ -399,7 +462,10 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.trajectory(a=1.0, q=0.5, time=-1.0), "time = -1.0"),
         (lambda s: s.trajectory(a=1.0, q=0.5, time="20"), "time = '20': give a positive number"),
         (lambda s: s.compare(3), "give the dataset"),
-        (lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)), "no value of a is common to both"),
+        (
+            lambda s: s.compare(survey.evaluate("mathieu", a=7.5, q=1.0)),
+            "no value of a is common to both",
+        ),
         (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "the scenes differ"),
         (lambda s: s.slice(q=1.0).survey.slice(a=1.0).survey.areas(), "two values or more"),
         (lambda s: s._ds.isel(a=[0, 1, 1, 2]).survey.areas(), "values of a must rise, or fall"),

@@ -26,9 +26,17 @@ def test_run_ends_with_a_file_a_digest_and_a_picture(program, small):
         "small.png",
         "small.toml",
     ]
-    for words in ("24 points in", "computed 1, reused 0", "ETA", "wrote small.nc", "status: ok: 24"):
+    for words in (
+        "24 points in",
+        "computed 1, reused 0",
+        "ETA",
+        "wrote small.nc",
+        "status: ok: 24",
+    ):
         assert words in done.stderr
-    subprocess.run(["sha256sum", "-c", "small.nc.sha256"], cwd=program.folder, check=True, capture_output=True)
+    subprocess.run(
+        ["sha256sum", "-c", "small.nc.sha256"], cwd=program.folder, check=True, capture_output=True
+    )
 
 
 def test_quiet_says_nothing_and_o_chooses_the_file(program, small):
@@ -42,7 +50,10 @@ def test_quiet_says_nothing_and_o_chooses_the_file(program, small):
 def test_worker_processes_give_the_same_file(program, small):
     for name, words in (("a.nc", ()), ("b.nc", ("--workers", "2"))):
         assert program("run", "small.toml", "--quiet", "-o", name, *words).returncode == 0
-    with netCDF4.Dataset(program.folder / "a.nc") as a, netCDF4.Dataset(program.folder / "b.nc") as b:
+    with (
+        netCDF4.Dataset(program.folder / "a.nc") as a,
+        netCDF4.Dataset(program.folder / "b.nc") as b,
+    ):
         assert all((a[name][:] == b[name][:]).all() for name in a.variables)
 
 
@@ -54,7 +65,10 @@ def test_worker_processes_give_the_same_file(program, small):
         (["run", "small.toml", "--set", "scene=gyrostats"], "did you mean 'gyrostat'"),
         (["run", "small.toml", "-o", "nowhere/out.nc"], "there is no folder 'nowhere'"),
         (["run", "small.toml", "-o", "."], "is a folder"),
-        (["run", "small.toml", "--workers", "none"], "is not a valid integer; see survey run --help"),
+        (
+            ["run", "small.toml", "--workers", "none"],
+            "is not a valid integer; see survey run --help",
+        ),
         (["run"], "Missing argument 'WORKFLOW'; see survey run --help"),
         (["runn"], "No such command 'runn'"),
         (["runn"], "; see survey --help"),
@@ -66,7 +80,10 @@ def test_worker_processes_give_the_same_file(program, small):
         (["info", "absent.nc"], "absent.nc: there is no such file"),
         (["verify", "absent.nc"], "absent.nc: there is no such file"),
         (["plot", "absent.nc"], "absent.nc: there is no such file"),
-        (["info", "small.toml"], "small.toml: this is not a netCDF file of survey; name one written by survey run"),
+        (
+            ["info", "small.toml"],
+            "small.toml: this is not a netCDF file of survey; name one written by survey run",
+        ),
         (["verify", "small.toml"], "small.toml: this is not a netCDF file of survey"),
         (["scenes", "gyroscope"], "did you mean 'gyrostat'"),
         (["precision", "gyroscope"], "did you mean 'gyrostat'"),
@@ -103,7 +120,9 @@ def test_the_plan_says_how_long_in_words_and_names_compiling_apart(small, monkey
 
 
 def test_plan_counts_what_run_does_and_calls_no_kernel(program, small):
-    planned = json.loads(program("plan", "small.toml", "--json", env={"NUMBA_DISABLE_JIT": "1"}).stdout)
+    planned = json.loads(
+        program("plan", "small.toml", "--json", env={"NUMBA_DISABLE_JIT": "1"}).stdout
+    )
     assert (planned["points"], planned["blocks"]) == (24, 1)
     assert planned["bytes"] == 24 * (2 * 8 + 2 * 4 + 4 + 1)
     assert [f.name for f in program.folder.iterdir()] == ["small.toml"]
@@ -114,15 +133,28 @@ def test_info_verify_and_plot(program, ran):
     assert answer["counts"]["status"]["ok"] == 24 and answer["provenance"]["kernel_hash"]
     assert "phi0" in program("info", "small.nc").stdout
     verified = program("verify", "small.nc")
-    assert verified.returncode == 0 and "20 points solved again by dop853 and full" in verified.stdout, verified.stderr
+    assert (
+        verified.returncode == 0 and "20 points solved again by dop853 and full" in verified.stdout
+    ), verified.stderr
     plotted = program("plot", "small.nc", "--var", "turnings", "-o", "t.pdf")
     assert plotted.returncode == 0 and (program.folder / "t.pdf").read_bytes()[:4] == b"%PDF"
     assert "did you mean 'turnings'" in program("plot", "small.nc", "--var", "turning").stderr
     assert program("plot", "small.nc", "-o", "t.docx").returncode == 2
-    for at, words in (("w0=x", "give one number"), ("w=1", "unknown axis"), ("w0=99", "lies outside the map")):
+    for at, words in (
+        ("w0=x", "give one number"),
+        ("w=1", "unknown axis"),
+        ("w0=99", "lies outside the map"),
+    ):
         refused = program("plot", "small.nc", "--at", at)
-        assert refused.returncode == 2 and words in refused.stderr and refused.stderr.count("\n") == 1, refused.stderr
-    assert program("plot", "small.nc", "--at", "w0=1.1", "--var", "turnings", "-o", "row.png").returncode == 0
+        assert (
+            refused.returncode == 2 and words in refused.stderr and refused.stderr.count("\n") == 1
+        ), refused.stderr
+    assert (
+        program(
+            "plot", "small.nc", "--at", "w0=1.1", "--var", "turnings", "-o", "row.png"
+        ).returncode
+        == 0
+    )
     assert "give both, or neither" in program("plot", "small.nc", "--width", "double").stderr
 
 
@@ -139,12 +171,21 @@ def test_verify_says_what_it_checks_without_a_digest(program, ran):
     (program.folder / "small.nc.sha256").unlink()
     found = program("verify", "small.nc")
     assert found.returncode == 3 and found.stderr.count("\n") == 1, found.stderr
-    assert "there is no digest small.nc.sha256 beside it" in found.stderr and "solved again are checked" in found.stderr
-    assert "sound except for the digest; 20 points solved again by dop853 and full, all within" in found.stdout
+    assert (
+        "there is no digest small.nc.sha256 beside it" in found.stderr
+        and "solved again are checked" in found.stderr
+    )
+    assert (
+        "sound except for the digest; 20 points solved again by dop853 and full, all within"
+        in found.stdout
+    )
     accepted = found.stderr.rpartition("accept the file as it is: ")[2]
     subprocess.run(accepted, shell=True, cwd=program.folder, check=True)
     found = program("verify", "small.nc", "--points", "1")
-    assert (found.returncode, found.stderr) == (0, "") and "small.nc: sound; 1 point solved again by" in found.stdout
+    assert (found.returncode, found.stderr) == (
+        0,
+        "",
+    ) and "small.nc: sound; 1 point solved again by" in found.stdout
 
 
 def test_a_single_point_and_block_are_told_as_one(program, small):
@@ -159,7 +200,9 @@ def test_verify_finds_a_wrong_value_by_solving_again(program, ran):
     with netCDF4.Dataset(program.folder / "small.nc", "a") as file:
         file["w"][3, 2] += 1e-6
     (program.folder / "small.nc.sha256").write_text("")
-    subprocess.run("sha256sum small.nc > small.nc.sha256", shell=True, cwd=program.folder, check=True)
+    subprocess.run(
+        "sha256sum small.nc > small.nc.sha256", shell=True, cwd=program.folder, check=True
+    )
     found = program("verify", "small.nc", "--points", "24")
     assert found.returncode == 3 and "w at " in found.stderr, found.stderr
 
@@ -167,16 +210,28 @@ def test_verify_finds_a_wrong_value_by_solving_again(program, ran):
 def test_scenes_tell_all_that_is_needed(program):
     assert "satellite" in program("scenes").stdout
     answer = program("scenes", "satellite").stdout
-    for words in ("k != 1", "body", "prolate | oblate", "discriminant", "taylor16", "undecided -1", "Astakhova"):
+    for words in (
+        "k != 1",
+        "body",
+        "prolate | oblate",
+        "discriminant",
+        "taylor16",
+        "undecided -1",
+        "Astakhova",
+    ):
         assert words in answer
     assert json.loads(program("scenes", "gyrostat", "--json").stdout)["name"] == "gyrostat"
 
 
 def test_no_color_is_honoured(program, ran):
-    assert "\x1b" not in program("info", "small.nc", env={"NO_COLOR": "1", "FORCE_COLOR": "1"}).stdout
+    assert (
+        "\x1b" not in program("info", "small.nc", env={"NO_COLOR": "1", "FORCE_COLOR": "1"}).stdout
+    )
 
 
-@pytest.mark.parametrize(("name", "code"), [("SIGINT", 130), pytest.param("SIGTERM", 143, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("name", "code"), [("SIGINT", 130), pytest.param("SIGTERM", 143, marks=pytest.mark.slow)]
+)
 def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     many = ("axes.w0.num=4000", "axes.t.num=40", "axes.t.stop=40")
     command = ["run", "small.toml", *[word for text in many for word in ("--set", text)]]
@@ -185,7 +240,8 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
         cwd=program.folder,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background job ignores it
+        # a shell's background job ignores it
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     blocks = program.folder / "small.nc.blocks"
     deadline = time.time() + 60
@@ -197,11 +253,17 @@ def test_an_interrupted_run_can_be_resumed(program, small, name, code):
     finished = len(list(blocks.glob("*.block")))
     assert finished and not (program.folder / "small.nc").exists()
     left = json.loads(program("info", "small.nc", "--json").stdout)["unfinished"]
-    safe, blocks_asked = map(int, re.search(r"finished blocks are safe: (\d+) of (\d+); resume with", answer).groups())
+    safe, blocks_asked = map(
+        int, re.search(r"finished blocks are safe: (\d+) of (\d+); resume with", answer).groups()
+    )
     assert 1 <= safe <= left["blocks_done"] == finished and blocks_asked == left["blocks"]
-    assert 0 < left["points_done"] <= left["points"] == 160_000 and left["resume"] == shlex.join(["survey", *command])
+    assert 0 < left["points_done"] <= left["points"] == 160_000 and left["resume"] == shlex.join(
+        ["survey", *command]
+    )
     seen = program("verify", "small.nc")
-    assert seen.returncode == 3 and f"{finished} of {left['blocks']} blocks" in seen.stderr, seen.stderr
+    assert seen.returncode == 3 and f"{finished} of {left['blocks']} blocks" in seen.stderr, (
+        seen.stderr
+    )
     resumed = program(*command)
     assert resumed.returncode == 0 and f", reused {finished} of" in resumed.stderr, resumed.stderr
     assert not blocks.exists() and not os.path.exists(program.folder / "small.nc.lock")

@@ -1,4 +1,6 @@
-"""A scene or method that does not keep to its table is refused in one line that names the file and the table."""
+"""A scene or method that does not keep to its table is refused in one line that names the file and
+the table.
+"""
 
 import importlib.util
 import shutil
@@ -35,14 +37,26 @@ def changed(path, tmp_path, old, new):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("def trajectory(", "def trajectry(", "trajectry is not in the table; did you mean 'trajectory'"),
+        (
+            "def trajectory(",
+            "def trajectry(",
+            "trajectry is not in the table; did you mean 'trajectory'",
+        ),
         ("TITLE = ", "TITEL = ", "TITEL is not in the table; did you mean 'TITLE'"),
         ("AUDIT = ", "_AUDIT = ", "AUDIT is missing: methods by which"),
-        ("def cost(options, sizes)", "def cost(options)", r"cost\(options\) must be cost\(options, sizes\)"),
+        (
+            "def cost(options, sizes)",
+            "def cost(options)",
+            r"cost\(options\) must be cost\(options, sizes\)",
+        ),
         ('FAMILY = "hill"', 'FAMILY = "hil"', "FAMILY names no family 'hil'"),
         ('"dop853"', '"dop85"', "AUDIT: unknown method 'dop85'; did you mean 'dop853'"),
         ("OPTIONS = ()", "OPTIONS = []", r"OPTIONS = \[\] must be of type tuple"),
-        ("def cost(options, sizes):", "cost = 1e-6\n\n\ndef _cost(options, sizes):", "cost must be a function"),
+        (
+            "def cost(options, sizes):",
+            "cost = 1e-6\n\n\ndef _cost(options, sizes):",
+            "cost must be a function",
+        ),
     ],
 )
 def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
@@ -50,14 +64,20 @@ def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
     with pytest.raises(BadInput, match=words) as refused:
         survey.scenes._check(scene)
     line = str(refused.value)
-    assert line.startswith(str(tmp_path / "mathieu.py")) and line.endswith("the table is in survey/scenes/__init__.py")
+    assert line.startswith(str(tmp_path / "mathieu.py")) and line.endswith(
+        "the table is in survey/scenes/__init__.py"
+    )
     assert "\n" not in line
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("def hill_scatter(", "def hill_scater(", "hill_scater is not in the table; did you mean 'hill_scatter'"),
+        (
+            "def hill_scatter(",
+            "def hill_scater(",
+            "hill_scater is not in the table; did you mean 'hill_scatter'",
+        ),
         ('SERVES = ("hill",)', 'SERVES = ("hil",)', "SERVES names no family 'hil'"),
         ("ORDER = 6", "ORDER = 6.0", "ORDER = 6.0 must be of type int"),
         ("def hill_density(rtol)", "def hill_density(tolerance)", r"must be hill_density\(rtol\)"),
@@ -65,21 +85,31 @@ def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
         ("def hill_scatter(", "def _hill_scatter(", "hill_scatter is missing: as hill_chain"),
         ("ORDER = 6", "ADAPTIVE = True\nORDER = 6", "hill_walk is missing: fill out"),
         ('COST = {"hill"', 'COST = {"hil"', "COST has 'hil', which SERVES does not name"),
-        ('SERVES = ("hill",)', 'SERVES = ("danby",)', "it is a name of the family 'hill', which SERVES must then name"),
+        (
+            'SERVES = ("hill",)',
+            'SERVES = ("danby",)',
+            "it is a name of the family 'hill', which SERVES must then name",
+        ),
     ],
 )
 def test_a_typo_in_a_method_is_one_line(tmp_path, old, new, words):
     method = changed(METHOD, tmp_path, old, new)
     with pytest.raises(BadInput, match=words) as refused:
         measures.check(method)
-    assert str(tmp_path / "magnus6.py") in str(refused.value) and "survey/methods/__init__.py" in str(refused.value)
+    assert str(tmp_path / "magnus6.py") in str(
+        refused.value
+    ) and "survey/methods/__init__.py" in str(refused.value)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
         ("def find(", "def fined(", "find is missing: the Cells of a rectangle"),
-        ("def find(solve, x, y,", "def find(solve, y, x,", r"must be find\(solve, x, y, each, report\)"),
+        (
+            "def find(solve, x, y,",
+            "def find(solve, y, x,",
+            r"must be find\(solve, x, y, each, report\)",
+        ),
         ("MOST = 10_000_000", "MOST = 1e7", "MOST = 10000000.0 must be of type int"),
     ],
 )
@@ -91,8 +121,19 @@ def test_a_typo_in_what_is_asked_of_a_family_is_one_line(tmp_path, old, new, wor
 
 
 def test_questions_are_found_by_the_folder_of_their_family():
-    found = {family: [q for q in measures.QUESTIONS if measures.question(family, q)] for family in FAMILIES}
-    assert found["hill"] == ["curves", "surfaces", "edges", "folds", "cells", "trace_curves", "trace_cells"]
+    found = {
+        family: [q for q in measures.QUESTIONS if measures.question(family, q)]
+        for family in FAMILIES
+    }
+    assert found["hill"] == [
+        "curves",
+        "surfaces",
+        "edges",
+        "folds",
+        "cells",
+        "trace_curves",
+        "trace_cells",
+    ]
     assert found["nutation"] == ["curves"]
     assert measures.question("no family", "curves") is None
 
@@ -108,7 +149,9 @@ def test_a_new_file_is_checked_when_it_is_loaded(tmp_path, monkeypatch):
     folder = tmp_path / "more"
     folder.mkdir()
     shutil.copy(SCENE, folder / "mathew.py")
-    (folder / "mathew.py").write_text(SCENE.read_text().replace("def trajectory(", "def trajectry("))
+    (folder / "mathew.py").write_text(
+        SCENE.read_text().replace("def trajectory(", "def trajectry(")
+    )
     monkeypatch.setattr(survey.scenes, "__path__", [*survey.scenes.__path__, str(folder)])
     with pytest.raises(BadInput, match="did you mean 'trajectory'"):
         survey.evaluate("mathew", a=1.0, q=0.1)

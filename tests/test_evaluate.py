@@ -7,7 +7,15 @@ import xarray as xr
 
 import survey
 
-SYSTEM = {"question": "trajectory", "b12": 0.7, "b31": -0.4, "d": 1.1, "s2": 0.5, "phi0": 1.5, "rtol": 1e-9}
+SYSTEM = {
+    "question": "trajectory",
+    "b12": 0.7,
+    "b31": -0.4,
+    "d": 1.1,
+    "s2": 0.5,
+    "phi0": 1.5,
+    "rtol": 1e-9,
+}
 W0, T = np.linspace(0.5, 2.0, 6), np.linspace(0.0, 3.0, 4)
 
 
@@ -86,7 +94,11 @@ def test_what_is_masked_costs_itself_alone_and_numbers_of_numpy_are_numbers():
 @pytest.mark.parametrize("workers", [0, -1, "two"])
 def test_a_number_of_workers_that_is_none_is_refused(workers, tmp_path):
     with pytest.raises(survey.BadInput, match="workers = "):
-        survey.run({"scene": "libration", "axes": {"mu": 0.01}}, output=tmp_path / "map.nc", workers=workers)
+        survey.run(
+            {"scene": "libration", "axes": {"mu": 0.01}},
+            output=tmp_path / "map.nc",
+            workers=workers,
+        )
 
 
 def test_a_missing_parameter_and_unequal_dimensions_are_named():
@@ -109,20 +121,28 @@ def test_a_point_outside_the_domain_costs_itself_alone():
     ("scene", "given"),
     [
         ("satellite", {"k": 0.3, "rho": 1.5}),
-        ("gyrostat", {"question": "portrait", "b12": 0.1, "b31": 0.2, "d": 0.3, "s2": 0.1}),  # counts, cycles
+        # counts, cycles
+        ("gyrostat", {"question": "portrait", "b12": 0.1, "b31": 0.2, "d": 0.3, "s2": 0.1}),
         ("gyrostat", SYSTEM | {"w0": 1.0, "t": 1.0}),
         ("libration", {"mu": 0.01}),
     ],
 )
 def test_a_lone_point_is_labelled_as_one_of_an_array_and_shares_nothing_with_the_next(scene, given):
     options = {key: value for key, value in given.items() if key in ("question", "rtol")}
-    arrays = {key: xr.DataArray([value], dims="point") for key, value in given.items() if key not in options}
+    arrays = {
+        key: xr.DataArray([value], dims="point")
+        for key, value in given.items()
+        if key not in options
+    }
     wanted = survey.evaluate(scene, **arrays, **options).isel(point=0)
     for _ in range(2):
         ds = survey.evaluate(scene, **given)
         xr.testing.assert_identical(ds, wanted)
         for name, variable in ds.variables.items():
-            assert (variable.encoding, variable.dtype) == (wanted[name].encoding, wanted[name].dtype)
+            assert (variable.encoding, variable.dtype) == (
+                wanted[name].encoding,
+                wanted[name].dtype,
+            )
         ds.status.attrs["flag_values"][:] = 7
         ds.status.attrs["long_name"] = ds.attrs["title"] = "changed"
         ds.status.encoding["dtype"] = "int16"

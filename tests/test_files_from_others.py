@@ -1,4 +1,6 @@
-"""Files from others: nothing of them runs, and each question ends in an answer or in one line (see `hostile.py`)."""
+"""Files from others: nothing of them runs, and each question ends in an answer or in one line (see
+`hostile.py`).
+"""
 
 import hashlib
 import html
@@ -41,7 +43,9 @@ def checked(folder, seeds, scene="evil.py", **asked):
     found = []
     for seed in seeds:
         mutation = hostile.mutate(folder / "base.nc", folder / "file.nc", seed)
-        found += [(seed, mutation, *one) for one in hostile.ask(folder / "file.nc", sentinel, **asked)]
+        found += [
+            (seed, mutation, *one) for one in hostile.ask(folder / "file.nc", sentinel, **asked)
+        ]
     assert not found, found
 
 
@@ -49,7 +53,9 @@ def test_the_file_that_is_mutated_is_sound(folder):
     sentinel = hostile.base(folder)
     assert hostile.ask(folder / "base.nc", sentinel) == []
     ds = survey.open(folder / "base.nc")
-    assert ds.survey.areas().sizes["area_verdict"] == 3 and ds.survey.boundary().sizes["place"] > 100
+    assert (
+        ds.survey.areas().sizes["area_verdict"] == 3 and ds.survey.boundary().sizes["place"] > 100
+    )
 
 
 def test_every_mutation_ends_in_an_answer_or_one_line(folder):
@@ -57,7 +63,9 @@ def test_every_mutation_ends_in_an_answer_or_one_line(folder):
 
 
 def test_mutations_that_once_ended_in_a_traceback_or_in_hidden_text(folder):
-    """An axis without values, areas without units, hidden text in a name, areas of -1e308, bars of a verdict."""
+    """An axis without values, areas without units, hidden text in a name, areas of -1e308, bars of
+    a verdict.
+    """
     checked(folder, (10459, 10509, 10569, 10089, 11392), draw=False)
 
 
@@ -68,7 +76,9 @@ def test_mutations_are_drawn_or_refused(folder):
 
 @pytest.mark.slow
 def test_mutations_of_cells_and_areas(folder):
-    """A cell that ends at -1e308, of which a picture overflows; areas of a single verdict, joined with another file."""
+    """A cell that ends at -1e308, of which a picture overflows; areas of a single verdict, joined
+    with another file.
+    """
     checked(folder, (20506,))
     checked(folder, (30082,), "mathieu")
 
@@ -82,7 +92,9 @@ def test_ticks_near_the_largest_number_warn_of_nothing(folder):
 def test_ten_thousand_mutations(folder, part):
     checked(folder, range(10_000 + 450 * part, 10_000 + 450 * (part + 1)), draw=False)
     checked(folder, range(20_000 + 40 * part, 20_000 + 40 * (part + 1)))
-    checked(folder, range(30_000 + 10 * part, 30_000 + 10 * (part + 1)), "mathieu", points=3, solve=True)
+    checked(
+        folder, range(30_000 + 10 * part, 30_000 + 10 * (part + 1)), "mathieu", points=3, solve=True
+    )
 
 
 def changed(folder, **attributes):
@@ -96,14 +108,19 @@ def changed(folder, **attributes):
 
 
 @pytest.mark.parametrize(
-    "scene", ["../x", "os", "survey.api", "libration.os", "__init__", "", "/etc/passwd", "x" * 10**6]
+    "scene",
+    ["../x", "os", "survey.api", "libration.os", "__init__", "", "/etc/passwd", "x" * 10**6],
 )
 def test_a_scene_is_a_module_of_the_folder_of_scenes_and_nothing_else(folder, scene):
     path, before = changed(folder, scene=scene), set(sys.modules)
     started = time.process_time()
     with pytest.raises(errors.SurveyError) as refused:
         survey.open(path).survey.trajectory(a=1.0, q=1.0)
-    assert "\n" not in str(refused.value) and len(str(refused.value)) < 2100 and time.process_time() - started < 20
+    assert (
+        "\n" not in str(refused.value)
+        and len(str(refused.value)) < 2100
+        and time.process_time() - started < 20
+    )
     assert not {name for name in set(sys.modules) - before if "passwd" in name or name == "x"}
 
 
@@ -132,7 +149,9 @@ def test_zoom_takes_no_path_from_the_file(folder, monkeypatch):
     with pytest.warns(UserWarning, match="beyond the map's"):
         finer = survey.open(path).survey.zoom(a=(0.0, 1.0), q=(0.1, 0.5), num=2)
     assert (
-        finer.verdict.shape == (2, 2) and sorted(folder.iterdir()) == before and "owned" not in finer.attrs["workflow"]
+        finer.verdict.shape == (2, 2)
+        and sorted(folder.iterdir()) == before
+        and "owned" not in finer.attrs["workflow"]
     )
 
 
@@ -140,9 +159,15 @@ def test_what_a_file_says_is_text_in_html_and_in_a_terminal(folder):
     path = changed(folder, title=HTML + "\x1b[2J$$x$$")
     ds = survey.open(path)
     seen = ds.survey.point(a=1.0, q=1.0)._repr_html_()
-    assert "<script" not in seen and "<img" not in seen and "\x1b" not in seen and html.escape(HTML) in seen
+    assert (
+        "<script" not in seen
+        and "<img" not in seen
+        and "\x1b" not in seen
+        and html.escape(HTML) in seen
+    )
     assert "tex2jax_ignore" in seen
-    assert "<script>alert" not in ds._repr_html_() and "<img src=x" not in ds._repr_html_()  # xarray's own
+    # xarray's own
+    assert "<script>alert" not in ds._repr_html_() and "<img src=x" not in ds._repr_html_()
     assert r"\x1b[2J" in repr(ds.survey.point(a=1.0, q=1.0))
     assert "<script>alert" not in hostile.page(path)
 
@@ -154,12 +179,16 @@ def test_the_browser_page_of_a_hostile_file_holds_text_only(folder):
     from survey.viewer.server import start
     from survey.viewer.shown import Map
 
-    path = changed(folder, title="</title><script>alert(1)</script>", options=f"a={HTML.replace('=', '')}")
+    path = changed(
+        folder, title="</title><script>alert(1)</script>", options=f"a={HTML.replace('=', '')}"
+    )
 
     async def page():
         server, address = start(Map(path), 0)
         try:
-            return await asyncio.to_thread(lambda: urllib.request.urlopen(address, timeout=20).read().decode())
+            return await asyncio.to_thread(
+                lambda: urllib.request.urlopen(address, timeout=20).read().decode()
+            )
         finally:
             server.stop()
 
@@ -168,7 +197,16 @@ def test_the_browser_page_of_a_hostile_file_holds_text_only(folder):
 
 def test_latex_is_off_and_what_is_no_formula_is_text():
     assert all(style.rc["text.usetex"] is False for style in STYLES.values())
-    for symbol in (r"\frac{", r"\input{/etc/passwd}", "$", "a" * 500, r"\frac{a}{" * 50, r"\hspace{1e9}", "\x1b", ""):
+    for symbol in (
+        r"\frac{",
+        r"\input{/etc/passwd}",
+        "$",
+        "a" * 500,
+        r"\frac{a}{" * 50,
+        r"\hspace{1e9}",
+        "\x1b",
+        "",
+    ):
         shown = formula(symbol, "a$b")
         assert shown == r"a\$b", symbol
     for name in modules.names(scenes):
@@ -186,12 +224,18 @@ def test_a_figure_on_axes_made_with_latex_on_is_drawn_without(folder):
     with matplotlib.rc_context({"text.usetex": True}):
         axes = Figure().subplots()
         ds.survey.map(ax=axes)
-        assert not any(text.get_usetex() for text in axes.figure.findobj(matplotlib.text.Text) if text.get_text())
+        assert not any(
+            text.get_usetex()
+            for text in axes.figure.findobj(matplotlib.text.Text)
+            if text.get_text()
+        )
 
 
 def test_bokeh_finds_no_tex_in_words():
     long_name = r"$$\href{javascript:alert(1)}{x}$$ \(y\) \[z\]"
-    variable = xr.DataArray(0.0, attrs={"long_name": long_name, "symbol": "x", "units": "1"}, name="v")
+    variable = xr.DataArray(
+        0.0, attrs={"long_name": long_name, "symbol": "x", "units": "1"}, name="v"
+    )
     for text in (widgets.label(variable), widgets.literal(long_name), widgets.literal("$$$$")):
         assert not re.search(r"\$\$|\\\(|\\\[", text), text
     assert widgets.label(variable.assign_attrs(long_name="a_b")) == r"a\_b, $$x$$"
@@ -210,14 +254,25 @@ def test_declared_sizes_are_refused_before_anything_is_allocated(tmp_path):
             file.createDimension(name, 10**6)
         status = file.createVariable("status", "i1", ("x", "y"), zlib=True, chunksizes=(1000, 1000))
         status.setncatts({"flag_values": np.array([0], np.int8), "flag_meanings": "ok"})
-        file.setncatts({"scene": "mathieu", "options": "", "method": "auto", "rtol": 1e-10, "complete": np.int8(1)})
+        file.setncatts(
+            {
+                "scene": "mathieu",
+                "options": "",
+                "method": "auto",
+                "rtol": 1e-10,
+                "complete": np.int8(1),
+            }
+        )
     assert path.stat().st_size < 40_000
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for words in (["info", str(path)], ["verify", str(path)], ["plot", str(path)]):
         assert list(hostile.command(words)) == []
-    with pytest.raises(Damaged, match="declares 1,000,000,000,000 bytes of values, more than a file of"):
+    with pytest.raises(
+        Damaged, match="declares 1,000,000,000,000 bytes of values, more than a file of"
+    ):
         survey.open(path)
-    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000  # kB; matplotlib's import takes some
+    # kB; matplotlib's import takes some
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 500_000
 
 
 def test_an_axis_that_was_never_written_is_refused(tmp_path):
@@ -227,7 +282,9 @@ def test_an_axis_that_was_never_written_is_refused(tmp_path):
         file.createVariable("x", "f8", ("x",))
         file.createVariable("status", "i1", ())
         file.setncatts({"scene": "mathieu", "complete": np.int8(1)})
-    with pytest.raises(Damaged, match=r"the axis x has 1,000,000,000,000 values, more than 100,000,000"):
+    with pytest.raises(
+        Damaged, match=r"the axis x has 1,000,000,000,000 values, more than 100,000,000"
+    ):
         survey.open(path)
 
 
@@ -263,10 +320,18 @@ def test_codes_that_no_flag_names_are_found(folder):
     with netCDF4.Dataset(path, "a") as file:
         file["status"][1, 1] = 77
     hostile.digest(path)
-    done = subprocess.run([sys.executable, "-m", "survey", "verify", path], capture_output=True, text=True)
-    assert done.returncode == 3 and "status contains codes that are not among its flag_values" in done.stderr
+    done = subprocess.run(
+        [sys.executable, "-m", "survey", "verify", path], capture_output=True, text=True
+    )
     assert (
-        "77" in survey.open(path).survey.point(a=float(survey.open(path).a[1]), q=float(survey.open(path).q[1])).status
+        done.returncode == 3
+        and "status contains codes that are not among its flag_values" in done.stderr
+    )
+    assert (
+        "77"
+        in survey.open(path)
+        .survey.point(a=float(survey.open(path).a[1]), q=float(survey.open(path).q[1]))
+        .status
     )
 
 
@@ -281,7 +346,14 @@ def test_what_an_unfinished_run_says_is_text_and_its_command_is_no_other_program
     folder = tmp_path / "map.nc.blocks"
     folder.mkdir()
     (folder / "manifest.json").write_text(json.dumps({"blocks": blocks, "points": "\x1b[31m"}))
-    for command in ("rm -rf ~", "survey run x.toml; rm -rf ~", "survey run $(reboot)", 5, "'", ["survey"]):
+    for command in (
+        "rm -rf ~",
+        "survey run x.toml; rm -rf ~",
+        "survey run $(reboot)",
+        5,
+        "'",
+        ["survey"],
+    ):
         (folder / "holder.json").write_text(
             json.dumps({"resume_command": command, "folder": "/tmp/$(reboot)\x1b", "host": "\x1b"})
         )
@@ -289,4 +361,8 @@ def test_what_an_unfinished_run_says_is_text_and_its_command_is_no_other_program
         resume = unfinished.summary(tmp_path / "map.nc")["resume"]
         command = resume.rpartition(" && ")[2]
         words = shlex.split(command)
-        assert words[:2] == ["survey", "run"] and command == shlex.join(words) and "rm" not in shlex.split(resume)[:1]
+        assert (
+            words[:2] == ["survey", "run"]
+            and command == shlex.join(words)
+            and "rm" not in shlex.split(resume)[:1]
+        )

@@ -1,7 +1,9 @@
-"""Small files of every scene, kept: an accidental change of the layout, of a code, or of a value beyond its bar shows.
+"""Small files of every scene, kept: an accidental change of the layout, of a code, or of a value
+beyond its bar shows.
 
-After an intended change, regenerate them (`survey run NAME.toml --fresh` in `tests/golden`) and document the change.
-Every scene with its own page of mathematics has one (`tests/workflows/test_docs.py`).
+After an intended change, regenerate them (`survey run NAME.toml --fresh` in `tests/golden`) and
+document the change. Every scene with its own page of mathematics has one
+(`tests/workflows/test_docs.py`).
 """
 
 import subprocess
@@ -15,9 +17,19 @@ import pytest
 from survey.file import reading
 
 FOLDER = Path(__file__).parent / "golden"
-CHANGING = {"date_created", "history", "wall_time_s", "compile_time_s", "commit", "dirty", "kernel_hash", "cpu"}
+CHANGING = {
+    "date_created",
+    "history",
+    "wall_time_s",
+    "compile_time_s",
+    "commit",
+    "dirty",
+    "kernel_hash",
+    "cpu",
+}
 CHANGING |= {"fingerprint"}  # of the sources
-CHANGING |= {"summary", "references", "areas", "refine_points"}  # words, and what other processors round otherwise
+# words, and what other processors round otherwise
+CHANGING |= {"summary", "references", "areas", "refine_points"}
 WORDS = {"_FillValue", "comment", "long_name"}  # a fill value may be NaN, and words may be bettered
 COMPILERS = ("version_numba", "version_llvmlite", "version_numpy", "cpu")
 
@@ -26,7 +38,15 @@ COMPILERS = ("version_numba", "version_llvmlite", "version_numpy", "cpu")
 def both(request, tmp_path_factory):
     """The kept file and one of today, open."""
     folder = tmp_path_factory.mktemp(request.param)
-    command = [sys.executable, "-m", "survey", "run", str(FOLDER / f"{request.param}.toml"), "-o", "now.nc"]
+    command = [
+        sys.executable,
+        "-m",
+        "survey",
+        "run",
+        str(FOLDER / f"{request.param}.toml"),
+        "-o",
+        "now.nc",
+    ]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     kept = FOLDER / f"{request.param}.nc"
@@ -77,4 +97,6 @@ def test_the_bits_are_the_same_on_the_same_machine(both):
 def _arrays(file):
     """The variables, but those of curves and cells, whose places are steps and halvings and have no bars."""
     beside = ("curve_", "cell_", "fold_")
-    return {name: np.asarray(v[:]) for name, v in file.variables.items() if not name.startswith(beside)}
+    return {
+        name: np.asarray(v[:]) for name, v in file.variables.items() if not name.startswith(beside)
+    }

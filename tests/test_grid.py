@@ -14,9 +14,14 @@ sizes = st.lists(st.integers(1, 7), min_size=0, max_size=4)
 def grid_of(lengths, whole=()):
     dims = [f"x{i}" for i in range(len(lengths))]
     parameters = {
-        dim: ((dim,), np.arange(length) * 10.0**i) for i, (dim, length) in enumerate(zip(dims, lengths, strict=True))
+        dim: ((dim,), np.arange(length) * 10.0**i)
+        for i, (dim, length) in enumerate(zip(dims, lengths, strict=True))
     }
-    return Grid(dict(zip(dims, lengths, strict=True)), parameters | {"fixed": ((), np.float64(7))}, frozenset(whole))
+    return Grid(
+        dict(zip(dims, lengths, strict=True)),
+        parameters | {"fixed": ((), np.float64(7))},
+        frozenset(whole),
+    )
 
 
 @given(sizes, st.integers(1, 400))
@@ -40,7 +45,9 @@ def test_regions_hold_whole_tiles_and_whole_blocks(lengths, block, region, tile,
             assert cut.start % length == 0 and (cut.stop % length == 0 or cut.stop == size)
         seen[place] += 1
         for part in blocks:
-            assert all(a.start <= b.start <= b.stop <= a.stop for a, b in zip(place, part, strict=True))
+            assert all(
+                a.start <= b.start <= b.stop <= a.stop for a, b in zip(place, part, strict=True)
+            )
             assert whole or seen[part].size <= block
             seen[part] += 1
         assert whole or seen[place].size <= region
@@ -56,7 +63,9 @@ def test_a_whole_dimension_is_never_cut(lengths, points_per_block):
 @given(sizes, st.integers(1, 400))
 def test_a_block_holds_its_points_parameters(lengths, points_per_block):
     grid = grid_of(lengths)
-    everywhere = np.full(lengths, 7.0) + sum(np.ix_(*(np.arange(n) * 10.0**i for i, n in enumerate(lengths))))
+    everywhere = np.full(lengths, 7.0) + sum(
+        np.ix_(*(np.arange(n) * 10.0**i for i, n in enumerate(lengths)))
+    )
     for block in grid.blocks(points_per_block):
         point = grid.point(block)
         assert all(values.ndim == len(lengths) for values in point.values())
@@ -103,7 +112,12 @@ def test_log_coordinates_need_positive_ends():
 
 @pytest.mark.parametrize(
     ("values", "complaint"),
-    [([], "at least one value"), ([1, np.nan], "value 2 is nan"), ([1, 1], "occurs twice"), ([1, 3, 2], "sort them")],
+    [
+        ([], "at least one value"),
+        ([1, np.nan], "value 2 is nan"),
+        ([1, 1], "occurs twice"),
+        ([1, 3, 2], "sort them"),
+    ],
 )
 def test_bad_axes_are_refused_by_name(values, complaint):
     with pytest.raises(BadInput, match=f"axes.k: .*{complaint}"):

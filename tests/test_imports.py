@@ -7,21 +7,33 @@ from pathlib import Path
 
 def loaded_by(code):
     report = f"import sys; {code}; print(*sorted(sys.modules))"
-    return subprocess.run([sys.executable, "-c", report], capture_output=True, text=True, check=True).stdout.split()
+    return subprocess.run(
+        [sys.executable, "-c", report], capture_output=True, text=True, check=True
+    ).stdout.split()
 
 
 def test_importing_survey_loads_nothing_heavy():
-    assert not {"numba", "numpy", "xarray", "dask", "matplotlib", "netCDF4"} & set(loaded_by("import survey"))
+    assert not {"numba", "numpy", "xarray", "dask", "matplotlib", "netCDF4"} & set(
+        loaded_by("import survey")
+    )
 
 
 def test_nothing_that_a_first_point_alone_needs_is_loaded_before():
-    assert not {"dask.array", "scipy.special", "matplotlib"} & set(loaded_by("import survey; survey.evaluate"))
+    assert not {"dask.array", "scipy.special", "matplotlib"} & set(
+        loaded_by("import survey; survey.evaluate")
+    )
 
 
 def test_telling_what_a_file_contains_loads_no_compiler():
     path = Path(__file__).parent / "golden/mathieu.nc"
-    code = f"from survey import cli; cli.program.main(['info', {str(path)!r}], standalone_mode=False)"
-    assert "xarray" in (found := loaded_by(code)) and not {"numba", "dask.array", "matplotlib"} & set(found)
+    code = (
+        f"from survey import cli; cli.program.main(['info', {str(path)!r}], standalone_mode=False)"
+    )
+    assert "xarray" in (found := loaded_by(code)) and not {
+        "numba",
+        "dask.array",
+        "matplotlib",
+    } & set(found)
 
 
 def test_a_run_loads_no_xarray_where_it_finds_no_curves():
@@ -41,5 +53,7 @@ def test_importing_a_scene_compiles_nothing():
 
 def test_the_import_rules_hold():
     linter = Path(sys.executable).with_name("lint-imports")
-    checked = subprocess.run([linter], cwd=Path(__file__).parent.parent, capture_output=True, text=True)
+    checked = subprocess.run(
+        [linter], cwd=Path(__file__).parent.parent, capture_output=True, text=True
+    )
     assert checked.returncode == 0, checked.stdout

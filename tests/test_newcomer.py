@@ -1,4 +1,6 @@
-"""Mistakes that a newcomer types, at the command line and in Python: one clear line each, which says what to do."""
+"""Mistakes that a newcomer types, at the command line and in Python: one clear line each, which
+says what to do.
+"""
 
 import numpy as np
 import pytest
@@ -21,7 +23,9 @@ path = "map.nc"
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("newcomer")
     (folder / "good.toml").write_text(WORKFLOW)
-    (folder / "own.py").write_text("PARAMETERS = ('a',)\nPERIOD = 1.0\n\n\ndef z(u, p):\n    return p[0]\n")
+    (folder / "own.py").write_text(
+        "PARAMETERS = ('a',)\nPERIOD = 1.0\n\n\ndef z(u, p):\n    return p[0]\n"
+    )
     (folder / "twice.toml").write_text(WORKFLOW.replace("rho =", "k ="))
     (folder / "folder.html").mkdir()
     survey.run(folder / "good.toml", output=folder / "map.nc")
@@ -44,11 +48,17 @@ SHELL = [
         "boundaries = True: it must be a valid table, [boundaries] on a line of its own",
     ),
     ("run good.toml --set boundaries.surfaces='yes'", "it must be true or false, without quotes"),
-    ("init floquet", "systems of your own are files, such as 'mine.py', or come from survey.floquet(...) in Python"),
+    (
+        "init floquet",
+        "systems of your own are files, such as 'mine.py', or come from survey.floquet(...) in Python",
+    ),
     ("run satellite", "this is a scene: survey init satellite writes a workflow of it"),
     ("run own.py", "this is a scene's file: survey init own.py writes a workflow of it"),
     ("run twice.toml", "this is not TOML (a key is given twice: "),
-    ("run good.toml -o map.csv", "output.path = 'map.csv' must be a netCDF file; name one, such as 'map.nc'"),
+    (
+        "run good.toml -o map.csv",
+        "output.path = 'map.csv' must be a netCDF file; name one, such as 'map.nc'",
+    ),
     ("run good.toml -o .", "output.path = '.' is a folder"),
     ("run good.toml --set axes.k.num=2.5", "axes.k.num = 2.5"),
     ("run good.toml --set axes.k.spacing=logarithmic", "should be 'linear' or 'log'"),
@@ -122,7 +132,12 @@ def test_a_command_answers_in_one_line(line, words, here, capsys):
     with pytest.raises(SystemExit) as ended:
         main(line.split())
     said = capsys.readouterr().err
-    assert ended.value.code == 2 and words in said and said.startswith("survey: ") and said.count("\n") == 1, said
+    assert (
+        ended.value.code == 2
+        and words in said
+        and said.startswith("survey: ")
+        and said.count("\n") == 1
+    ), said
     assert sorted(path.name for path in here.iterdir()) == before
 
 
@@ -136,25 +151,48 @@ def fill(t, p, out):
 
 PYTHON = [
     (lambda ds: survey.evaluate("satelite", k=0.1, rho=1.0), "did you mean 'satellite'?"),
-    (lambda ds: survey.evaluate("satellite", k=0.1), "rho is missing: satellite needs orbital rate"),
-    (lambda ds: survey.evaluate("satellite", k=0.1, rho="1"), "rho = '1': it must be a real number"),
-    (lambda ds: survey.evaluate("satellite", k=2 + 1j, rho=1.0), "k = (2+1j): it must be a real number"),
-    (lambda ds: survey.evaluate("satellite", k=[[0.1, 0.2]], rho=1.0), "an array of 2 dimensions needs names"),
+    (
+        lambda ds: survey.evaluate("satellite", k=0.1),
+        "rho is missing: satellite needs orbital rate",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", k=0.1, rho="1"),
+        "rho = '1': it must be a real number",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", k=2 + 1j, rho=1.0),
+        "k = (2+1j): it must be a real number",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", k=[[0.1, 0.2]], rho=1.0),
+        "an array of 2 dimensions needs names",
+    ),
     (
         lambda ds: survey.evaluate("satellite", k=0.1, rho=1.0, body="ball"),
         "body: unknown value 'ball' (allowed: prolate",
     ),
-    (lambda ds: survey.evaluate("satellite", amplitude=45, inertia_ratio=0.5), "give amplitude_deg = 45"),
+    (
+        lambda ds: survey.evaluate("satellite", amplitude=45, inertia_ratio=0.5),
+        "give amplitude_deg = 45",
+    ),
     (lambda ds: survey.evaluate("satellite", k=0.5, rho=1.0, tol=1e-8), "did you mean 'rtol'?"),
     (lambda ds: survey.evaluate("satellite", k=0.5, rho=1.0, rtol=0), "must lie between 0 and 1"),
-    (lambda ds: survey.evaluate("satellite", k=0.5, rho=1.0, variables=["disc"]), "did you mean 'discriminant'?"),
+    (
+        lambda ds: survey.evaluate("satellite", k=0.5, rho=1.0, variables=["disc"]),
+        "did you mean 'discriminant'?",
+    ),
     (lambda ds: survey.evaluate("mathieu", a=1.0, q=None), "q = None: it must be a real number"),
     (
         lambda ds: survey.evaluate("mathieu", a=1.0, q=0.1, k=3),
         "unknown parameter of scene mathieu 'k' (allowed: a, q)",
     ),
     (lambda ds: survey.evaluate("mathieu", a=[], q=1.0), "an empty array has no points"),
-    (lambda ds: survey.evaluate("satellite", k=[0.0, 0.5, 0.9], rho=xr.DataArray([1.0, 2.0], dims="k")), "align them"),
+    (
+        lambda ds: survey.evaluate(
+            "satellite", k=[0.0, 0.5, 0.9], rho=xr.DataArray([1.0, 2.0], dims="k")
+        ),
+        "align them",
+    ),
     (lambda ds: survey.evaluate(ds), "this is a dataset, not a scene"),
     (lambda ds: survey.open(ds), "give the path of a netCDF file"),
     (lambda ds: survey.run({"scene": "mathieu"}), "axes is missing"),
@@ -174,21 +212,48 @@ PYTHON = [
     (lambda ds: ds.survey.compare("other.nc"), "give the dataset of another survey"),
     (lambda ds: xr.Dataset().survey.map(), "this dataset was not written by survey"),
     (lambda ds: survey.concat([ds, ds]), "they are of the same points"),
-    (lambda ds: survey.hill("cos(t)", period=1.0, parameters="a"), "z must be a function of two arguments, z(u, p)"),
-    (lambda ds: survey.hill(z, period=-1, parameters="a"), "period = -1: it must be a positive number"),
-    (lambda ds: survey.edge("satellite", along="amplitud", inertia_ratio=0.2), "did you mean 'amplitude'?"),
+    (
+        lambda ds: survey.hill("cos(t)", period=1.0, parameters="a"),
+        "z must be a function of two arguments, z(u, p)",
+    ),
+    (
+        lambda ds: survey.hill(z, period=-1, parameters="a"),
+        "period = -1: it must be a positive number",
+    ),
+    (
+        lambda ds: survey.edge("satellite", along="amplitud", inertia_ratio=0.2),
+        "did you mean 'amplitude'?",
+    ),
     (lambda ds: survey.evaluate("libration", body="Earth-Mon"), "did you mean 'Earth-Moon'?"),
     (lambda ds: survey.evaluate("libration", m1=1.0), "m2 is missing: give all of m1, m2"),
-    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=-1.0, B=-1.0, C=-0.5), "A = -1.0: a moment of inertia"),
-    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=0.0, B=0.0, C=1.0), "none may exceed the sum"),
-    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=2.0, C=2.5), "must be equal and positive"),
-    (lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=1.0), "C is missing: give all of A, B, C"),
-    (lambda ds: survey.evaluate("satellite", k=True, rho=1.0), "k = True: it must be a real number"),
+    (
+        lambda ds: survey.evaluate("satellite", amplitude=0.5, A=-1.0, B=-1.0, C=-0.5),
+        "A = -1.0: a moment of inertia",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", amplitude=0.5, A=0.0, B=0.0, C=1.0),
+        "none may exceed the sum",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=2.0, C=2.5),
+        "must be equal and positive",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", amplitude=0.5, A=1.0, B=1.0),
+        "C is missing: give all of A, B, C",
+    ),
+    (
+        lambda ds: survey.evaluate("satellite", k=True, rho=1.0),
+        "k = True: it must be a real number",
+    ),
     (
         lambda ds: survey.evaluate("satellite", k=0.5, rho=1.0, rtol="1e-8"),
         "rtol = '1e-8': it must lie between 0 and 1",
     ),
-    (lambda ds: survey.evaluate("gyrostat", question="Abel", phi=1.0, w0=1.0), "did you mean 'abel'?"),
+    (
+        lambda ds: survey.evaluate("gyrostat", question="Abel", phi=1.0, w0=1.0),
+        "did you mean 'abel'?",
+    ),
     (lambda ds: survey.evaluate("libration", body="Earth-Moon", mu=0.01), "mu is given twice"),
     (lambda ds: survey.run("good.toml", output=3), "output = 3: give the path of a netCDF file"),
     (lambda ds: survey.run("good.toml", scheduler=3), "scheduler = 3: give an address"),
@@ -200,27 +265,54 @@ PYTHON = [
     (lambda ds: ds.survey.map(x="k", y="k"), "x and y are both 'k'"),
     (lambda ds: ds.survey.margin(k=0.1), "rho is missing: a point needs"),
     (lambda ds: ds.survey.margin(k=5, rho=1.0), "lies outside the map"),
-    (lambda ds: survey.edge("satellite", along="amplitude", amplitude=1.0, inertia_ratio=0.2), "give (low, high)"),
-    (lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio=[0.2, 0.3]), "it must be one number"),
+    (
+        lambda ds: survey.edge("satellite", along="amplitude", amplitude=1.0, inertia_ratio=0.2),
+        "give (low, high)",
+    ),
+    (
+        lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio=[0.2, 0.3]),
+        "it must be one number",
+    ),
     (
         lambda ds: survey.edge("brun", along="ratio", l=0.5, alpha=0.1, beta=0.2, sign="1"),
         "no boundaries are known along ratio",
     ),
-    (lambda ds: survey.hill(z, period=1.0, parameters=("a", "a")), "give at least one name, each once"),
-    (lambda ds: survey.hill(z, period=1.0, parameters="a", even="yes"), "even = 'yes': it must be True or False"),
+    (
+        lambda ds: survey.hill(z, period=1.0, parameters=("a", "a")),
+        "give at least one name, each once",
+    ),
+    (
+        lambda ds: survey.hill(z, period=1.0, parameters="a", even="yes"),
+        "even = 'yes': it must be True or False",
+    ),
     (
         lambda ds: survey.hill(z, period=1.0, parameters="a", damping=np.nan),
         "damping = nan: it must be a finite number",
     ),
-    (lambda ds: survey.hill(z, period=1.0, parameters="a", breaks=(9.0,)), "breaks: 9 lies outside"),
+    (
+        lambda ds: survey.hill(z, period=1.0, parameters="a", breaks=(9.0,)),
+        "breaks: 9 lies outside",
+    ),
     (
         lambda ds: survey.floquet(fill, period=0, parameters="a", states="xy"),
         "period = 0: it must be a positive number",
     ),
-    (lambda ds: survey.floquet(fill, period=1, parameters="a", states=()), "give the names of the states"),
-    (lambda ds: survey.floquet(fill, period=1, parameters="a", states="xy", structure="even"), "must be one of 'none'"),
-    (lambda ds: survey.floquet(period=1, parameters="a", states="xy"), "give either A(t, p, out), or K(t, p, out)"),
-    (lambda ds: survey.abel(z, "g", parameters="a"), "g must be a function of two arguments, g(phi, p)"),
+    (
+        lambda ds: survey.floquet(fill, period=1, parameters="a", states=()),
+        "give the names of the states",
+    ),
+    (
+        lambda ds: survey.floquet(fill, period=1, parameters="a", states="xy", structure="even"),
+        "must be one of 'none'",
+    ),
+    (
+        lambda ds: survey.floquet(period=1, parameters="a", states="xy"),
+        "give either A(t, p, out), or K(t, p, out)",
+    ),
+    (
+        lambda ds: survey.abel(z, "g", parameters="a"),
+        "g must be a function of two arguments, g(phi, p)",
+    ),
 ]
 
 
@@ -261,7 +353,9 @@ def named_state(t, x, p, out):
 
 
 def floquet(A=fill, **given):
-    return survey.floquet(A, **({"period": np.pi, "parameters": ("a", "e"), "states": ("x", "v")} | given))
+    return survey.floquet(
+        A, **({"period": np.pi, "parameters": ("a", "e"), "states": ("x", "v")} | given)
+    )
 
 
 def orbit(f=driven, **given):
@@ -274,38 +368,71 @@ def at(scene, **parameters):
 
 
 OWN = [
-    (lambda: at(floquet(rebound), a=1.0, e=0.1), "A(t, p, out) leaves out all 0; fill its entries: out[0, 0] = ..."),
-    (lambda: at(floquet(None, K=K, C=rebound, states="x"), a=1.0, e=0.1), "C(t, p, out) leaves out all 0"),
+    (
+        lambda: at(floquet(rebound), a=1.0, e=0.1),
+        "A(t, p, out) leaves out all 0; fill its entries: out[0, 0] = ...",
+    ),
+    (
+        lambda: at(floquet(None, K=K, C=rebound, states="x"), a=1.0, e=0.1),
+        "C(t, p, out) leaves out all 0",
+    ),
     (
         lambda: at(floquet(states=("x", "v", "w")), a=1.0, e=0.1),
         "states names w, but its row and column of A are all 0",
     ),
-    (lambda: at(floquet(None, K=K), a=1.0, e=0.1), "leave it out of states, to which velocities are added"),
+    (
+        lambda: at(floquet(None, K=K), a=1.0, e=0.1),
+        "leave it out of states, to which velocities are added",
+    ),
     (lambda: floquet(reordered), "its arguments come in the order A(t, p, out)"),
     (lambda: survey.hill(lambda p, u: p[0], period=1.0, parameters="a"), "in the order z(u, p)"),
     (lambda: survey.abel(lambda p, phi: -p[0], z, parameters="a"), "in the order f(phi, p)"),
     (lambda: at(floquet(attribute), a=1.0, e=0.1), "p is an array; write p[0], p[1]"),
-    (lambda: at(floquet(imaginary), a=1.0, e=0.1), "fills in a complex number; write real and imaginary parts"),
-    (lambda: floquet(period=lambda a, e: 1.0), "period must be a function of one argument, the array p"),
+    (
+        lambda: at(floquet(imaginary), a=1.0, e=0.1),
+        "fills in a complex number; write real and imaginary parts",
+    ),
+    (
+        lambda: floquet(period=lambda a, e: 1.0),
+        "period must be a function of one argument, the array p",
+    ),
     (lambda: floquet(breaks=90), "breaks: 90 lies outside 0 <= t <= T = 3.14159"),
-    (lambda: floquet(conserved="x"), "conserved = 'x': there are 2 states, and each needs a number"),
+    (
+        lambda: floquet(conserved="x"),
+        "conserved = 'x': there are 2 states, and each needs a number",
+    ),
     (lambda: floquet(parameters="a, e"), "write ('a', 'e')"),
     (lambda: floquet(parameters=("a", "exponent")), "rename 'exponent', which is taken"),
     (lambda: floquet(states="x v"), "write ('x', 'v')"),
-    (lambda: at(floquet(None, K=K, M=rebound, states="x"), a=1.0, e=0.1), "M(t, p, out) leaves out all 0"),
-    (lambda: at(orbit(half_filled), F=0.3), "leaves out[1] 0: v never changes; fill out[1] = dv/dt"),
+    (
+        lambda: at(floquet(None, K=K, M=rebound, states="x"), a=1.0, e=0.1),
+        "M(t, p, out) leaves out all 0",
+    ),
+    (
+        lambda: at(orbit(half_filled), F=0.3),
+        "leaves out[1] 0: v never changes; fill out[1] = dv/dt",
+    ),
     (lambda: at(orbit(whole_state), F=0.3), "an entry that f(t, x, p, out) fills in is no number"),
     (lambda: at(orbit(named_state), F=0.3), "x and p hold numbers; write x[0], ..., p[0]"),
     (
         lambda: at(orbit(period=None, start=(1.0, 0.0, 6.0)), F=0.3),
         "depends on t, so that period must be given; give the period of f in t",
     ),
-    (lambda: orbit(period=None, start=(1.0, 0.0, -6.0)), "start ends in -6, the guess of the period"),
+    (
+        lambda: orbit(period=None, start=(1.0, 0.0, -6.0)),
+        "start ends in -6, the guess of the period",
+    ),
     (lambda: orbit(start=lambda: (0.0, 0.0)), "start must be a function of one argument"),
-    (lambda: at(orbit(start=lambda p: (0.0,)), F=0.3), "start(p) returns (1,) numbers, not 2: the states; correct it"),
+    (
+        lambda: at(orbit(start=lambda p: (0.0,)), F=0.3),
+        "start(p) returns (1,) numbers, not 2: the states; correct it",
+    ),
     (lambda: orbit(continuation=("G", 0, 1)), "give (name, least, greatest value) of one of F"),
     (lambda: at(orbit(continuation=("F", 0, 1)), F=0.3, branch=1.5), "branch != 0, a whole number"),
-    (lambda: at(orbit(), F=0.3, question="fate"), "question: unknown parameter of scene orbit(driven) 'question'"),
+    (
+        lambda: at(orbit(), F=0.3, question="fate"),
+        "question: unknown parameter of scene orbit(driven) 'question'",
+    ),
     (lambda: at(fill, a=1.0), "is a function; give survey.floquet(fill, period=...)"),
     (lambda: at(driven, F=1.0), "is a function; give survey.orbit(driven, period=...)"),
 ]
@@ -320,7 +447,9 @@ def test_an_own_system_that_is_wrong_answers_in_one_line(mistake, words):
 
 
 def test_a_system_that_may_stay_as_it_is():
-    """No damping, a stiffness that is 0 at the point that is asked, and an equation that returns its array."""
+    """No damping, a stiffness that is 0 at the point that is asked, and an equation that returns
+    its array.
+    """
     undamped = floquet(None, K=K, C=lambda t, p, out: None, states="x")
     assert at(undamped, a=0.0, e=0.0).status == 0
     returned = floquet(lambda t, p, out: np.array([[-0.1 - p[0], 0.0], [0.0, -0.2 - p[1]]]))
@@ -329,7 +458,10 @@ def test_a_system_that_may_stay_as_it_is():
 
 def test_why_nothing_is_stable_without_a_structure():
     point = at(floquet(None, K=K, states="x"), a=0.5, e=0.1)
-    assert point.verdict == -1 and "their product is 1: state the structure if" in point.survey.point().why
+    assert (
+        point.verdict == -1
+        and "their product is 1: state the structure if" in point.survey.point().why
+    )
     damped = at(floquet(None, K=K, C=lambda t, p, out: out.fill(0.1), states="x"), a=0.5, e=0.1)
     assert damped.verdict == 1 and "product" not in damped.survey.point().why
 
@@ -348,38 +480,62 @@ def labelled(scene):
 
 
 DATASET = [
-    (lambda ds, scene: labelled(scene).survey.zoom(case=("soft", "hard")), "case = ('soft', 'hard'): give two numbers"),
-    (lambda ds, scene: ds.survey.zoom(a=(0.5, 1.0), num={"e": 3}), "num: unknown axis with a range 'e' (allowed: a)"),
+    (
+        lambda ds, scene: labelled(scene).survey.zoom(case=("soft", "hard")),
+        "case = ('soft', 'hard'): give two numbers",
+    ),
+    (
+        lambda ds, scene: ds.survey.zoom(a=(0.5, 1.0), num={"e": 3}),
+        "num: unknown axis with a range 'e' (allowed: a)",
+    ),
     (lambda ds, scene: ds.survey.zoom(a=(0.5, np.inf)), "a = (0.5, inf): give two numbers"),
-    (lambda ds, scene: ds.survey.trajectory(a=1.0, e=0.0, figure=True), "figure = True: give a matplotlib Figure"),
-    (lambda ds, scene: ds.survey.trajectory(a=1.0, e=0.0, time=1e9), "periods is too long to be drawn; give at most"),
+    (
+        lambda ds, scene: ds.survey.trajectory(a=1.0, e=0.0, figure=True),
+        "figure = True: give a matplotlib Figure",
+    ),
+    (
+        lambda ds, scene: ds.survey.trajectory(a=1.0, e=0.0, time=1e9),
+        "periods is too long to be drawn; give at most",
+    ),
     (
         lambda ds, scene: ds.isel(e=1).survey.point(a=1.0, e=0.5),
         "e is 1 at all points of this survey, so it is no axis",
     ),
-    (lambda ds, scene: ds.isel(e=1).survey.zoom(e=(0.5, 1.0)), "e is 1 at all points of this survey"),
+    (
+        lambda ds, scene: ds.isel(e=1).survey.zoom(e=(0.5, 1.0)),
+        "e is 1 at all points of this survey",
+    ),
     (
         lambda ds, scene: survey.edge(scene, along=["a"], e=1.0, a=(0, 1)),
         "along = ['a']: give the name of one parameter",
     ),
-    (lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, np.inf)), "a = (0, inf): it is searched along, so"),
+    (
+        lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, np.inf)),
+        "a = (0, inf): it is searched along, so",
+    ),
     (
         lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, 1), rtol=1e-8),
         "rtol does not apply here: edges are",
     ),
     (
-        lambda ds, scene: survey.edge("satellite", along="amplitude", inertia_ratio=0.2, amplitude=(0, 90)),
+        lambda ds, scene: survey.edge(
+            "satellite", along="amplitude", inertia_ratio=0.2, amplitude=(0, 90)
+        ),
         "allowed: 0 <= amplitude < 1.5708 (rad)",
     ),
     (
-        lambda ds, scene: survey.edge("brun_triaxial", along="Omega", A=1.0, B=0.5, C=0.3, Omega=(0, 2)),
+        lambda ds, scene: survey.edge(
+            "brun_triaxial", along="Omega", A=1.0, B=0.5, C=0.3, Omega=(0, 2)
+        ),
         "edge: none at Omega = 1, A = 1, B = 0.5, C = 0.3, epsilon = 1: the parameters lie outside the domain: ",
     ),
 ]
 
 
 @pytest.mark.parametrize(("mistake", "words"), DATASET)
-def test_a_question_to_a_dataset_or_an_edge_that_is_wrong_answers_in_one_line(mistake, words, damped):
+def test_a_question_to_a_dataset_or_an_edge_that_is_wrong_answers_in_one_line(
+    mistake, words, damped
+):
     with pytest.raises(survey.BadInput) as refused:
         mistake(*damped)
     said = str(refused.value)
@@ -388,8 +544,16 @@ def test_a_question_to_a_dataset_or_an_edge_that_is_wrong_answers_in_one_line(mi
 
 def test_a_range_without_boundaries_has_none(damped):
     assert survey.edge(damped[1], along="a", a=(2.0, 3.0), e=0.0).place.size == 0
-    assert survey.edge("brun_triaxial", along="Omega", A=1.0, B=0.8, C=0.7, Omega=(5.0, 6.0)).place.size == 0
-    assert survey.evaluate("satellite_triaxial", yaw_ratio=0.5, roll_ratio=0.4, amplitude=0.5).status == 1
+    assert (
+        survey.edge(
+            "brun_triaxial", along="Omega", A=1.0, B=0.8, C=0.7, Omega=(5.0, 6.0)
+        ).place.size
+        == 0
+    )
+    assert (
+        survey.evaluate("satellite_triaxial", yaw_ratio=0.5, roll_ratio=0.4, amplitude=0.5).status
+        == 1
+    )
 
 
 FILE = """from math import cos, pi
@@ -408,8 +572,14 @@ def f(t, x, p, out):
     out[0], out[1] = x[1], p[0] * cos(t) - 0.1 * x[1] - x[0]
 """
 FILES = [
-    (FILE.replace("def K", "def k"), "z is missing; write def z(u, p) for a Hill equation, or f(phi, p)"),
-    (FILE.replace("PERIOD = pi", ""), "PERIOD is missing; write PERIOD = 2 * pi (its length), or a function of p"),
+    (
+        FILE.replace("def K", "def k"),
+        "z is missing; write def z(u, p) for a Hill equation, or f(phi, p)",
+    ),
+    (
+        FILE.replace("PERIOD = pi", ""),
+        "PERIOD is missing; write PERIOD = 2 * pi (its length), or a function of p",
+    ),
     (FILE.replace("PERIOD", "Period"), "Period is not read; write PERIOD"),
     (FILE + 'STRUCTUR = "symplectic"\n', "STRUCTUR is not read; write STRUCTURE"),
     (FILE + 'structure = "symplectic"\n', "structure is not read; write STRUCTURE"),
@@ -418,7 +588,10 @@ FILES = [
     (ORBIT.replace('STATES = ("x", "v")', ""), 'STATES is missing; write STATES = ("x", "v")'),
     (ORBIT.replace("PERIOD = 2 * pi", ""), "or a function of p, or None if f does not depend on t"),
     (ORBIT + "def JACOBIAN(t, x, p, out): pass\n", "JACOBIAN is not read; write jacobian"),
-    (ORBIT.replace("(t, x, p, out)", "(phi, p)"), "f must be a function of four arguments, f(t, x, p, out)"),
+    (
+        ORBIT.replace("(t, x, p, out)", "(phi, p)"),
+        "f must be a function of four arguments, f(t, x, p, out)",
+    ),
 ]
 
 
@@ -430,7 +603,9 @@ def test_a_scene_file_that_is_wrong_answers_in_one_line(text, words, tmp_path, m
     with pytest.raises(survey.BadInput) as refused:
         survey.run({"scene": "my own.py", "axes": axes}, output="map.nc")
     said = str(refused.value)
-    assert said.startswith("my own.py: ") and words in said and "\n" not in said and len(said) < 500, said
+    assert (
+        said.startswith("my own.py: ") and words in said and "\n" not in said and len(said) < 500
+    ), said
     assert [path.name for path in tmp_path.iterdir()] == ["my own.py"]
 
 
@@ -438,14 +613,19 @@ def test_a_constant_of_a_scene_file_is_no_slip(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "own.py").write_text(FILE + "DAMPING, STATE, delta, HELD = 0.1, 1, 2, 3\n")
     assert at("own.py", delta=1.0, epsilon=0.1).status == 0
-    with pytest.raises(survey.BadInput, match=r"unknown scene 'own'; did you mean the file 'own\.py'\?"):
+    with pytest.raises(
+        survey.BadInput, match=r"unknown scene 'own'; did you mean the file 'own\.py'\?"
+    ):
         at("own", delta=1.0, epsilon=0.1)
 
 
 def test_a_model_that_is_missing_is_said_in_one_line(here):
     with pytest.raises(FileNotFoundError) as refused:
         survey.Model("nothing.model")
-    assert str(refused.value) == "nothing.model: there is no such file; name one that survey model has made"
+    assert (
+        str(refused.value)
+        == "nothing.model: there is no such file; name one that survey model has made"
+    )
 
 
 @pytest.mark.parametrize(("mistake", "words"), PYTHON)

@@ -31,7 +31,12 @@ def test_the_package_shows_its_public_names():
 def test_scenes_of_ones_own_show_what_they_take_and_give(kind):
     scene = OWN[kind]()
     text, page = repr(scene), scene._repr_html_()
-    assert "outputs: " in text and "object at 0x" not in text and page.startswith("<div") and "<table>" in page
+    assert (
+        "outputs: " in text
+        and "object at 0x" not in text
+        and page.startswith("<div")
+        and "<table>" in page
+    )
     for p in scene.PARAMETERS:
         assert f"  {p.name}: " in text and f"<th>{p.name}</th>" in page
 
@@ -47,7 +52,11 @@ def test_a_survey_is_shown_as_a_table():
 def test_a_scene_is_described():
     described = survey.describe("satellite")
     assert described["parameters"]["rho"] and described["methods"]["auto"]
-    assert "parameters:" in repr(described) and "  rho " in repr(described) and "<table>" in described._repr_html_()
+    assert (
+        "parameters:" in repr(described)
+        and "  rho " in repr(described)
+        and "<table>" in described._repr_html_()
+    )
     assert "a" in survey.describe(OWN["hill"]())["parameters"]
     with pytest.raises(survey.BadInput, match="did you mean 'satellite'"):
         survey.describe("satelite")

@@ -1,7 +1,8 @@
-"""The program runs where Python has not what only POSIX has: Windows, as nearly as a POSIX system can play it.
+"""The program runs where Python has not what only POSIX has: Windows, as nearly as a POSIX system
+can play it.
 
-There are no such modules and functions; folders are not opened, files that are open neither removed nor replaced; pipes
-and texts know few characters.
+There are no such modules and functions; folders are not opened, files that are open neither removed
+nor replaced; pipes and texts know few characters.
 """
 
 import json
@@ -11,7 +12,9 @@ import sys
 
 import pytest
 
-pytestmark = pytest.mark.skipif(not os.path.isdir("/proc/self/fd"), reason="what is open is looked up in /proc")
+pytestmark = pytest.mark.skipif(
+    not os.path.isdir("/proc/self/fd"), reason="what is open is looked up in /proc"
+)
 
 LACKING = """
 import errno, os, shutil, signal, sys, tempfile, warnings
@@ -134,7 +137,9 @@ def start(tmp_path):
     def start(*words):
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
         command = [sys.executable, *words]
-        return subprocess.Popen(command, cwd=tmp_path, env=os.environ | own, text=True, encoding="cp1252", **pipes)
+        return subprocess.Popen(
+            command, cwd=tmp_path, env=os.environ | own, text=True, encoding="cp1252", **pipes
+        )
 
     return start
 
@@ -143,7 +148,12 @@ def test_the_commands_do_what_they_do_elsewhere(start, tmp_path):
     said = start("-c", PROGRAM).communicate(timeout=300)[0]
     assert "codes: [0, 0, 0, 0, 0, 0, 0, 0, 0, 0]" in said, said
     assert "Traceback" not in said and "already complete" in said
-    assert {file.name for file in tmp_path.glob("map.*")} >= {"map.nc", "map.nc.sha256", "map.png", "map.zip"}
+    assert {file.name for file in tmp_path.glob("map.*")} >= {
+        "map.nc",
+        "map.nc.sha256",
+        "map.png",
+        "map.zip",
+    }
     assert not (tmp_path / "map.nc.blocks").exists() and not (tmp_path / "map.nc.lock").exists()
 
 
@@ -162,7 +172,11 @@ def test_a_second_run_is_told_whose_the_lock_is_and_a_killed_one_frees_it(start,
     holder = start("-c", HOLDER)
     assert holder.stdout.readline() == "held\n"
     said = start("-m", "survey", "run", "map.toml").communicate(timeout=120)[0]
-    assert "another run is writing it (host" in said and f"pid {holder.pid})" in said and said.count("\n") == 1
+    assert (
+        "another run is writing it (host" in said
+        and f"pid {holder.pid})" in said
+        and said.count("\n") == 1
+    )
     holder.kill()
     holder.communicate()
     assert json.loads((tmp_path / "map.nc.lock").read_text())["pid"] == holder.pid

@@ -16,7 +16,9 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
 
 def test_the_citation_names_this_version():
     citation = yaml.safe_load((ABOUT / "CITATION.cff").read_text())
-    assert citation["version"] == VERSION and citation["authors"] == [{"name": "the survey founders"}]
+    assert citation["version"] == VERSION and citation["authors"] == [
+        {"name": "the survey founders"}
+    ]
     assert {"cff-version", "message", "title"} <= set(citation)
 
 
@@ -45,16 +47,28 @@ def test_the_typed_view_names_what_the_package_has():
 def test_the_distribution_is_described_and_its_version_is_the_packages():
     assert PROJECT["name"] != "survey" and "version" in PROJECT["dynamic"]
     assert "Typing :: Typed" in PROJECT["classifiers"]
-    tested = yaml.safe_load((ABOUT / "workflows" / "ci.yml").read_text())["jobs"]["check"]["strategy"]["matrix"]
-    named = [c.rpartition(" ")[2] for c in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d+$", c)]
+    tested = yaml.safe_load((ABOUT / "workflows" / "ci.yml").read_text())["jobs"]["check"][
+        "strategy"
+    ]["matrix"]
+    named = [
+        c.rpartition(" ")[2] for c in PROJECT["classifiers"] if re.search(r"Python :: 3\.\d+$", c)
+    ]
     assert sorted(tested["python"]) == sorted(named) and len(tested["os"]) == 3
 
 
 def test_the_files_that_others_expect_are_there():
-    for name in ("CODE_OF_CONDUCT.md", "ISSUE_TEMPLATE/bug.yml", "ISSUE_TEMPLATE/scene.yml", "CONTRIBUTING.md"):
+    for name in (
+        "CODE_OF_CONDUCT.md",
+        "ISSUE_TEMPLATE/bug.yml",
+        "ISSUE_TEMPLATE/scene.yml",
+        "CONTRIBUTING.md",
+    ):
         assert (ABOUT / name).stat().st_size > 200, name
     hooks = yaml.safe_load((ROOT / ".pre-commit-config.yaml").read_text())
-    assert {hook["id"] for repo in hooks["repos"] for hook in repo["hooks"]} >= {"ruff-check", "ruff-format"}
+    assert {hook["id"] for repo in hooks["repos"] for hook in repo["hooks"]} >= {
+        "ruff-check",
+        "ruff-format",
+    }
     for name in ("bug.yml", "scene.yml"):
         form = yaml.safe_load((ABOUT / "ISSUE_TEMPLATE" / name).read_text())
         assert {"name", "description", "body"} <= set(form)

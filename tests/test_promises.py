@@ -1,6 +1,8 @@
-"""What a sweep promises, on the real program: kills, faults, several processes. The long forms are marked slow.
+"""What a sweep promises, on the real program: kills, faults, several processes. The long forms are
+marked slow.
 
-Where each promise is tested, here if no file is named; (slow): its long form, (beside): parts in one process.
+Where each promise is tested, here if no file is named; (slow): its long form, (beside): parts in
+one process.
 
  1 atomic                test_kills_at_random_times_lose_and_corrupt_nothing: 4 kills, 200 (slow); test_faults: a kill
                          at each call that reaches the disk (slow), at all that publish and clean up
@@ -11,17 +13,21 @@ Where each promise is tested, here if no file is named; (slow): its long form, (
  6 drift is refused      test_drift_and_a_second_writer_are_refused; test_blocks (beside)
  7 one writer            test_drift_and_a_second_writer_are_refused; test_blocks: a killed holder; test_lock
  8 damage is found       test_a_flipped_bit_of_a_block_is_mended; test_cli: test_verify_finds_...; test_blocks:
-                         every bit of a block (beside); test_audit: wrong values under sound sums (beside)
+                         every bit of a block (beside); test_audit: wrong values under sound sums
+                         (beside)
  9 bounded memory        test_memory_is_bounded_by_blocks_not_by_the_map: 10^6 points, 10^8 (slow)
 10 prompt stop           test_workers_stop_promptly_with_the_run; test_an_interrupt_from_the_terminal_...;
-                         test_dispatch: an interruption (beside); test_cli: test_an_interrupted_run_can_be_resumed;
-                         test_cluster: test_the_batch_script_stops_before_the_walltime_and_is_queued_again
+                         test_dispatch: an interruption (beside); test_cli:
+                         test_an_interrupted_run_can_be_resumed; test_cluster:
+                         test_the_batch_script_stops_before_the_walltime_and_is_queued_again
 11 disk faults           test_a_full_disk_..., test_a_file_size_limit_...; test_faults: an error at each call that
-                         reaches the disk (slow), at one of each kind, a read-only disk; test_blocks: each (beside)
+                         reaches the disk (slow), at one of each kind, a read-only disk;
+                         test_blocks: each (beside)
 12 dying workers         test_a_killed_worker_is_replaced; test_dispatch: tasks that kill (beside); test_cluster: a lost
                          scheduler, workers on another disk, a worker with other code
 13 no stale code         test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process;
-                         test_two_processes_fill_one_empty_kernel_cache; test_a_home_that_cannot_be_written_is_fine
+                         test_two_processes_fill_one_empty_kernel_cache;
+                         test_a_home_that_cannot_be_written_is_fine
 14 an honest plan        test_the_plan_counts_what_the_run_does; test_cli: no kernel is called
 15 old files open        test_files_that_are_kept_open_and_verify; test_golden: of every scene
 16 the same answer       test_the_same_bits_on_one_processor_and_on_all; test_scenes (beside)
@@ -137,7 +143,8 @@ def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills,
             (folder / "sweep.nc").unlink()
             continue
         workers = [child for child in children if _is_worker(child)]
-        if workers and dice.random() < 0.5:  # a worker first: the run goes on, until it is killed too
+        # a worker first: the run goes on, until it is killed too
+        if workers and dice.random() < 0.5:
             dice.choice(workers).kill()
             killed += 1
             time.sleep(dice.uniform(0.0, 1.0))
@@ -145,7 +152,10 @@ def test_kills_at_random_times_lose_and_corrupt_nothing(folder, unbroken, kills,
         running.kill()
         running.wait()
         killed += 1
-        wait_for(lambda gone=children: not any(child.is_running() and _works(child) for child in gone), 20)
+        wait_for(
+            lambda gone=children: not any(child.is_running() and _works(child) for child in gone),
+            20,
+        )
         assert len(blocks(folder)) >= before or (folder / "sweep.nc").exists()
         if (folder / "sweep.nc").exists():
             assert reading.check(folder / "sweep.nc") == []
@@ -214,7 +224,9 @@ def test_cells_go_on_where_a_kill_left_them(tmp_path):
     command = [sys.executable, "-c", PARTS, "run", "cells.toml"]
     keywords = {"cwd": tmp_path, "text": True, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     whole = subprocess.run([*command, "-o", "whole.nc"], **keywords, timeout=120)
-    assert whole.returncode == 0 and "cells: all decided or at the requested width" in whole.stderr, whole.stderr
+    assert (
+        whole.returncode == 0 and "cells: all decided or at the requested width" in whole.stderr
+    ), whole.stderr
     parts, known = whole.stdout.split(), set()
     for share in (0.3, 0.7):
         running = subprocess.Popen(command, **keywords)
@@ -223,16 +235,22 @@ def test_cells_go_on_where_a_kill_left_them(tmp_path):
         assert not known & set(running.communicate()[0].split())
         known = _parts_of_cells(tmp_path)
     done = subprocess.run(command, **keywords, timeout=120)
-    assert done.returncode == 0 and sorted([*known, *done.stdout.split()]) == sorted(parts), done.stderr
+    assert done.returncode == 0 and sorted([*known, *done.stdout.split()]) == sorted(parts), (
+        done.stderr
+    )
     assert reading.check(tmp_path / "cells.nc") == []
-    xr.testing.assert_equal(*(xr.load_dataset(tmp_path / name).drop_attrs() for name in ("whole.nc", "cells.nc")))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(tmp_path / name).drop_attrs() for name in ("whole.nc", "cells.nc"))
+    )
 
 
 def _parts_of_cells(folder):
     return {file.stem for file in (folder / "cells.nc.blocks").glob("cells-*.extra")}
 
 
-@pytest.mark.parametrize(("name", "code"), [pytest.param("SIGINT", 130, marks=pytest.mark.slow), ("SIGTERM", 143)])
+@pytest.mark.parametrize(
+    ("name", "code"), [pytest.param("SIGINT", 130, marks=pytest.mark.slow), ("SIGTERM", 143)]
+)
 def test_workers_stop_promptly_with_the_run(folder, name, code):
     heeding = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731  (a background job ignores it)
     running = start(folder, "--workers", "2", stderr=subprocess.PIPE, preexec_fn=heeding)
@@ -264,7 +282,9 @@ def test_drift_and_a_second_writer_are_refused(folder, unbroken):
     running.send_signal(signal.SIGSTOP)
     code, stderr = resume(folder, "--quiet")
     assert (
-        code == 2 and stderr.count("\n") == 1 and f"another run is writing it (host {socket.gethostname()}, " in stderr
+        code == 2
+        and stderr.count("\n") == 1
+        and f"another run is writing it (host {socket.gethostname()}, " in stderr
     )
     assert f"pid {running.pid}" in stderr
     running.kill()
@@ -279,7 +299,11 @@ def test_drift_and_a_second_writer_are_refused(folder, unbroken):
     assert f"--fresh, which deletes {kept} finished blocks" in stderr
     assert len(blocks(folder)) == kept
     code, stderr = resume(folder, "--fresh")
-    assert code == 0 and "reused 0 of" in stderr and "--fresh" in xr.load_dataset(folder / "sweep.nc").attrs["history"]
+    assert (
+        code == 0
+        and "reused 0 of" in stderr
+        and "--fresh" in xr.load_dataset(folder / "sweep.nc").attrs["history"]
+    )
     same(folder, unbroken)
 
 
@@ -307,7 +331,9 @@ def test_a_bad_point_costs_itself_alone(tmp_path):
         command = [sys.executable, "-m", "survey", "run", f"{name}.toml", "-o", f"{name}.nc"]
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stderr
-        assert name == "without" or "status: ok: 6, invalid_parameters: 2" in done.stderr, done.stderr
+        assert name == "without" or "status: ok: 6, invalid_parameters: 2" in done.stderr, (
+            done.stderr
+        )
     bad, good = (xr.load_dataset(tmp_path / f"{name}.nc") for name in axes)
     xr.testing.assert_equal(bad.sel(k=good.k).drop_attrs(), good.drop_attrs())
     assert reading.check(tmp_path / "with.nc") == [] and bad.discriminant.sel(k=1.0).isnull().all()
@@ -318,36 +344,55 @@ def test_a_log_gets_a_line_now_and_then(folder):
     """Without a terminal, as under nohup; a minute is shortened to a twentieth of a second."""
     program = "import survey.sweep.progress; survey.sweep.progress.LOG_SECONDS = 0.05; " + PROGRAM
     done = subprocess.run(
-        [sys.executable, "-c", program, "run", "sweep.toml"], cwd=folder, capture_output=True, text=True
+        [sys.executable, "-c", program, "run", "sweep.toml"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
     )
     lines = [
-        line for line in done.stderr.splitlines() if re.search(r": \d+ of 45 blocks, \d+ s elapsed, ETA \d+ s$", line)
+        line
+        for line in done.stderr.splitlines()
+        if re.search(r": \d+ of 45 blocks, \d+ s elapsed, ETA \d+ s$", line)
     ]
     assert done.returncode == 0 and 2 <= len(lines) <= 45 and "\r" not in done.stderr, done.stderr
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, "run", "sweep.toml", "--fresh"], cwd=folder, capture_output=True, text=True
+        [sys.executable, "-c", PROGRAM, "run", "sweep.toml", "--fresh"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
     )
     assert done.stderr.count("elapsed") == 1, done.stderr  # the last
 
 
 def test_the_plan_counts_what_the_run_does(folder, unbroken):
     command = [sys.executable, "-c", PROGRAM, "plan", "sweep.toml", "--json"]
-    planned = json.loads(subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout)
+    planned = json.loads(
+        subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
+    )
     assert planned["points"] == unbroken.status.size == 4500 and planned["blocks"] == 45
-    kinds = [np.dtype(variable.encoding.get("dtype", variable.dtype)) for variable in unbroken.data_vars.values()]
-    assert planned["bytes"] == sum(4500 * kind.itemsize for kind in kinds)  # masked integers are floats once open
+    kinds = [
+        np.dtype(variable.encoding.get("dtype", variable.dtype))
+        for variable in unbroken.data_vars.values()
+    ]
+    # masked integers are floats once open
+    assert planned["bytes"] == sum(4500 * kind.itemsize for kind in kinds)
     assert not (folder / "sweep.nc").exists()
 
 
 def test_a_file_size_limit_is_one_line_and_the_run_can_go_on(folder, unbroken):
     def limit():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.getrlimit(resource.RLIMIT_FSIZE)[1]))
+        resource.setrlimit(
+            resource.RLIMIT_FSIZE, (20_000, resource.getrlimit(resource.RLIMIT_FSIZE)[1])
+        )
 
-    environment = {key: value for key, value in os.environ.items() if not key.startswith("COV")}  # it writes files too
+    # it writes files too
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("COV")}
     running = start(folder, "--quiet", stderr=subprocess.PIPE, preexec_fn=limit, env=environment)
     stderr = running.communicate(timeout=60)[1]
-    assert running.returncode == 4 and stderr.count("\n") == 1 and "sweep.nc: writing failed" in stderr, stderr
+    assert (
+        running.returncode == 4 and stderr.count("\n") == 1 and "sweep.nc: writing failed" in stderr
+    ), stderr
     assert not (folder / "sweep.nc").exists()
     assert resume(folder)[0] == 0
     same(folder, unbroken)
@@ -357,17 +402,23 @@ def test_a_file_size_limit_is_one_line_and_the_run_can_go_on(folder, unbroken):
 def test_a_full_disk_is_one_line_and_the_run_can_go_on(folder, unbroken):
     disk = folder / "disk"
     disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=200k", "none", disk], capture_output=True).returncode:
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=200k", "none", disk], capture_output=True
+    ).returncode:
         pytest.skip("needs the right to mount a small tmpfs")
     try:
         (disk / "sweep.toml").write_text(SWEEP)
         code, stderr = resume(disk, "--quiet")
         assert code == 2 and "the disk of" in stderr and stderr.count("\n") == 1, stderr
         (disk / "filler").write_bytes(bytes(60_000))
-        program = PROGRAM.replace("from", "survey.sweep.engine.refuse_too_large = lambda _: None; from")
+        program = PROGRAM.replace(
+            "from", "survey.sweep.engine.refuse_too_large = lambda _: None; from"
+        )
         command = [sys.executable, "-c", program, "run", "sweep.toml", "--quiet"]
         done = subprocess.run(command, cwd=disk, capture_output=True, text=True, timeout=60)
-        assert done.returncode == 4 and "bytes free" in done.stderr and done.stderr.count("\n") == 1, done.stderr
+        assert (
+            done.returncode == 4 and "bytes free" in done.stderr and done.stderr.count("\n") == 1
+        ), done.stderr
         kept = len(blocks(disk))
         subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
         code, stderr = resume(disk)
@@ -394,7 +445,9 @@ def test_a_user_without_a_home_is_fine(folder):
     environment = {key: value for key, value in os.environ.items() if not key.startswith(places)}
     words = ["run", "sweep.toml", "--set", "axes.w0.num=2", "--set", "axes.phi0.num=2"]
     command = [sys.executable, "-c", homeless, *words]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=120
+    )
     assert done.returncode == 0 and "status: ok: 4" in done.stderr, done.stderr
 
 
@@ -414,11 +467,16 @@ def test_an_edit_of_what_a_kernel_calls_takes_effect_in_the_next_process(tmp_pat
         "import numpy as np; from survey.kernels.hill.satellite import sample; out = np.empty((1, 2, 2, 2));"
         "sample(np.array([[0.5, 0.75**0.5, 1.6, 0.0, 0.5, 0.0]]), np.array([0.2, 0.8]), out); print(out)"
     )
-    environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    environment = os.environ | {
+        "PYTHONPATH": str(tmp_path),
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+    }
 
     def printed():
         command = [sys.executable, "-c", words]
-        done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
+        )
         return done.stdout
 
     first = printed()
@@ -437,26 +495,35 @@ KEPT = sorted((Path(__file__).parent.parent / "results").glob("*_small.nc"))
 
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(path, marks=pytest.mark.slow if "fate" in path.name else (), id=path.name) for path in KEPT],
+    [
+        pytest.param(path, marks=pytest.mark.slow if "fate" in path.name else (), id=path.name)
+        for path in KEPT
+    ],
 )
 def test_files_that_are_kept_open_and_verify(path, tmp_path):
     for file in (path, Path(f"{path}.sha256")):
         shutil.copy(file, tmp_path)
     assert reading.check(tmp_path / path.name) == []
     done = subprocess.run(
-        [sys.executable, "-m", "survey", "verify", path.name], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "-m", "survey", "verify", path.name],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0 and "all within the error bars" in done.stdout, done.stderr
 
 
 def test_the_same_bits_on_one_processor_and_on_all(folder, unbroken):
-    code = start(folder, preexec_fn=lambda: os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})).wait(120)
+    code = start(
+        folder, preexec_fn=lambda: os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    ).wait(120)
     assert code == 0
     same(folder, unbroken)
     assert np.isfinite(unbroken.w).all()
 
 
-# runs a command and tells its peak memory: a process counts as its own what the one that started it had
+# runs a command and tells its peak memory: a process counts as its own what the one that started it
+# had
 PEAK = """
 import os, subprocess, sys
 _, ended, usage = os.wait4(subprocess.Popen(sys.argv[1:]).pid, 0)
@@ -473,10 +540,27 @@ def test_memory_is_bounded_by_blocks_not_by_the_map(tmp_path, side):
     workflow.write_text(text.partition("[boundaries]")[0])
     peaks = []
     for k, rho in ((100, 1000), (side, side)):
-        command = [sys.executable, "-m", "survey", "run", str(workflow), "-o", "map.nc", "--quiet", "--fresh"]
-        asked = [f"axes.k.num={k}", f"axes.rho.num={rho}", "output.variables=['discriminant']", "output.figures=[]"]
+        command = [
+            sys.executable,
+            "-m",
+            "survey",
+            "run",
+            str(workflow),
+            "-o",
+            "map.nc",
+            "--quiet",
+            "--fresh",
+        ]
+        asked = [
+            f"axes.k.num={k}",
+            f"axes.rho.num={rho}",
+            "output.variables=['discriminant']",
+            "output.figures=[]",
+        ]
         command += [word for text in asked for word in ("--set", text)]
-        ran = subprocess.run([sys.executable, "-c", PEAK, *command], cwd=tmp_path, capture_output=True, text=True)
+        ran = subprocess.run(
+            [sys.executable, "-c", PEAK, *command], cwd=tmp_path, capture_output=True, text=True
+        )
         assert ran.returncode == 0, ran.stderr
         peaks.append(int(ran.stdout.split()[-1]) / 1024)
     assert peaks[1] < 1024 and peaks[1] - peaks[0] < 256, peaks

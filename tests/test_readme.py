@@ -34,18 +34,25 @@ def small(code):
 def folder(tmp_path):
     """An empty folder with a small copy of the main workflow in it."""
     text = (ROOT / "workflows/satellite_prolate.toml").read_text()
-    text = text.replace("num = 400", "num = 8").replace("num = 600", "num = 9").replace("results/", "")
+    text = (
+        text.replace("num = 400", "num = 8").replace("num = 600", "num = 9").replace("results/", "")
+    )
     (tmp_path / "small.toml").write_text(text)
     return tmp_path
 
 
 def run(command, folder):
-    return subprocess.run(command, cwd=folder, shell=True, capture_output=True, text=True, executable="/bin/bash")
+    return subprocess.run(
+        command, cwd=folder, shell=True, capture_output=True, text=True, executable="/bin/bash"
+    )
 
 
 def test_the_main_command_is_the_documented_job():
     (main, test) = fenced("sh")
-    assert main.startswith("python3 -m venv .venv && .venv/bin/pip install -e . && ") and main.count("&&") == 2
+    assert (
+        main.startswith("python3 -m venv .venv && .venv/bin/pip install -e . && ")
+        and main.count("&&") == 2
+    )
     assert test.endswith("&& .venv/bin/python -m pytest\n")
     assert "README.md" in (ROOT / ".ci/run").read_text()
 
@@ -59,15 +66,21 @@ def test_the_first_picture_shows_whole_tongues():
 
 
 def test_the_main_command_runs(folder):
-    command = small(fenced("sh")[0].split("&&")[-1]).replace(".venv/bin/", f"{shlex.quote(str(BIN))}/")
+    command = small(fenced("sh")[0].split("&&")[-1]).replace(
+        ".venv/bin/", f"{shlex.quote(str(BIN))}/"
+    )
     done = run(command, folder)
     assert done.returncode == 0, done.stderr
-    assert (folder / "satellite_prolate.nc").exists() and (folder / "satellite_prolate.png").exists()
+    assert (folder / "satellite_prolate.nc").exists() and (
+        folder / "satellite_prolate.png"
+    ).exists()
 
 
 def test_the_notebook_example_runs(folder):
     code, *_ = fenced("python")
-    done = subprocess.run([sys.executable, "-c", small(code)], cwd=folder, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", small(code)], cwd=folder, capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("undecided unstable stable marginal\n") and "+-" in done.stdout
 
@@ -87,7 +100,9 @@ def test_the_scene_of_ones_own_runs(tmp_path, monkeypatch):
     (call,) = re.findall(r'`survey.evaluate\("two_harmonics.py",\s(.*?)\)`', README)
     (tmp_path / "two_harmonics.py").write_text(fenced("python")[2])
     ds = survey.evaluate("two_harmonics.py", **eval(f"dict({call})"))
-    assert int(ds.verdict) == 1 and ds.attrs["title"].startswith("Mathieu's equation with a second harmonic")
+    assert int(ds.verdict) == 1 and ds.attrs["title"].startswith(
+        "Mathieu's equation with a second harmonic"
+    )
 
 
 @pytest.mark.slow
@@ -146,6 +161,8 @@ def test_the_map_of_the_folders_is_the_tree():
     listed = sorted(name for row in rows for name in row.split())
     apart = {"__init__.py", "__main__.py", "__pycache__"}
     there = [path for path in (ROOT / "survey").iterdir() if path.is_dir() or path.suffix == ".py"]
-    assert listed == sorted(path.name + "/" * path.is_dir() for path in there if path.name not in apart)
+    assert listed == sorted(
+        path.name + "/" * path.is_dir() for path in there if path.name not in apart
+    )
     for name in re.findall(r"^([a-z]+)/ ", tree, re.MULTILINE):
         assert (ROOT / name).is_dir(), name

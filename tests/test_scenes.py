@@ -1,4 +1,6 @@
-"""What every scene promises, checked for each one that is found in its folder, under every value of its options."""
+"""What every scene promises, checked for each one that is found in its folder, under every value of
+its options.
+"""
 
 import itertools
 
@@ -20,7 +22,9 @@ def questions():
     for name in modules.names(survey.scenes):
         scene = modules.load(survey.scenes, name, "scene")
         choices = [
-            [(option.name, choice) for choice in option.choices] for option in scene.OPTIONS if not option.only_with
+            [(option.name, choice) for choice in option.choices]
+            for option in scene.OPTIONS
+            if not option.only_with
         ]
         also = [
             [*_needed(scene, o), (o.name, choice)]
@@ -30,7 +34,9 @@ def questions():
         ]
         whens, seen = {option.name: option for option in scene.OPTIONS}, []
         for combination in map(dict, [*itertools.product(*choices), *also]):
-            options = {key: value for key, value in combination.items() if exists(whens[key], combination)}
+            options = {
+                key: value for key, value in combination.items() if exists(whens[key], combination)
+            }
             if options not in seen:
                 seen.append(options)
                 yield pytest.param(scene, options, id="-".join([name, *options.values()]))
@@ -39,7 +45,9 @@ def questions():
 def _needed(scene, option):
     """Values of other options with which the parameter of the option exists."""
     when = next(p.when for p in scene.PARAMETERS if p.name == option.only_with)
-    return [(name, allowed[0]) for name, allowed in when.items() if name != option.name and allowed[0]]
+    return [
+        (name, allowed[0]) for name, allowed in when.items() if name != option.name and allowed[0]
+    ]
 
 
 def _is_primary(scene, name):
@@ -51,7 +59,9 @@ def draw(scene, options, seed):
     """Random parameters: two of them as axes of 4 and 3 values, the others fixed, all inside the domain."""
     random = np.random.default_rng(seed)
     used = [p for p in scene.PARAMETERS if exists(p, options) and not p.instead_of]
-    axes = [p.name for p in used if p.default is None] + [p.name for p in reversed(used) if p.default is not None]
+    axes = [p.name for p in used if p.default is None] + [
+        p.name for p in reversed(used) if p.default is not None
+    ]
     point = {}
     for p in used:
         size = {name: n for name, n in zip(axes, (4, 3), strict=False)}.get(p.name)
@@ -65,7 +75,9 @@ def evaluate(scene, options, point, **more):
 
 
 def agree(one, other):
-    """Names of the outputs whose difference exceeds the sum of the error bars, or whose verdicts contradict."""
+    """Names of the outputs whose difference exceeds the sum of the error bars, or whose verdicts
+    contradict.
+    """
     wrong = []
     for name in error_bars(one):
         off = np.abs(one[name] - other[name])
@@ -83,11 +95,16 @@ each = pytest.mark.parametrize(("scene", "options"), list(questions()))
 
 def each_but(*slow):
     """As `each`; these questions, whose kernels or points take long, are slow."""
-    marked = [pytest.param(*q.values, id=q.id, marks=pytest.mark.slow) if q.id in slow else q for q in questions()]
+    marked = [
+        pytest.param(*q.values, id=q.id, marks=pytest.mark.slow) if q.id in slow else q
+        for q in questions()
+    ]
     return pytest.mark.parametrize(("scene", "options"), marked)
 
 
-seeds = pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
+seeds = pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))]
+)
 
 
 @each
@@ -100,7 +117,12 @@ def test_a_scene_describes_itself(scene, options):
     )
     names = [p.name for p in scene.PARAMETERS]
     assert len(set(names)) == len(names) and all(p.long_name and p.symbol for p in scene.PARAMETERS)
-    flags = {name for o in scene.OUTPUTS if o.name == "verdict" and exists(o, options) for name in o.flags}
+    flags = {
+        name
+        for o in scene.OUTPUTS
+        if o.name == "verdict" and exists(o, options)
+        for name in o.flags
+    }
     assert not flags & set(status.table(scene)), "counts and legends could not tell the two apart"
     for parameter in scene.PARAMETERS:
         assert parameter.name in scene.__doc__, f"the docstring does not tell of {parameter.name}"
@@ -114,8 +136,25 @@ def extremes(scene, options, seed, points=60):
     random, point = np.random.default_rng(seed), {}
     for p in scene.PARAMETERS:
         if exists(p, options) and not p.instead_of:
-            values = np.array([p.minimum, p.maximum, -0.0, 5e-324, 1e-300, -1e-200, 1e-17, -1e-8, 0.5, 1.0, -1.0, 3e4])
-            point[p.name] = xr.DataArray(random.choice(values[p.holds(values)], points), dims="point")
+            values = np.array(
+                [
+                    p.minimum,
+                    p.maximum,
+                    -0.0,
+                    5e-324,
+                    1e-300,
+                    -1e-200,
+                    1e-17,
+                    -1e-8,
+                    0.5,
+                    1.0,
+                    -1.0,
+                    3e4,
+                ]
+            )
+            point[p.name] = xr.DataArray(
+                random.choice(values[p.holds(values)], points), dims="point"
+            )
     return point
 
 
@@ -135,7 +174,9 @@ def at_the_ends():
 
 @pytest.mark.parametrize(("scene", "options"), [*at_the_ends()])
 def test_so_has_each_at_the_ends_of_the_domain(scene, options):
-    """Those of the gyrostat and of `brun_triaxial` by time, which take seconds a point there, stand in their files."""
+    """Those of the gyrostat and of `brun_triaxial` by time, which take seconds a point there, stand
+    in their files.
+    """
     points = 10 if scene.FAMILY == "floquet" else 60  # a point of these is a system of its own
     has_outputs_bars_and_a_status(evaluate(scene, options, extremes(scene, options, 1, points)))
 
@@ -182,7 +223,9 @@ def test_one_bad_point_costs_one_point(scene, options):
     assert (last.status == status.INVALID_PARAMETERS).all()
     assert all(last[name].isnull().all() for name in error_bars(bad))
     for name in good.data_vars:
-        np.testing.assert_array_equal(good[name].values, bad.isel({axis: slice(0, -1)})[name].values)
+        np.testing.assert_array_equal(
+            good[name].values, bad.isel({axis: slice(0, -1)})[name].values
+        )
 
 
 @each_but("gyrostat-fate", "gyrostat-portrait", "brun_triaxial-trajectory")
@@ -190,7 +233,8 @@ def test_one_bad_point_costs_one_point(scene, options):
 def test_the_methods_check_one_another(scene, options, seed):
     point = draw(scene, options, seed)
     if scene.cost(options, {name: np.size(values) for name, values in point.items()}) > 1e-3:
-        point = {name: np.ravel(values)[0] for name, values in point.items()}  # the slowest methods take seconds
+        # the slowest methods take seconds
+        point = {name: np.ravel(values)[0] for name, values in point.items()}
     auto = evaluate(scene, options, point, rtol=1e-9)
     for method in methods_of(scene, options):
         assert agree(auto, evaluate(scene, options, point, rtol=1e-6, method=method)) == [], method

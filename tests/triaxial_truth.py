@@ -1,4 +1,6 @@
-"""The rotation of a rigid satellite on a circular orbit in three dimensions, by quaternions: no linearisation."""
+"""The rotation of a rigid satellite on a circular orbit in three dimensions, by quaternions: no
+linearisation.
+"""
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -8,9 +10,11 @@ STEP = 1e-30  # of complex derivatives
 
 
 def monodromies(A, B, C, k, direction, rtol=1e-12):
-    """M (N, 4, 4) in e1, e2, P1, P2 of N planar motions (arrays): derivatives of the body's motion over a period.
+    """M (N, 4, 4) in e1, e2, P1, P2 of N planar motions (arrays): derivatives of the body's motion
+    over a period.
 
-    All points and the four directions are integrated at once, over the period as unit of time, from complex starts.
+    All points and the four directions are integrated at once, over the period as unit of time, from
+    complex starts.
     """
     A, B, C, k, direction = np.broadcast_arrays(A, B, C, k, direction)
     rate = np.sqrt(3 * (B - A) / C)
@@ -36,9 +40,13 @@ def monodromies(A, B, C, k, direction, rtol=1e-12):
             ((moments[j] - moments[i]) * (w[i] * w[j] - 3.0 * r[i] * r[j])) / moments[m]
             for m, (j, i) in enumerate(((1, 2), (2, 0), (0, 1)))
         ]
-        return np.concatenate([np.stack([*own]), multiplied(Q, w) / 2]).reshape(-1) * np.tile(period, 28)
+        return np.concatenate([np.stack([*own]), multiplied(Q, w) / 2]).reshape(-1) * np.tile(
+            period, 28
+        )
 
-    end = solve_ivp(slopes, (0.0, 1.0), start.reshape(-1), method="DOP853", rtol=rtol, atol=1e-14).y[:, -1]
+    end = solve_ivp(
+        slopes, (0.0, 1.0), start.reshape(-1), method="DOP853", rtol=rtol, atol=1e-14
+    ).y[:, -1]
     w, Q = end.reshape(7, 4, -1)[:3], end.reshape(7, 4, -1)[3:]
     n = turned(Q, (0.0, 0.0, 1.0))
     e = np.stack([n[1].imag, -n[0].imag]) / STEP
@@ -51,9 +59,15 @@ def turned(Q, v):
     """The inertial vector v in the body's axes, Q* v Q, for quaternions Q (4, ...) of length 1."""
     s, x, y, z = Q
     return (
-        (s * s + x * x - y * y - z * z) * v[0] + 2 * (x * y + s * z) * v[1] + 2 * (x * z - s * y) * v[2],
-        2 * (x * y - s * z) * v[0] + (s * s - x * x + y * y - z * z) * v[1] + 2 * (y * z + s * x) * v[2],
-        2 * (x * z + s * y) * v[0] + 2 * (y * z - s * x) * v[1] + (s * s - x * x - y * y + z * z) * v[2],
+        (s * s + x * x - y * y - z * z) * v[0]
+        + 2 * (x * y + s * z) * v[1]
+        + 2 * (x * z - s * y) * v[2],
+        2 * (x * y - s * z) * v[0]
+        + (s * s - x * x + y * y - z * z) * v[1]
+        + 2 * (y * z + s * x) * v[2],
+        2 * (x * z + s * y) * v[0]
+        + 2 * (y * z - s * x) * v[1]
+        + (s * s - x * x - y * y + z * z) * v[2],
     )
 
 

@@ -1,9 +1,10 @@
-"""The bifurcation set of Brun's problem as surfaces over the scaled integrals l, alpha, beta: a picture.
+"""The bifurcation set of Brun's problem as surfaces over the scaled integrals l, alpha, beta: a
+picture.
 
     python workflows/brun_bifurcations.py [-o results]
 
-The surface (S18) of regular precessions in closed form (survey/scenes/brun.md), for both signs of k:
-stable and unstable sheets, the cusp curve where they meet, and the threads of upright rotations.
+The surface (S18) of regular precessions in closed form (survey/scenes/brun.md), for both signs of
+k: stable and unstable sheets, the cusp curve where they meet, and the threads of upright rotations.
 """
 
 import matplotlib.pyplot as plt
@@ -17,7 +18,13 @@ from survey.measures.nutation.regular_precessions import surface
 
 ALONG, ACROSS = 161, 31
 HIGHEST = {1: 1.6, -1: 5.5}  # l
-COLOURS = {"stable": "#7FBCE0", "unstable": "#D55E00", "cusp": "#000000", "upright": "#009E73", "thread": "#CC2288"}
+COLOURS = {
+    "stable": "#7FBCE0",
+    "unstable": "#D55E00",
+    "cusp": "#000000",
+    "upright": "#009E73",
+    "thread": "#CC2288",
+}
 
 
 def coordinates(y, z, s):
@@ -37,7 +44,9 @@ def cusps(u):
 
 
 def patch(s, furthest, inner, outer):
-    """Four meshes, the last one in front: |u| <= furthest, the greater of y^2, z^2 from inner(u) to outer(u)."""
+    """Four meshes, the last one in front: |u| <= furthest, the greater of y^2, z^2 from inner(u) to
+    outer(u).
+    """
     u = furthest * np.sin(np.linspace(-0.5 * np.pi, 0.5 * np.pi, ALONG))[:, None]
     low, high = inner(u), outer(u)
     great = np.sqrt(low + (high - low) * np.linspace(0.0, 1.0, ACROSS) ** 2)
@@ -57,7 +66,13 @@ def shaded(mesh, s, name):
 
 def draw_sheets(axes, s):
     """The stable sheet without its front, which would hide the others."""
-    style = {"linewidth": 0.0, "antialiased": False, "rcount": ALONG, "ccount": ACROSS, "shade": False}
+    style = {
+        "linewidth": 0.0,
+        "antialiased": False,
+        "rcount": ALONG,
+        "ccount": ACROSS,
+        "shade": False,
+    }
     start = cusps if s > 0 else abs
     for mesh in list(patch(s, 1.0, start, lambda u: greater(HIGHEST[s] + 3.0 * s * u**2, u)))[:3]:
         axes.plot_surface(*mesh, facecolors=shaded(mesh, s, "stable"), **style)
@@ -72,14 +87,18 @@ def draw_lines(axes, s):
         great = np.sqrt(cusps(u))
         for side in (1.0, -1.0):
             for y, z in ((great, -u / great), (-u / great, great)):
-                axes.plot(*coordinates(side * y, side * z, s), color=COLOURS["cusp"], lw=1.6, zorder=10)
+                axes.plot(
+                    *coordinates(side * y, side * z, s), color=COLOURS["cusp"], lw=1.6, zorder=10
+                )
     furthest = np.sqrt(HIGHEST[s] + s)
     p = np.linspace(-furthest, furthest, 401)
     for side in (1.0, -1.0):
         axes.plot(p, side * p, p * p - s, color=COLOURS["upright"], lw=1.8, zorder=11)
         if s < 0:
             slow = np.linspace(-2.0, 2.0, 201)
-            axes.plot(slow, side * slow, slow * slow - s, color=COLOURS["thread"], lw=1.8, zorder=12)
+            axes.plot(
+                slow, side * slow, slow * slow - s, color=COLOURS["thread"], lw=1.8, zorder=12
+            )
 
 
 def panel(figure, position, s, title):
@@ -97,7 +116,10 @@ def draw():
     figure = plt.figure(figsize=(9.6, 5.2))
     panel(figure, 1, 1, r"$k > 0$")
     panel(figure, 2, -1, r"$k < 0$")
-    figure.suptitle("Regular precessions of an axisymmetric body in a Newtonian field, the front cut away", fontsize=11)
+    figure.suptitle(
+        "Regular precessions of an axisymmetric body in a Newtonian field, the front cut away",
+        fontsize=11,
+    )
     handles = [
         Patch(color=COLOURS["stable"], label="stable: a well begins"),
         Patch(color=COLOURS["unstable"], label="unstable: separatrices"),

@@ -1,9 +1,10 @@
-"""Where textbook formulas and direct integration of Brun's problem lose their digits: error against distance.
+"""Where textbook formulas and direct integration of Brun's problem lose their digits: error against
+distance.
 
     python workflows/brun_digits.py [-o results]
 
-Needs scipy: pip install -e ".[test]". States near a separatrix, a pole and a regular precession, with 60-digit truths
-(survey/reference/brun_distances.json).
+Needs scipy: pip install -e ".[test]". States near a separatrix, a pole and a regular precession,
+with 60-digit truths (survey/reference/brun_distances.json).
 """
 
 import argparse
@@ -30,7 +31,9 @@ ANSWERED = 1e-17  # a chart in logarithms has no zero
 
 
 def polynomial(point):
-    """k, the numbers that conserve, and the turning points next to u0 by the eigenvalues of P's companion matrix."""
+    """k, the numbers that conserve, and the turning points next to u0 by the eigenvalues of P's
+    companion matrix.
+    """
     A, C, epsilon, theta, p, b, a = (
         point[name] for name in ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
     )
@@ -43,7 +46,9 @@ def polynomial(point):
 
 
 def textbook(point):
-    """The precession by (S6) in float64: roots of the quartic, 1 - u and 1 + u by subtraction, scipy's R_F and R_J."""
+    """The precession by (S6) in float64: roots of the quartic, 1 - u and 1 + u by subtraction,
+    scipy's R_F and R_J.
+    """
     A, k, level, a, b, low, high = polynomial(point)
     total = low + high
     rest = level - k + k * (total**2 - low * high)
@@ -54,11 +59,21 @@ def textbook(point):
     period = 4 * A * elliprf(0, x, y).real
     up = (
         period / (2 * (1 - low))
-        + 2 * A * (high - low) * far / (3 * (1 - low) ** 2) * elliprj(0, x, y, far * (1 - high) / (1 - low)).real
+        + 2
+        * A
+        * (high - low)
+        * far
+        / (3 * (1 - low) ** 2)
+        * elliprj(0, x, y, far * (1 - high) / (1 - low)).real
     )
     down = (
         period / (2 * (1 + high))
-        + 2 * A * (high - low) * near / (3 * (1 + high) ** 2) * elliprj(0, x, y, near * (1 + low) / (1 + high)).real
+        + 2
+        * A
+        * (high - low)
+        * near
+        / (3 * (1 + high) ** 2)
+        * elliprj(0, x, y, near * (1 + low) / (1 + high)).real
     )
     return ((b - a) * up + (b + a) * down) / A
 
@@ -80,11 +95,15 @@ def integrated(point):
     """The precession by DOP853 over one period, which it is given, to 1e-12."""
     if abs(point["p_psi"] - point["p_phi"]) < 5e-5:
         return np.nan  # comes to no end near the pole
-    return float(chart.outcome(integrator.integrate(chart.system(point, {}), 1e-12))[chart.ERROR][0])
+    return float(
+        chart.outcome(integrator.integrate(chart.system(point, {}), 1e-12))[chart.ERROR][0]
+    )
 
 
 def solved(point, method):
-    return float(survey.evaluate("brun", method=method, variables=["precession"], **point).precession)
+    return float(
+        survey.evaluate("brun", method=method, variables=["precession"], **point).precession
+    )
 
 
 WAYS = {
@@ -105,23 +124,38 @@ def errors(family):
         warnings.simplefilter("ignore")
         for way, precession in WAYS.items():
             exact = [float(values[chart.ERROR]) for _, _, values, _ in rows]
-            found[way] = np.array([abs(precession(row[1]) - value) for row, value in zip(rows, exact, strict=True)])
-    return np.array([row[0] for row in rows]), found, np.array([float(row[3][chart.ERROR]) for row in rows])
+            found[way] = np.array(
+                [abs(precession(row[1]) - value) for row, value in zip(rows, exact, strict=True)]
+            )
+    return (
+        np.array([row[0] for row in rows]),
+        found,
+        np.array([float(row[3][chart.ERROR]) for row in rows]),
+    )
 
 
 def draw(results, path):
     """One panel per family."""
-    figure, panels = plt.subplots(1, len(results), figsize=(4.8 * len(results), 4.8), sharey=True, layout="constrained")
+    figure, panels = plt.subplots(
+        1, len(results), figsize=(4.8 * len(results), 4.8), sharey=True, layout="constrained"
+    )
     for axes, (family, (distances, found, floors)) in zip(panels, results.items(), strict=True):
         for marker, (way, off) in zip("osD^vP", found.items(), strict=True):
             axes.loglog(
-                distances, np.maximum(off, ANSWERED), marker=marker, ms=4, lw=2.5 if way == "survey" else 1, label=way
+                distances,
+                np.maximum(off, ANSWERED),
+                marker=marker,
+                ms=4,
+                lw=2.5 if way == "survey" else 1,
+                label=way,
             )
         axes.loglog(distances, floors, "k--", lw=1, label="what half-ulp changes of the inputs do")
         axes.set(title=family, xlabel=FAMILIES[family])
         axes.grid(alpha=0.3)
     panels[0].set_ylabel("error of the precession per period (rad)")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
+    figure.legend(
+        *panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8
+    )
     figure.savefig(path, dpi=150)
     plt.close(figure)
 
@@ -133,7 +167,12 @@ def table(results):
     for family, (distances, found, floors) in results.items():
         shown = [int(np.argmin(abs(np.log(distances / at)))) for at in (1e-2, 1e-4, 1e-8, 1e-12)]
         head = " | ".join(f"{distances[i]:.0e}" for i in shown)
-        lines += [f"## {family}: {FAMILIES[family]}", "", f"| | {head} |", "|---" * (len(shown) + 1) + "|"]
+        lines += [
+            f"## {family}: {FAMILIES[family]}",
+            "",
+            f"| | {head} |",
+            "|---" * (len(shown) + 1) + "|",
+        ]
         for way, off in (found | {"half-ulp changes of the inputs": floors}).items():
             cells = (f"{off[i]:.0e}" if np.isfinite(off[i]) else "-" for i in shown)
             lines.append(f"| {way} | " + " | ".join(cells) + " |")

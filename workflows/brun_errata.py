@@ -1,10 +1,12 @@
-"""The printed formulas of the paper on quadratures of Kobb's type, each tested: a page for a reader of the paper.
+"""The printed formulas of the paper on quadratures of Kobb's type, each tested: a page for a reader
+of the paper.
 
     python workflows/brun_errata.py [-o results]
 
-Needs mpmath: pip install -e ".[test]". Residuals to 40 digits at random bodies and states: the Hamiltonian is held
-against the kinetic energy of the turning rotation matrix, integrals by their Poisson brackets, quadratures by their
-derivatives along the motion. The corrections are derived in survey/scenes/brun.md.
+Needs mpmath: pip install -e ".[test]". Residuals to 40 digits at random bodies and states: the
+Hamiltonian is held against the kinetic energy of the turning rotation matrix, integrals by their
+Poisson brackets, quadratures by their derivatives along the motion. The corrections are derived in
+survey/scenes/brun.md.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
@@ -32,7 +34,10 @@ class Motion:
         here = self.theta, self.phi, self.psi
 
         def entry(i, j):
-            return diff(lambda t: self.turned(*(x + t * v for x, v in zip(here, rates, strict=True)))[i, j], 0)
+            return diff(
+                lambda t: self.turned(*(x + t * v for x, v in zip(here, rates, strict=True)))[i, j],
+                0,
+            )
 
         change = self.turned(*here).T * matrix([[entry(i, j) for j in range(3)] for i in range(3)])
         return change[2, 1], change[0, 2], change[1, 0]
@@ -86,7 +91,9 @@ def clebsch(m, state, sign=-1, field=1):
     """F2 of (7)."""
     theta, phi, _psi, *momenta = state
     first, second = brackets(theta, phi, momenta, sign)
-    across = (m.B * m.C * sin(phi) ** 2 + m.A * m.C * cos(phi) ** 2) * sin(theta) ** 2 + m.A * m.B * cos(theta) ** 2
+    across = (m.B * m.C * sin(phi) ** 2 + m.A * m.C * cos(phi) ** 2) * sin(
+        theta
+    ) ** 2 + m.A * m.B * cos(theta) ** 2
     return first**2 + second**2 + momenta[1] ** 2 - field * m.eps * across
 
 
@@ -112,7 +119,9 @@ def quartic(m, u, alphas, p_phi=None, doubled=1):
 
 
 class Instant:
-    """What (9)-(11) need of a motion with p_theta > 0, p_phi > 0: alphas with alpha1 = 2h, u, sqrt P, a1, rates."""
+    """What (9)-(11) need of a motion with p_theta > 0, p_phi > 0: alphas with alpha1 = 2h, u, sqrt
+    P, a1, rates.
+    """
 
     def __init__(self, dice, positive=True):
         while True:
@@ -131,12 +140,15 @@ class Instant:
     def w_rate(self):
         """d/dt of dW/d alpha1 along the motion, W of (9) with p_theta > 0."""
         rest = self.alphas[1:]
-        p_theta = diff(lambda x: sqrt(quartic(self.m, self.u, [x, *rest])), self.alphas[0]) / sin(self.m.theta)
+        p_theta = diff(lambda x: sqrt(quartic(self.m, self.u, [x, *rest])), self.alphas[0]) / sin(
+            self.m.theta
+        )
         p_phi = diff(lambda x: sqrt(radicand(self.m, x, rest[0])), self.alphas[0])
         return p_theta * self.d_theta + p_phi * self.d_phi
 
 
-# the printed formulas that need correction: each function gives (residual as printed, residual corrected)
+# the printed formulas that need correction: each function gives (residual as printed, residual
+# corrected)
 
 
 def dots(dice):
@@ -145,7 +157,10 @@ def dots(dice):
     true = m.spin(m.rates)
 
     def residual(x):
-        p, q = x * sin(theta) * sin(phi) + d_theta * cos(phi), x * sin(theta) * cos(phi) - d_theta * sin(phi)
+        p, q = (
+            x * sin(theta) * sin(phi) + d_theta * cos(phi),
+            x * sin(theta) * cos(phi) - d_theta * sin(phi),
+        )
         return max(abs(a - b) for a, b in zip((p, q, x * cos(theta) + d_phi), true, strict=True))
 
     return residual(psi), residual(d_psi)
@@ -164,26 +179,36 @@ def sign_in_h(dice):
 def sign_in_f2(dice):
     m = Motion(dice, ratios=(2, 1.5))
     return tuple(
-        abs(bracket(lambda s: hamiltonian(m, s), lambda s, sign=sign: clebsch(m, s, sign), m.state()))
+        abs(
+            bracket(
+                lambda s: hamiltonian(m, s), lambda s, sign=sign: clebsch(m, s, sign), m.state()
+            )
+        )
         for sign in (1, -1)
     )
 
 
 def first_constant(dice):
     at = Instant(dice)
-    return tuple(abs(radicand(at.m, alpha1, at.alphas[1]) - at.p_phi**2) for alpha1 in (at.h, 2 * at.h))
+    return tuple(
+        abs(radicand(at.m, alpha1, at.alphas[1]) - at.p_phi**2) for alpha1 in (at.h, 2 * at.h)
+    )
 
 
 def negative_spin(dice):
     at = Instant(dice, positive=False)
     square = at.root**2
-    return abs(quartic(at.m, at.u, at.alphas) - square), abs(quartic(at.m, at.u, at.alphas, at.p_phi) - square)
+    return abs(quartic(at.m, at.u, at.alphas) - square), abs(
+        quartic(at.m, at.u, at.alphas, at.p_phi) - square
+    )
 
 
 def coefficients(dice):
     at = Instant(dice)
     square, halved = at.root**2, [at.h, *at.alphas[1:]]
-    return abs(quartic(at.m, at.u, halved, at.p_phi) - square), abs(quartic(at.m, at.u, halved, at.p_phi, 2) - square)
+    return abs(quartic(at.m, at.u, halved, at.p_phi) - square), abs(
+        quartic(at.m, at.u, halved, at.p_phi, 2) - square
+    )
 
 
 def time_of_w(dice):
@@ -288,7 +313,11 @@ def any_ratio(dice):
     p_theta, a, b = m.momenta()
     u, k = cos(m.theta), m.eps * m.A * (m.A - m.C)
     level = 2 * m.A * m.energy() - m.A / m.C * a * a - m.eps * m.A**2 + a * a
-    return abs((1 - u * u) * (level + k * u * u) - (a * a + b * b - 2 * a * b * u) - (sin(m.theta) * p_theta) ** 2)
+    return abs(
+        (1 - u * u) * (level + k * u * u)
+        - (a * a + b * b - 2 * a * b * u)
+        - (sin(m.theta) * p_theta) ** 2
+    )
 
 
 def combined(dice):

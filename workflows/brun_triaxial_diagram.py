@@ -1,4 +1,5 @@
-"""The bifurcation diagram of Clebsch's case: energy H against F2 at one value of F3, with random motions.
+"""The bifurcation diagram of Clebsch's case: energy H against F2 at one value of F3, with random
+motions.
 
 python workflows/brun_triaxial_diagram.py -o results
 """
@@ -26,7 +27,9 @@ def curves():
         *(end + side * np.geomspace(1e-9, 0.1, 2000) for end in ends for side in (-1.0, 1.0)),
     ]))  # fmt: skip
     for sense in ("1", "-1"):
-        ds = survey.evaluate("brun_triaxial", question="critical", **BODY, p_psi=AREA, sense=sense, sigma=sigma)
+        ds = survey.evaluate(
+            "brun_triaxial", question="critical", **BODY, p_psi=AREA, sense=sense, sigma=sigma
+        )
         yield ds.H.values, ds.F2.values, np.where(ds.status == 0, ds.verdict.values, -1)
 
 
@@ -59,12 +62,23 @@ def draw():
             on = verdict == code
             # a verdict changes between two points: the curve runs on to the next
             on |= np.roll(on, 1) & (verdict >= 0)
-            axes.plot(np.where(on, energy, np.nan), np.where(on, second, np.nan), color=color, zorder=2 - code)
+            axes.plot(
+                np.where(on, energy, np.nan),
+                np.where(on, second, np.nan),
+                color=color,
+                zorder=2 - code,
+            )
     for words, color in NAMES.values():
         axes.plot([], [], color=color, label=f"critical motions, {words}")
     for energy, second, axis, verdict in rotations():
         axes.plot(energy, second, "o", color=NAMES[verdict][1], markeredgecolor="black", zorder=4)
-        axes.annotate(f"rotation about {axis}", (energy, second), (6, -12), textcoords="offset points", fontsize=8)
+        axes.annotate(
+            f"rotation about {axis}",
+            (energy, second),
+            (6, -12),
+            textcoords="offset points",
+            fontsize=8,
+        )
     axes.set(xlim=(0.65, 2.6), ylim=(-3.1, 3.4), xlabel="$H$", ylabel="$F_2$",
              title=rf"Clebsch's case, A : B : C = {BODY['A']:g} : {BODY['B']:g} : {BODY['C']:g}, "
              rf"$\varepsilon$ = {BODY['epsilon']:g}, $F_3$ = {AREA:g}")  # fmt: skip

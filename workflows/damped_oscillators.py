@@ -1,4 +1,5 @@
-r"""Two coupled oscillators whose stiffness is modulated, with damping: thresholds of parametric resonance.
+r"""Two coupled oscillators whose stiffness is modulated, with damping: thresholds of parametric
+resonance.
 
 $$\ddot x + 2 c \dot x + (\omega_1^2 + \epsilon \cos\Omega t)\, x + \epsilon\, y \cos\Omega t = 0, \qquad
 \ddot y + 2 c \dot y + (\omega_2^2 + \epsilon \cos\Omega t)\, y + \epsilon\, x \cos\Omega t = 0,$$

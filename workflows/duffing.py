@@ -2,9 +2,10 @@ r"""Duffing's oscillator with a hardening spring and a force: periodic orbits, r
 
 $$\ddot x + 2 \zeta \dot x + x + x^3 = F \cos\omega t.$$
 
-Above $\omega = 1$ the response has up to three periodic orbits, two of them stable: the resonance curve is bent over.
-With one harmonic, $x = A \cos(\omega t - \varphi)$, $A^2 ((1 - \omega^2 + 3A^2/4)^2 + 4\zeta^2\omega^2) = F^2$, and
-the folds are where $d\omega/dA = 0$. Orbits are followed along $\omega$; branch 1 is the smallest.
+Above $\omega = 1$ the response has up to three periodic orbits, two of them stable: the resonance
+curve is bent over. With one harmonic, $x = A \cos(\omega t - \varphi)$, $A^2 ((1 - \omega^2 +
+3A^2/4)^2 + 4\zeta^2\omega^2) = F^2$, and the folds are where $d\omega/dA = 0$. Orbits are followed
+along $\omega$; branch 1 is the smallest.
 """
 
 from math import cos, pi

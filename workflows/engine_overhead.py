@@ -1,6 +1,8 @@
-"""Overhead of the engine: a map of ten million points against its kernels and netCDF4 alone, and the time to start.
+"""Overhead of the engine: a map of ten million points against its kernels and netCDF4 alone, and
+the time to start.
 
-python workflows/engine_overhead.py [-o results] [--variables discriminant,verdict] [--points 2500x4000]
+python workflows/engine_overhead.py [-o results] [--variables discriminant,verdict] [--points
+2500x4000]
 """
 
 import argparse
@@ -45,7 +47,9 @@ main(sys.argv[1:])
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", metavar="DIR", type=Path, default=Path("results"))
     parser.add_argument("--variables", default="discriminant,verdict")
     parser.add_argument("--points", default="2500x4000", metavar="KxRHO")
@@ -63,9 +67,19 @@ def measure(given, folder):
     points_alone, target = folder / "points.toml", folder / "map.nc"
     points_alone.write_text(WORKFLOW.read_text(encoding="utf-8").partition("[boundaries]")[0])
     k, rho = given.points.split("x")
-    overrides = [f"axes.k.num={k}", f"axes.rho.num={rho}", f"output.variables={given.variables.split(',')}"]
+    overrides = [
+        f"axes.k.num={k}",
+        f"axes.rho.num={rho}",
+        f"output.variables={given.variables.split(',')}",
+    ]
     overrides.append("output.figures=[]")
-    command = ["run", str(points_alone), "-o", str(target), *(word for text in overrides for word in ("--set", text))]
+    command = [
+        "run",
+        str(points_alone),
+        "-o",
+        str(target),
+        *(word for text in overrides for word in ("--set", text)),
+    ]
     small = [*command, "--set", "axes.k.num=40", "--set", "axes.rho.num=400", "--quiet"]
     checked = workflow.read(points_alone, overrides, target)
     cold, warm = starts(small)
@@ -73,7 +87,9 @@ def measure(given, folder):
     arrays, packing = read(target)
     runs = {
         "kernels": [kernels(checked) for _ in range(REPEATS)],
-        "netCDF4": [netcdf4_alone(arrays, packing, target.with_name("alone.nc")) for _ in range(REPEATS)],
+        "netCDF4": [
+            netcdf4_alone(arrays, packing, target.with_name("alone.nc")) for _ in range(REPEATS)
+        ],
         "command": [seconds for seconds, _, _ in measured],
         "since": [seconds - begin for seconds, begin, _ in measured],
     }
@@ -136,7 +152,9 @@ def first_block(command, cache):
 def run(command):
     """(seconds of the command, how many of them before it read its workflow, peak MiB)."""
     begin = time.time()
-    process = subprocess.Popen([sys.executable, "-c", READING, *command, "--quiet"], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-c", READING, *command, "--quiet"], stdout=subprocess.PIPE, text=True
+    )
     reading = float(process.stdout.readline())
     _, status, usage = os.wait4(process.pid, 0)
     seconds = time.time() - begin
@@ -168,7 +186,9 @@ def read(path):
         for name, variable in file.variables.items():
             if variable.dimensions == file["status"].dimensions:
                 filters = variable.filters()
-                packing[name] = {key: filters[key] for key in ("zlib", "shuffle", "complevel", "fletcher32")}
+                packing[name] = {
+                    key: filters[key] for key in ("zlib", "shuffle", "complevel", "fletcher32")
+                }
                 packing[name]["chunksizes"] = variable.chunking()
                 arrays[name] = variable[:]
     return arrays, packing

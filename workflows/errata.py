@@ -1,4 +1,6 @@
-"""What the pages of errata share: residuals of formulas at random parameters with many digits, and the page."""
+"""What the pages of errata share: residuals of formulas at random parameters with many digits, and
+the page.
+"""
 
 import random
 
@@ -56,14 +58,22 @@ def short(value):
 
 
 def write(doc, name, page, tables):
-    """Write NAME.md: `page` with tables: errata (place, printed, correct, test), right, gaps (place, words, test)."""
+    """Write NAME.md: `page` with tables: errata (place, printed, correct, test), right, gaps
+    (place, words, test).
+    """
     folder = parser(doc, "the page").parse_args().output
     say("comparing printed and corrected formulas")
     rows = [(place, a, b, *erratum(test)) for place, a, b, test in tables["errata"]]
-    filled = {"errata": "\n".join(f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in rows)}
+    filled = {
+        "errata": "\n".join(
+            f"| {place} | {a} | {b} | {x:.1g} | {short(y)} |" for place, a, b, x, y in rows
+        )
+    }
     say("checking the remaining formulas")
     for key in ("right", "gaps"):
-        filled[key] = "\n".join(f"| {place} | {what} | {short(residual(test))} |" for place, what, test in tables[key])
+        filled[key] = "\n".join(
+            f"| {place} | {what} | {short(residual(test))} |" for place, what, test in tables[key]
+        )
     path = folder / f"{name}.md"
     path.write_text(page.format(digits=DIGITS, trials=TRIALS, **filled), encoding="utf-8")
     print(path)

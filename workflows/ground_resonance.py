@@ -1,7 +1,9 @@
-r"""Ground resonance of a helicopter: a rotor of four blades, hinged in lag, on a hub that can move in its plane.
+r"""Ground resonance of a helicopter: a rotor of four blades, hinged in lag, on a hub that can move
+in its plane.
 
-The hub moves by x, y, blade k lags by $\zeta_k$ at the azimuth $\psi_k = \Omega t + k \pi / 2$; S and J are the first
-and second moment of a blade's mass about its hinge, at the distance e from the centre:
+The hub moves by x, y, blade k lags by $\zeta_k$ at the azimuth $\psi_k = \Omega t + k \pi / 2$; S
+and J are the first and second moment of a blade's mass about its hinge, at the distance e from the
+centre:
 
 $$J \ddot\zeta_k + c_k \dot\zeta_k + e S \Omega^2 \zeta_k + S (\ddot y \cos\psi_k - \ddot x \sin\psi_k) = 0,$$
 $$m_x \ddot x + c_x \dot x + k_x x
@@ -9,8 +11,9 @@ $$m_x \ddot x + c_x \dot x + k_x x
 $$m_y \ddot y + c_y \dot y + k_y y
 + S \sum (\ddot\zeta_k - \Omega^2 \zeta_k) \cos\psi_k - 2 \Omega \dot\zeta_k \sin\psi_k = 0.$$
 
-The period is that of a turn. With equal dampers Coleman's coordinates make the coefficients constant; with one damper
-out (`lost` = 1) nothing does: twelve states, periodic. Numbers are those of Hammond's rotor, in SI units.
+The period is that of a turn. With equal dampers Coleman's coordinates make the coefficients
+constant; with one damper out (`lost` = 1) nothing does: twelve states, periodic. Numbers are those
+of Hammond's rotor, in SI units.
 """
 
 from math import cos, pi, sin
@@ -25,7 +28,9 @@ REFERENCES = (
 PARAMETERS = (
     Parameter("omega", "rotor speed", r"\Omega", units="rad s-1", minimum=0.0, open_minimum=True),
     Parameter("damping", "damping of a blade's lag", "c_k", units="N m s", minimum=0.0),
-    Parameter("lost", "share of its damping that one blade has lost", r"\ell", minimum=0.0, maximum=1.0),
+    Parameter(
+        "lost", "share of its damping that one blade has lost", r"\ell", minimum=0.0, maximum=1.0
+    ),
 )
 STATES = ("x", "y", "zeta1", "zeta2", "zeta3", "zeta4")
 BLADES = 4

@@ -1,8 +1,10 @@
-"""How a deviation from the gyrostat's rotation about axis 1 grows: why, and where, the reduced scene suffices.
+"""How a deviation from the gyrostat's rotation about axis 1 grows: why, and where, the reduced
+scene suffices.
 
     python workflows/gyrostat_deviation.py [-o results]
 
-The six equations (1)-(6) are solved in a rotated body frame, where no component is zero, and read in the scene's axes.
+The six equations (1)-(6) are solved in a rotated body frame, where no component is zero, and read
+in the scene's axes.
 """
 
 # ruff: noqa: E501  (the page's lines)
@@ -37,7 +39,9 @@ Q = gyrostat.FRAME
 
 
 def body(free=None):
-    """(G, initial state) of a full gyrostat that holds the reduced flow; by default as the method `full` builds it."""
+    """(G, initial state) of a full gyrostat that holds the reduced flow; by default as the method
+    `full` builds it.
+    """
     p, G, state = coefficients(*SIX.values()), np.empty((14, 3)), np.empty(6)
     values = np.empty(8) if free is None else np.array(free, float)
     if free is None:
@@ -58,7 +62,9 @@ def broken(free, condition, size):
         G[row] += size * Q[:, where[0]]
         return G, state
     i, j = where
-    G[row : row + 3] += size * (np.outer(Q[:, i], Q[:, j]) + (np.outer(Q[:, j], Q[:, i]) if i != j else 0))
+    G[row : row + 3] += size * (
+        np.outer(Q[:, i], Q[:, j]) + (np.outer(Q[:, j], Q[:, i]) if i != j else 0)
+    )
     gyrostat.invert(G)
     return G, state
 
@@ -79,14 +85,18 @@ def deviation(states):
 
 def off_reduced(states, times=TIMES):
     """Largest difference of (w, nu) from the scene's at each time."""
-    ds = survey.evaluate("gyrostat", question="trajectory", method="taylor", rtol=1e-13, t=times, **SIX, **START)
+    ds = survey.evaluate(
+        "gyrostat", question="trajectory", method="taylor", rtol=1e-13, t=times, **SIX, **START
+    )
     zero = np.zeros(times.size)
     true = np.stack([ds.w, zero, zero, zero, np.sin(ds.phi), np.cos(ds.phi)], axis=1)
     return np.abs(states - true).max(axis=1)
 
 
 def growth(tangent):
-    """Largest singular value of the map of (w2, w3, nu1) at each time: how much a deviation has grown at most."""
+    """Largest singular value of the map of (w2, w3, nu1) at each time: how much a deviation has
+    grown at most.
+    """
     return np.linalg.norm(tangent[:, 1:4, 1:4], ord=2, axis=(1, 2))
 
 
@@ -134,11 +144,17 @@ def main():
     folder = parser(__doc__, "the page and its picture").parse_args().output
     say("growth of deviations")
     runs = {name: motion(*body(free)) for name, free in BODIES.items()}
-    kept = {name: (off_reduced(states), growth(tangent)) for name, (states, tangent) in runs.items()}
+    kept = {
+        name: (off_reduced(states), growth(tangent)) for name, (states, tangent) in runs.items()
+    }
     say("conditions broken one by one")
     first = next(iter(BODIES.values()))
     names = [*CONDITIONS, *START_CONDITIONS]
-    off = {(name, size): deviation(motion(*broken(first, name, size))[0]) for name in names for size in (0.1, 1e-6)}
+    off = {
+        (name, size): deviation(motion(*broken(first, name, size))[0])
+        for name in names
+        for size in (0.1, 1e-6)
+    }
     one, twenty = TIMES <= 1.0, TIMES <= REDUCED
     page = PAGE.format(
         six=", ".join(f"{key} = {value:g}" for key, value in SIX.items()),
@@ -149,7 +165,11 @@ def main():
         ),
         conditions="\n".join(
             f"| {name} | "
-            + " | ".join(f"{off[name, size][part].max():.1e}" for size in (0.1, 1e-6) for part in (one, twenty))
+            + " | ".join(
+                f"{off[name, size][part].max():.1e}"
+                for size in (0.1, 1e-6)
+                for part in (one, twenty)
+            )
             + " |"
             for name in names
         ),
@@ -169,7 +189,9 @@ def moved(free):
 
 
 def draw(kept, off, path):
-    """Left: growth of deviations and what rounding becomes; right: |w2|, |w3|, |nu1| with one condition broken."""
+    """Left: growth of deviations and what rounding becomes; right: |w2|, |w3|, |nu1| with one
+    condition broken.
+    """
     figure, (left, right) = plt.subplots(1, 2, figsize=(11.5, 5.4), layout="constrained")
     dark = [COLOURS[i] for i in (0, 6, 4, 5)]
     for (name, (distance, grown)), colour in zip(kept.items(), dark, strict=True):
@@ -186,7 +208,9 @@ def draw(kept, off, path):
     for i, (name, values) in enumerate(off.items()):
         style = "-" if name in CONDITIONS else "--"
         # largest so far: the motions oscillate
-        right.semilogy(TIMES[1:], np.maximum.accumulate(values)[1:], style, lw=1.1, color=shades(i), label=name)
+        right.semilogy(
+            TIMES[1:], np.maximum.accumulate(values)[1:], style, lw=1.1, color=shades(i), label=name
+        )
     right.set(xlabel="time, $t$", title="one condition broken by $10^{-6}$, axis 1 of largest inertia:\n"
               "largest of $|w_2|, |w_3|, |\\nu_1|$ so far")  # fmt: skip
     right.legend(fontsize=8, frameon=False, ncols=2)

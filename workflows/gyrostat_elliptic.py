@@ -1,4 +1,5 @@
-"""Formulas of the gyrostat paper for b = 0, (62)-(68), as printed and corrected: residuals for `gyrostat_errata.py`.
+"""Formulas of the gyrostat paper for b = 0, (62)-(68), as printed and corrected: residuals for
+`gyrostat_errata.py`.
 
 The derivatives of u = tan(phi/2) are checked against u'^2 = P4(u) / 4, those of w against (57).
 """
@@ -11,7 +12,14 @@ def abel(six, w, slope, phi):
     """w w_phi - f w - g of (57), everything over A11; zero for a solution."""
     b12, b31, d, c23, s2, s3 = six
     f = b12 * cos(phi) - b31 * sin(phi)
-    return w * slope - f * w + d * cos(phi) * sin(phi) + c23 * cos(2 * phi) - s2 * cos(phi) + s3 * sin(phi)
+    return (
+        w * slope
+        - f * w
+        + d * cos(phi) * sin(phi)
+        + c23 * cos(2 * phi)
+        - s2 * cos(phi)
+        + s3 * sin(phi)
+    )
 
 
 def energy(dice):
@@ -81,12 +89,24 @@ def elementary(variant, a, u1, u0, factors=(4, 6), e=1, third=sin):
     head, q = 2 * c + b * z0, a[0] * z0**2 + b * z0 + c
     if variant == 1:
         return lambda t: (
-            u1 + 2 * c * z0 / (head * cosh(sqrt(c) * t / 2) - 2 * e * sqrt(c * q) * sinh(sqrt(c) * t / 2) - b * z0)
+            u1
+            + 2
+            * c
+            * z0
+            / (head * cosh(sqrt(c) * t / 2) - 2 * e * sqrt(c * q) * sinh(sqrt(c) * t / 2) - b * z0)
         )
     if variant == 2:
-        return lambda t: u1 + 2 * c * z0 / (head * exp(-e * mp.sign(head) * sqrt(c) * t / 2) - b * z0)
+        return lambda t: (
+            u1 + 2 * c * z0 / (head * exp(-e * mp.sign(head) * sqrt(c) * t / 2) - b * z0)
+        )
     root = sqrt(-c)
-    return lambda t: u1 + 2 * c * z0 / (head * cos(root * t / 2) + 2 * e * sqrt(-c * q) * third(root * t / 2) - b * z0)
+    return lambda t: (
+        u1
+        + 2
+        * c
+        * z0
+        / (head * cos(root * t / 2) + 2 * e * sqrt(-c * q) * third(root * t / 2) - b * z0)
+    )
 
 
 def motion(a, u1, u, t):
@@ -99,7 +119,9 @@ def variant_of(variant, *cases):
 
     def test(dice):
         a, u1, u0 = multiple(dice, variant)
-        return tuple(motion(a, u1, elementary(variant, a, u1, u0, **case), mpf("0.2")) for case in cases)
+        return tuple(
+            motion(a, u1, elementary(variant, a, u1, u0, **case), mpf("0.2")) for case in cases
+        )
 
     return test
 
@@ -167,7 +189,11 @@ def coefficients(d, c23, s2, s3, n):
 def invariants(a):
     """(67)."""
     return a[0] * a[4] - 4 * a[1] * a[3] + 3 * a[2] ** 2, (
-        a[0] * a[2] * a[4] + 2 * a[1] * a[2] * a[3] - a[2] ** 3 - a[4] * a[1] ** 2 - a[0] * a[3] ** 2
+        a[0] * a[2] * a[4]
+        + 2 * a[1] * a[2] * a[3]
+        - a[2] ** 3
+        - a[4] * a[1] ** 2
+        - a[0] * a[3] ** 2
     )
 
 
@@ -208,12 +234,24 @@ def expanded(dice):
     a = coefficients(*values)
     g2, g3 = invariants(a)
     long = (
-        8 * n**3 - 18 * n * (d * d + 4 * c23**2 + 2 * (s2**2 + s3**2)) - 54 * d * (s2**2 - s3**2) - 216 * c23 * s2 * s3
+        8 * n**3
+        - 18 * n * (d * d + 4 * c23**2 + 2 * (s2**2 + s3**2))
+        - 54 * d * (s2**2 - s3**2)
+        - 216 * c23 * s2 * s3
     )
     G = (4 * n * n + 3 * d * d + 12 * (c23**2 - s2**2 - s3**2)) ** 3 - long**2
     whole = [a[0], 4 * a[1], 6 * a[2], 4 * a[3], a[4]]
     slope = [4 * a[0], 12 * a[1], 12 * a[2], 4 * a[3]]
-    rows = [[0] * i + whole + [0] * (2 - i) for i in range(3)] + [[0] * i + slope + [0] * (3 - i) for i in range(4)]
+    rows = [[0] * i + whole + [0] * (2 - i) for i in range(3)] + [
+        [0] * i + slope + [0] * (3 - i) for i in range(4)
+    ]
     discriminant = mp.det(matrix(rows)) / a[0]  # Sylvester's resultant of P4 and its derivative
     short = d * d + 4 * n * n / 3 + 4 * (c23**2 - s2**2 - s3**2)
-    return worst([short - g2, long / 27 - g3, G / 27 - (g2**3 - 27 * g3**2), discriminant / 256 - (g2**3 - 27 * g3**2)])
+    return worst(
+        [
+            short - g2,
+            long / 27 - g3,
+            G / 27 - (g2**3 - 27 * g3**2),
+            discriminant / 256 - (g2**3 - 27 * g3**2),
+        ]
+    )

@@ -2,9 +2,9 @@
 
     python workflows/gyrostat_errata.py [-o results]
 
-Needs mpmath: pip install -e ".[test]". Residuals to 40 digits at random parameters: motions are checked against the
-six equations (1)-(6), the formulas of the elliptic case against u'^2 = P4(u) / 4. The corrections are derived in
-survey/scenes/gyrostat.md.
+Needs mpmath: pip install -e ".[test]". Residuals to 40 digits at random parameters: motions are
+checked against the six equations (1)-(6), the formulas of the elliptic case against u'^2 = P4(u) /
+4. The corrections are derived in survey/scenes/gyrostat.md.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
@@ -35,7 +35,12 @@ class Body:
         """A w' by the vector form (A w + lambda) x w + (B w) x nu + nu x (C nu) + s x nu."""
         A, B, C = (self.tensor(m) for m in "ABC")
         momentum = A * w + matrix([self.l1, self.l2, self.l3])
-        parts = cross(momentum, w), cross(B * w, nu), cross(nu, C * nu), cross(matrix([self.s1, self.s2, self.s3]), nu)
+        parts = (
+            cross(momentum, w),
+            cross(B * w, nu),
+            cross(nu, C * nu),
+            cross(matrix([self.s1, self.s2, self.s3]), nu),
+        )
         return parts[0] + parts[1] + parts[2] + parts[3]
 
     def reduced(self):
@@ -58,7 +63,8 @@ def about_first(body, theta, phi, w):
     return body.moment(matrix([w, 0, 0]), vertical(theta, phi))
 
 
-# the printed formulas that need correction: each function gives (residual as printed, residual corrected)
+# the printed formulas that need correction: each function gives (residual as printed, residual
+# corrected)
 
 
 def harmonics(dice):
@@ -101,7 +107,9 @@ def first_integral(dice):
     b, theta, phi, w = case_a(dice)
     true = about_first(b, theta, phi, w)[0]
     printed = diff(lambda x: (b.B12 * cos(x) - b.B31 * sin(x)) * sin(theta), phi) * w
-    return abs(printed - true), abs(diff(lambda x: (b.B12 * sin(x) + b.B31 * cos(x)) * sin(theta), phi) * w - true)
+    return abs(printed - true), abs(
+        diff(lambda x: (b.B12 * sin(x) + b.B31 * cos(x)) * sin(theta), phi) * w - true
+    )
 
 
 def areas(dice):
@@ -146,7 +154,9 @@ def trigonometric(dice, sign=-1, constant=lambda mu, b, n: n, root=lambda b: Non
 
 def root_of(inertia, sign):
     """mu by sqrt(1/4 - inertia C23 / (B12 B31))."""
-    return lambda b: mpf("0.5") + sign * sqrt(mpf("0.25") - getattr(b, inertia) * b.C23 / (b.B12 * b.B31))
+    return lambda b: (
+        mpf("0.5") + sign * sqrt(mpf("0.25") - getattr(b, inertia) * b.C23 / (b.B12 * b.B31))
+    )
 
 
 def with_root(*root):
@@ -220,14 +230,36 @@ def rotation(dice):
     p2, p3 = b.C12 * v1 + b.C22 * v2 + b.C23 * v3, b.C31 * v1 + b.C23 * v2 + b.C33 * v3
     p1 = b.C11 * v1 + b.C12 * v2 + b.C31 * v3
     first = (b.B12 * v3 - b.B31 * v2) * w - p2 * v3 + p3 * v2 + b.s2 * v3 - b.s3 * v2
-    second = b.A31 * w * w + (b.B31 * v1 - b.B11 * v3) * w + b.l3 * w - p3 * v1 + p1 * v3 + b.s3 * v1 - b.s1 * v3
-    third = -b.A12 * w * w + (b.B11 * v2 - b.B12 * v1) * w - b.l2 * w - p1 * v2 + p2 * v1 + b.s1 * v2 - b.s2 * v1
+    second = (
+        b.A31 * w * w
+        + (b.B31 * v1 - b.B11 * v3) * w
+        + b.l3 * w
+        - p3 * v1
+        + p1 * v3
+        + b.s3 * v1
+        - b.s1 * v3
+    )
+    third = (
+        -b.A12 * w * w
+        + (b.B11 * v2 - b.B12 * v1) * w
+        - b.l2 * w
+        - p1 * v2
+        + p2 * v1
+        + b.s1 * v2
+        - b.s2 * v1
+    )
     true = about_first(b, theta, phi, w)
     rest = (b.B31 * v2 - b.B12 * v3) * w + p2 * v3 - p3 * v2 - b.s2 * v3 + b.s3 * v2
     eliminated = b.A11 * second + b.A12 * rest, b.A11 * third + b.A31 * rest
     wanted = b.A11 * true[1] - b.A12 * true[0], b.A11 * true[2] - b.A31 * true[0]
     return worst(
-        [first - true[0], second - true[1], third - true[2], eliminated[0] - wanted[0], eliminated[1] - wanted[1]]
+        [
+            first - true[0],
+            second - true[1],
+            third - true[2],
+            eliminated[0] - wanted[0],
+            eliminated[1] - wanted[1],
+        ]
     )
 
 
@@ -244,7 +276,9 @@ def second_equation(dice):
 
 
 def conditions(dice):
-    """(26)-(34), (36): harmonics 1, cos, sin, cos 2phi, sin 2phi of the second and third equations, at w^0 and w^1."""
+    """(26)-(34), (36): harmonics 1, cos, sin, cos 2phi, sin 2phi of the second and third equations,
+    at w^0 and w^1.
+    """
     b, theta = Body(dice, A12=0, A31=0), number(dice)
     c, s = cos(theta), sin(theta)
     nodes = [2 * pi * k / 8 for k in range(8)]
@@ -281,7 +315,9 @@ def set_a(dice):
     """(44)-(48): the second and third equations hold, and the first is that before (49)."""
     b, theta, phi, w = case_a(dice)
     true = about_first(b, theta, phi, w)
-    return worst([true[1], true[2], true[0] - w * (b.B12 * cos(phi) - b.B31 * sin(phi)) * sin(theta)])
+    return worst(
+        [true[1], true[2], true[0] - w * (b.B12 * cos(phi) - b.B31 * sin(phi)) * sin(theta)]
+    )
 
 
 def quadrature(P, Q, n, A, u0=0):
@@ -292,7 +328,11 @@ def quadrature(P, Q, n, A, u0=0):
     def u(t):
         if square == 0:
             return (2 * A * u0 + (n + Q + P * u0) * t) / (2 * A - (P + (n - Q) * u0) * t)
-        T = tan(root * t / (2 * A)) if square > 0 else sinh(root * t / (2 * A)) / cosh(root * t / (2 * A))
+        T = (
+            tan(root * t / (2 * A))
+            if square > 0
+            else sinh(root * t / (2 * A)) / cosh(root * t / (2 * A))
+        )
         return (u0 * root + (n + Q + P * u0) * T) / (root - (P + (n - Q) * u0) * T)
 
     return u
@@ -305,7 +345,9 @@ def printed_quadrature(P, Q, n, A):
         return lambda t: (n + Q) * tan(m * t) / (2 * A * m - P * tan(m * t))
     if square < 0:
         kappa = sqrt(-square) / A
-        return lambda t: (n + Q) * (1 - exp(kappa * t)) / ((P - A * kappa) * exp(kappa * t) - (P + A * kappa))
+        return lambda t: (
+            (n + Q) * (1 - exp(kappa * t)) / ((P - A * kappa) * exp(kappa * t) - (P + A * kappa))
+        )
     return lambda t: (n + Q) * t / (2 * A - P * t)
 
 
@@ -388,7 +430,9 @@ def any_start(dice):
 
 
 def general_solution(dice):
-    """d : c23 = b12^2 - b31^2 : b12 b31 and s || b: |w - mu2 X|^mu2 / |w - mu1 X|^mu1 is constant along (57)."""
+    """d : c23 = b12^2 - b31^2 : b12 b31 and s || b: |w - mu2 X|^mu2 / |w - mu1 X|^mu1 is constant
+    along (57).
+    """
     b12, b31, sigma, phi, w = numbers(dice, 5)
     mu1 = mpf("1.2") + abs(number(dice))
     mu2 = 1 - mu1

@@ -1,12 +1,14 @@
-"""The homoclinic curve of the driven Josephson junction beside its expansion I = 4 a / pi + O(a^3), and over the map.
+"""The homoclinic curve of the driven Josephson junction beside its expansion I = 4 a / pi + O(a^3),
+and over the map.
 
     python workflows/josephson_curve.py [-o results]
 
-On the curve the branch that leaves the saddle to the right changes its end: below, it falls into the equilibrium;
-above, it tends to the rotation cycle. The portrait's table of branches tells which, so the curve is bisected.
+On the curve the branch that leaves the saddle to the right changes its end: below, it falls into
+the equilibrium; above, it tends to the rotation cycle. The portrait's table of branches tells
+which, so the curve is bisected.
 
-Source: J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of Vector Fields (1983),
-4.6: Melnikov's method gives I = 4 a / pi to first order.
+Source: J. Guckenheimer, P. Holmes, Nonlinear Oscillations, Dynamical Systems, and Bifurcations of
+Vector Fields (1983), 4.6: Melnikov's method gives I = 4 a / pi to first order.
 """
 
 import tomllib
@@ -50,13 +52,18 @@ def draw(rows, folder):
     """The map of `josephson.toml` with the curve and its expansion."""
     import matplotlib.pyplot as plt
 
-    job = tomllib.loads((HERE / "josephson.toml").read_text(encoding="utf-8")) | {"scene": str(HERE / "josephson.py")}
+    job = tomllib.loads((HERE / "josephson.toml").read_text(encoding="utf-8")) | {
+        "scene": str(HERE / "josephson.py")
+    }
     job["output"] |= {"figures": []}
     with TemporaryDirectory() as own:
         ds = survey.run(job, output=Path(own) / "josephson.nc").load()
     figure = plt.figure(figsize=(7.2, 5.2), layout="constrained")
     axes = ds.survey.map("rotations_plus", ax=figure.subplots())
-    a, middle = np.array([row[0] for row in rows]), np.array([0.5 * (row[1] + row[2]) for row in rows])
+    a, middle = (
+        np.array([row[0] for row in rows]),
+        np.array([0.5 * (row[1] + row[2]) for row in rows]),
+    )
     line = np.array([0.0, 0.25 * pi])
     axes.plot(line, 4 * line / pi, "--", color="#D40000", lw=1.4, label=r"$I = 4a/\pi$")
     axes.plot(a, middle, "o", color="white", mec="black", ms=5, label="homoclinic, bisected")

@@ -1,8 +1,10 @@
-"""Figures 8 to 10 of the source regenerated, with the order 4 that it leaves out, and the verdict with the resonances.
+"""Figures 8 to 10 of the source regenerated, with the order 4 that it leaves out, and the verdict
+with the resonances.
 
     python workflows/libration_coefficients.py [-o results]
 
-Runs `libration_coefficients.toml` beside this file, and draws libration_coefficients.png and libration_verdict.png.
+Runs `libration_coefficients.toml` beside this file, and draws libration_coefficients.png and
+libration_verdict.png.
 """
 
 from pathlib import Path
@@ -50,7 +52,9 @@ def _letter(name):
 
 def draw_coefficients(ds, path):
     """A panel for each of the figures; the scale is linear around 0 and logarithmic beyond."""
-    figure, panels = plt.subplots(len(PANELS), 1, figsize=(8.0, 12.5), sharex=True, layout="constrained")
+    figure, panels = plt.subplots(
+        len(PANELS), 1, figsize=(8.0, 12.5), sharex=True, layout="constrained"
+    )
     marks = {value.symbol: float(value.mu) for value in boundaries()}
     for axes, (title, names, width) in zip(panels, PANELS, strict=True):
         for name, colour in zip(names, LINES, strict=False):
@@ -60,16 +64,21 @@ def draw_coefficients(ds, path):
         for name in ("mu2", "mu1", "mu_R"):
             axes.axvline(marks[name], color="grey", lw=0.8, ls="--")
         axes.axvspan(marks["mu_c"], marks["mu_d"], color=COLOURS[2], alpha=0.15, lw=0)
-        axes.legend(fontsize=9, frameon=False, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        axes.legend(
+            fontsize=9, frameon=False, ncols=1, loc="center left", bbox_to_anchor=(1.0, 0.5)
+        )
         axes.grid(alpha=0.25)
         axes.set_xlim(0.0, 0.0395)
         critical = axes.secondary_xaxis("top")
-        critical.set_xticks([marks[name] for name in MARKED], [_letter(name) for name in MARKED], fontsize=8)
+        critical.set_xticks(
+            [marks[name] for name in MARKED], [_letter(name) for name in MARKED], fontsize=8
+        )
         critical.tick_params(length=3, pad=1)
         axes.set_title(title, fontsize=10, pad=16)
     panels[-1].set(xlabel=r"$\mu$")
     figure.suptitle(
-        "Normal form at $L_4$: dashed $\\mu_2$, $\\mu_1$, $\\mu_R$; shaded where order 6 decides", fontsize=11
+        "Normal form at $L_4$: dashed $\\mu_2$, $\\mu_1$, $\\mu_R$; shaded where order 6 decides",
+        fontsize=11,
     )
     figure.savefig(path, dpi=150)
     plt.close(figure)
@@ -82,26 +91,59 @@ def draw_verdict(ds, path):
     )
     mu, verdict = ds.mu.values, ds.verdict.values
     names = dict(zip(ds.verdict.flag_values, ds.verdict.flag_meanings.split(), strict=True))
-    look = {"cmap": ListedColormap(list(VERDICTS.values())), "vmin": -0.5, "vmax": 2.5, "shading": "nearest"}
+    look = {
+        "cmap": ListedColormap(list(VERDICTS.values())),
+        "vmin": -0.5,
+        "vmax": 2.5,
+        "shading": "nearest",
+    }
     strip.pcolormesh(mu, [0.0, 1.0], np.vstack([verdict, verdict]), rasterized=True, **look)
-    strip.set(yticks=[], ylim=(0, 1), title="Formal stability of $L_4$ and $L_5$ in the spatial circular problem")
+    strip.set(
+        yticks=[],
+        ylim=(0, 1),
+        title="Formal stability of $L_4$ and $L_5$ in the spatial circular problem",
+    )
     critical = {value.symbol: float(value.mu) for value in boundaries()}
     for name in MARKED:
         letter = name.removeprefix("mu").removeprefix("_")
         unstable = name in ("mu1", "mu2")
-        strip.axvline(critical[name], color="black", lw=1.6 if unstable else 0.8, ls="-" if unstable else ":")
+        strip.axvline(
+            critical[name], color="black", lw=1.6 if unstable else 0.8, ls="-" if unstable else ":"
+        )
         strip.annotate(f"$\\mu_{letter}$", (critical[name], 0), xytext=(0, -3), textcoords="offset points",
                        ha="center", va="top", fontsize=9)  # fmt: skip
-    handles = [Patch(color=colour, label=names[code].replace("_", " ")) for code, colour in VERDICTS.items()]
+    handles = [
+        Patch(color=colour, label=names[code].replace("_", " "))
+        for code, colour in VERDICTS.items()
+    ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=9)
     for value in resonances():
         definite = value.what.endswith(" definite")
         colour = "black" if definite else "grey"
-        marks.vlines(float(value.mu), value.order, 9.4, color=colour, lw=0.6, alpha=0.5, ls="-" if definite else ":")
-        marks.plot(float(value.mu), value.order, "o", ms=5, color=colour, mfc=colour if definite else "white")
-        left = value.mu > 0.0375  # no room to the right; and in order 7 none above, where (3, 4, 0) stands
+        marks.vlines(
+            float(value.mu),
+            value.order,
+            9.4,
+            color=colour,
+            lw=0.6,
+            alpha=0.5,
+            ls="-" if definite else ":",
+        )
+        marks.plot(
+            float(value.mu),
+            value.order,
+            "o",
+            ms=5,
+            color=colour,
+            mfc=colour if definite else "white",
+        )
+        # no room to the right; and in order 7 none above, where (3, 4, 0) stands
+        left = value.mu > 0.0375
         above = definite and not (left and value.order == 7)
-        place = {"xytext": (-4 if left else 4, 4 if above else -10), "ha": "right" if left else "left"}
+        place = {
+            "xytext": (-4 if left else 4, 4 if above else -10),
+            "ha": "right" if left else "left",
+        }
         marks.annotate(value.symbol, (float(value.mu), value.order), textcoords="offset points", fontsize=7.5,
                        color=colour, **place)  # fmt: skip
     marks.set(ylabel="order", ylim=(9.4, 2.4), yticks=range(3, 9))
@@ -112,12 +154,27 @@ def draw_verdict(ds, path):
     shades = plt.get_cmap("viridis_r")
     for order in range(2, 9):
         here = ds.resonance_order.values == order
-        below.plot(mu, np.where(here, ds.resonance_distance.values, np.nan), lw=1.4, color=shades(order / 9 + 0.1))
+        below.plot(
+            mu,
+            np.where(here, ds.resonance_distance.values, np.nan),
+            lw=1.4,
+            color=shades(order / 9 + 0.1),
+        )
         if here.any():
             below.plot([], [], color=shades(order / 9 + 0.1), lw=3, label=f"{order}")
-    below.set(xlabel=r"$\mu$", ylabel=r"$|k \cdot \omega|$", yscale="log", ylim=(1e-5, 0.1), xlim=(0.0, 0.04))
-    below.set_title("distance from the nearest of them (and of those at the ends), by order", fontsize=9)
-    below.legend(fontsize=8, frameon=False, title="order", loc="center left", bbox_to_anchor=(1.0, 0.5))
+    below.set(
+        xlabel=r"$\mu$",
+        ylabel=r"$|k \cdot \omega|$",
+        yscale="log",
+        ylim=(1e-5, 0.1),
+        xlim=(0.0, 0.04),
+    )
+    below.set_title(
+        "distance from the nearest of them (and of those at the ends), by order", fontsize=9
+    )
+    below.legend(
+        fontsize=8, frameon=False, title="order", loc="center left", bbox_to_anchor=(1.0, 0.5)
+    )
     below.grid(alpha=0.25)
     figure.savefig(path, dpi=150)
     plt.close(figure)

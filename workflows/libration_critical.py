@@ -2,9 +2,10 @@
 
     python workflows/libration_critical.py [-o results]
 
-Every value is a zero of an integer polynomial in v = omega2^2 without poles (0 < v < 1/2 is 0 < mu < mu_R). Sturm's
-theorem counts the zeros, so none is missing; each lies between two rational numbers where the polynomial has opposite
-signs. Nothing is rounded before mu is printed. Equation numbers: survey/scenes/libration.md.
+Every value is a zero of an integer polynomial in v = omega2^2 without poles (0 < v < 1/2 is 0 < mu
+< mu_R). Sturm's theorem counts the zeros, so none is missing; each lies between two rational
+numbers where the polynomial has opposite signs. Nothing is rounded before mu is printed. Equation
+numbers: survey/scenes/libration.md.
 """
 
 import csv
@@ -27,7 +28,18 @@ SHOWN = Decimal("1e-31")  # mu is printed in multiples of it
 ERROR = Decimal("2e-31")
 WIDTH = Fraction(1, 2**150)  # of v
 END = Fraction(1, 2)  # v at mu_R
-POLYNOMIALS = ([1, -1], [0, 1], [1, -2], [-4, 5], [1, -5], [-9, 10], [1, -10], [3, 1], [4, -1], [9, -4, 4])
+POLYNOMIALS = (
+    [1, -1],
+    [0, 1],
+    [1, -2],
+    [-4, 5],
+    [1, -5],
+    [-9, 10],
+    [1, -10],
+    [3, 1],
+    [4, -1],
+    [9, -4, 4],
+)
 
 
 # polynomials: lists of integers, ascending
@@ -48,7 +60,9 @@ def _times(a, b):
 
 def plus(a, b):
     longer, shorter = (a, b) if len(a) >= len(b) else (b, a)
-    return trimmed([x + y for x, y in zip(longer, shorter + [0] * (len(longer) - len(shorter)), strict=True)])
+    return trimmed(
+        [x + y for x, y in zip(longer, shorter + [0] * (len(longer) - len(shorter)), strict=True)]
+    )
 
 
 def trimmed(a):
@@ -120,7 +134,8 @@ def count(chain, low, high):
 
 
 def zeros(a, low=Fraction(0), high=END):
-    """Every zero in low < v < high, as a pair of rationals, WIDTH apart or less, where a has opposite signs.
+    """Every zero in low < v < high, as a pair of rationals, WIDTH apart or less, where a has
+    opposite signs.
 
     Zeros at 0 and END are divided out.
     """
@@ -163,7 +178,11 @@ def term(name, w1=0, w2=0, weight=1):
 
 def product(*terms):
     numerators, commons, powers = zip(*terms, strict=True)
-    return times(*numerators), reduce(int.__mul__, commons), tuple(map(sum, zip(*powers, strict=True)))
+    return (
+        times(*numerators),
+        reduce(int.__mul__, commons),
+        tuple(map(sum, zip(*powers, strict=True))),
+    )
 
 
 def rational(a):
@@ -188,7 +207,9 @@ def numerators(sums):
     for terms in sums:
         total = []
         for numerator, denominator, powers in terms:
-            factors = [f for f, n, m in zip(POLYNOMIALS, powers, least, strict=True) for _ in range(n - m)]
+            factors = [
+                f for f, n, m in zip(POLYNOMIALS, powers, least, strict=True) for _ in range(n - m)
+            ]
             total = plus(total, [common // denominator * x for x in times(numerator, *factors)])
         found.append(total)
     return found
@@ -208,7 +229,9 @@ def discriminant():
 
 def determinant_2():
     """det N'' in the plane."""
-    return summed(product(term("200", weight=4), term("020")), product(term("110", weight=-1), term("110")))
+    return summed(
+        product(term("200", weight=4), term("020")), product(term("110", weight=-1), term("110"))
+    )
 
 
 def determinant_3():
@@ -314,8 +337,14 @@ def determinants():
     """Zeros of det N'', of D6, and of M on the two lines of L = N = 0."""
     found = [value("det3", "det N'' = 0 (3 x 3)", zero) for zero in zeros(determinant_3())]
     found += [value("D6", "D6 = 0", zero) for zero in zeros(numerator("D6"))]
-    rays = ((zero, min((1, 2), key=lambda ray: abs(on_ray(zero[0], ray)))) for zero in zeros(ray_resultant()))
-    return found + [value(f"M{ray}", f"M = 0 on the line of alpha{ray}, outside the octant", z) for z, ray in rays]
+    rays = (
+        (zero, min((1, 2), key=lambda ray: abs(on_ray(zero[0], ray))))
+        for zero in zeros(ray_resultant())
+    )
+    return found + [
+        value(f"M{ray}", f"M = 0 on the line of alpha{ray}, outside the octant", z)
+        for z, ray in rays
+    ]
 
 
 def coefficients():
@@ -330,9 +359,12 @@ def ray_resultant():
 
 
 def on_ray(v, ray):
-    """M / omega2 on the line of alpha1 or alpha2 (3.11) at a rational v, times a positive factor, to many digits."""
+    """M / omega2 on the line of alpha1 or alpha2 (3.11) at a rational v, times a positive factor,
+    to many digits.
+    """
     quadratic, cubic = ([at(a, v) for a in polynomial] for polynomial in on_rays())
-    # the sign of the common denominators, from a20 = (numerator) / (144 s^2 (1 - 5u) (4 - u) (4 - v)), 1 - 5u < 0
+    # the sign of the common denominators, from a20 = (numerator) / (144 s^2 (1 - 5u) (4 - u) (4 -
+    # v)), 1 - 5u < 0
     common = 1 if (quadratic[2] > 0) == (at(numerator("a20"), v) < 0) else -1
     with localcontext(prec=DIGITS):
         (q0, q1, q2), (m0, m1, m2, m3) = map(decimal, quadratic), map(decimal, cubic)
@@ -342,7 +374,9 @@ def on_ray(v, ray):
 
 
 def resonances(highest=8):
-    """Every resonance k1 omega1 - k2 omega2 + k3 = 0 in 0 < mu < mu_R with even k3 up to an order, ascending in mu."""
+    """Every resonance k1 omega1 - k2 omega2 + k3 = 0 in 0 < mu < mu_R with even k3 up to an order,
+    ascending in mu.
+    """
     found = []
     with localcontext(prec=DIGITS):
         for k1, k2, k3 in vectors(highest).astype(int).tolist():
@@ -443,12 +477,16 @@ Odd k3 does not matter: H is even in the coordinate and momentum across the plan
 
 
 def table(values):
-    return "\n".join(f"| {v.symbol} | {v.mu} | {f'{v.order}, ' * bool(v.order)}{v.what} |" for v in values)
+    return "\n".join(
+        f"| {v.symbol} | {v.mu} | {f'{v.order}, ' * bool(v.order)}{v.what} |" for v in values
+    )
 
 
 def intervals(named):
     """The intervals (3.1) and (3.2), with the ends that (3.12) prints and in full."""
-    c, two, d, one_, end = (f"{named[name].mu:.15f}" for name in ("mu_c", "mu2", "mu_d", "mu1", "mu_R"))
+    c, two, d, one_, end = (
+        f"{named[name].mu:.15f}" for name in ("mu_c", "mu2", "mu_d", "mu1", "mu_R")
+    )
     return [
         "| (3.1) | 0 < mu < 0.010913... | 0 < mu < " + c + " |",
         f"| | 0.016376... < mu < mu1 | {d} < mu < {one_} |",
@@ -463,7 +501,9 @@ def page():
     first, second, third, fourth = boundaries(), determinants(), coefficients(), resonances()
     named = {v.symbol: v for v in first}
     c, d = float(named["mu_c"].mu), float(named["mu_d"].mu)
-    ends = survey.evaluate("libration", mu=[np.nextafter(c, 1), np.nextafter(d, 0)], variables=["M_ray"]).M_ray
+    ends = survey.evaluate(
+        "libration", mu=[np.nextafter(c, 1), np.nextafter(d, 0)], variables=["M_ray"]
+    ).M_ray
     text = PAGE.format(
         error=f"{ERROR:.0e}",
         boundaries=table(first),
@@ -471,7 +511,9 @@ def page():
         share=100 * (named["mu_d"].mu - named["mu_c"].mu) / named["mu_R"].mu,
         below=float(ends[0]),
         above=float(ends[1]),
-        claims="\n".join(f"| {sentence} | {'yes' if holds else 'NO'} |" for sentence, holds in claims()),
+        claims="\n".join(
+            f"| {sentence} | {'yes' if holds else 'NO'} |" for sentence, holds in claims()
+        ),
         determinants=table(second),
         coefficients=table(third),
         resonances=table(fourth),
@@ -482,7 +524,10 @@ def page():
 def main():
     folder = parser(__doc__, "the page and its table").parse_args().output
     text, values = page()
-    written, listed = folder / "libration_critical_values.md", folder / "libration_critical_values.csv"
+    written, listed = (
+        folder / "libration_critical_values.md",
+        folder / "libration_critical_values.csv",
+    )
     written.write_text(text, encoding="utf-8")
     with listed.open("w", newline="") as file:
         out = csv.writer(file, lineterminator="\n")

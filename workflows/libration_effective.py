@@ -1,8 +1,10 @@
-"""For how long motions near the triangular libration points stay near them: the radius of effective stability over mu.
+"""For how long motions near the triangular libration points stay near them: the radius of effective
+stability over mu.
 
     python workflows/libration_effective.py [-o results]
 
-Definition and assumptions: `survey/measures/libration/effective_stability.py`; series: `survey/methods/lie.py`.
+Definition and assumptions: `survey/measures/libration/effective_stability.py`; series:
+`survey/methods/lie.py`.
 """
 
 import matplotlib.pyplot as plt
@@ -33,12 +35,15 @@ def radii(mu, order):
         for periods in PERIODS:
             parts[periods].append(effective_stability.radius(norms, 2.0 * np.pi * periods))
     return {
-        periods: tuple(np.concatenate(part) for part in zip(*found, strict=True)) for periods, found in parts.items()
+        periods: tuple(np.concatenate(part) for part in zip(*found, strict=True))
+        for periods, found in parts.items()
     }
 
 
 def resonances(highest):
-    """[(mu, k)]: where k1 w1 - k2 w2 + k3 = 0, k the shortest of its line, |k| <= highest, in the order of mu."""
+    """[(mu, k)]: where k1 w1 - k2 w2 + k3 = 0, k the shortest of its line, |k| <= highest, in the
+    order of mu.
+    """
     vectors, found = plan(highest, True).harmonics, {}
     vectors = vectors[np.lexsort((*vectors.T, abs(vectors).sum(axis=1)))]
     for k in vectors:
@@ -75,12 +80,16 @@ def bisect(k, low, high):
 
 
 def semi_axes(mu):
-    """Greatest distance from L4, per unit of |z_j|, of short- and long-period motions (linear): their semi-axes."""
+    """Greatest distance from L4, per unit of |z_j|, of short- and long-period motions (linear):
+    their semi-axes.
+    """
     s, *frequency = frequencies(mu)
     k, axes = 0.75 * np.sqrt(3.0) * (1.0 - 2.0 * mu), []
     for omega in frequency:
         g = 1.0 / np.sqrt(2.0 * omega * s * (omega**2 + 0.75))
-        axes.append(2.0 * np.linalg.norm([[k * g, 2.0 * omega * g], [-(omega**2 + 0.75) * g, 0.0]], ord=2))
+        axes.append(
+            2.0 * np.linalg.norm([[k * g, 2.0 * omega * g], [-(omega**2 + 0.75) * g, 0.0]], ord=2)
+        )
     return axes
 
 
@@ -139,7 +148,9 @@ def main():
     roots = np.array([root for root, _k in low])
     say("at the resonances")
     on, beside = radii(roots, ORDERS[-1]), radii(roots * 1.001, ORDERS[-1])
-    (folder / "libration_effective_stability.md").write_text(page(mu, curves, at, low, on, beside), encoding="utf-8")
+    (folder / "libration_effective_stability.md").write_text(
+        page(mu, curves, at, low, on, beside), encoding="utf-8"
+    )
     draw(mu, curves, found, folder / "libration_effective_stability.png")
     print(*(folder / f"libration_effective_stability.{end}" for end in ("md", "png")), sep="\n")
 
@@ -163,7 +174,9 @@ def page(mu, curves, at, low, on, beside):
         time_rules="|".join("---" for _ in PERIODS),
         by_time="\n".join(
             f"| {name} | "
-            + " | ".join(f"{at[top][periods][0][n]:.3e} ({at[top][periods][2][n]})" for periods in PERIODS)
+            + " | ".join(
+                f"{at[top][periods][0][n]:.3e} ({at[top][periods][2][n]})" for periods in PERIODS
+            )
             + "".join(f" | {axis * at[top][long][0][n]:.1e}" for axis in semi_axes(value))
             + " |"
             for n, (name, value) in enumerate(zip(names, PLACES.values(), strict=True))
@@ -180,7 +193,9 @@ def page(mu, curves, at, low, on, beside):
 
 def draw(mu, curves, found, path):
     """Left: by order for the longest time; right: by time for the highest order, and the resonances."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(12.5, 5.8), sharey=True, layout="constrained")
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(12.5, 5.8), sharey=True, layout="constrained"
+    )
     top, long, shades = ORDERS[-1], PERIODS[-1], [COLOURS[i] for i in (0, 6, 4, 5)]
     for order, colour in zip(ORDERS, shades, strict=False):
         left.semilogy(mu, curves[order][long][0], color=colour, lw=1.1, label=f"order {order}")

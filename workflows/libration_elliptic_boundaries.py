@@ -1,9 +1,11 @@
-"""The curves that bound Danby's region of stability, and their tip, with error bounds; and the map with the curves.
+"""The curves that bound Danby's region of stability, and their tip, with error bounds; and the map
+with the curves.
 
     python workflows/libration_elliptic_boundaries.py [-o results]
 
-On A and B a pair of multipliers meets at -1, on KC two pairs meet on the circle. A and KC are tangent at the tip, where
-all four multipliers are -1: it is found as the common zero of A and t (`survey/scenes/libration_elliptic.md`).
+On A and B a pair of multipliers meets at -1, on KC two pairs meet on the circle. A and KC are
+tangent at the tip, where all four multipliers are -1: it is found as the common zero of A and t
+(`survey/scenes/libration_elliptic.md`).
 """
 
 import csv
@@ -20,10 +22,35 @@ from survey.measures.libration import danby
 
 ROWS = np.round(np.concatenate([np.arange(0, 0.9, 0.01), np.arange(0.9, 0.991, 0.005)]), 3)
 STRIP = np.round(np.concatenate([np.arange(0.296, 0.3141, 0.002), [0.3142, 0.3144, 0.3145]]), 4)
-SHOWN = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.31, 0.314, 0.3145, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
+SHOWN = (
+    0.0,
+    0.05,
+    0.1,
+    0.15,
+    0.2,
+    0.25,
+    0.3,
+    0.31,
+    0.314,
+    0.3145,
+    0.35,
+    0.4,
+    0.5,
+    0.6,
+    0.7,
+    0.8,
+    0.9,
+    0.95,
+    0.99,
+)
 MU_LEAST, MU_MOST, SAMPLES = 1e-9, 0.055, 1000
-FULL, NEAR = ((0.0, 0.055), (0.0, 0.98)), ((-2e-5, 5e-5), (0.296, 0.3156))  # mu, or mu less that of A; e
-LABELS = {"A": "a pair meets at -1 (factor A)", "B": "a pair meets at -1 (factor B)", "KC": "two pairs meet (K)"}
+# mu, or mu less that of A; e
+FULL, NEAR = ((0.0, 0.055), (0.0, 0.98)), ((-2e-5, 5e-5), (0.296, 0.3156))
+LABELS = {
+    "A": "a pair meets at -1 (factor A)",
+    "B": "a pair meets at -1 (factor B)",
+    "KC": "two pairs meet (K)",
+}
 
 
 @dataclass(frozen=True)
@@ -46,7 +73,9 @@ def functions(e, mu):
 
 
 def tip():
-    """(mu, e) of the tip and their error bounds: Newton's method for A = t = 0; the error includes its last step."""
+    """(mu, e) of the tip and their error bounds: Newton's method for A = t = 0; the error includes
+    its last step.
+    """
     x = np.array([0.047, 0.3145])
     for _ in range(8):
         value, bar = (np.array(part) for part in both(*x))
@@ -61,7 +90,9 @@ def tip():
 def both(mu, e):
     """(A, t) and their bars at one point."""
     found = functions(np.array([e]), np.array([mu]))
-    return np.array([found["A"][0][0], found["t"][0][0]]), np.array([found["A"][1][0], found["t"][1][0]])
+    return np.array([found["A"][0][0], found["t"][0][0]]), np.array(
+        [found["A"][1][0], found["t"][1][0]]
+    )
 
 
 def trace(curve, e):
@@ -140,13 +171,36 @@ def draw(points, end, path):
     def map_of(axes, window, base):
         e, x = np.linspace(*window[1], 400), np.linspace(*window[0], 600)
         mu = xr.DataArray(base(e)[:, None] + x, dims=("row", "column"))
-        ds = survey.evaluate("libration_elliptic", mu=mu, e=xr.DataArray(e, dims="row"), variables=["verdict"])
-        shown = {"cmap": ListedColormap([UNDECIDED, *COLOURS[:2]]), "vmin": -1.5, "vmax": 1.5, "rasterized": True}
+        ds = survey.evaluate(
+            "libration_elliptic", mu=mu, e=xr.DataArray(e, dims="row"), variables=["verdict"]
+        )
+        shown = {
+            "cmap": ListedColormap([UNDECIDED, *COLOURS[:2]]),
+            "vmin": -1.5,
+            "vmax": 1.5,
+            "rasterized": True,
+        }
         axes.pcolormesh(x, e, ds.verdict.transpose("row", "column"), **shown)
         for name, style in (("B", "-"), ("A", "--"), ("KC", ":")):
-            curve = np.array([(point.mu, point.e) for point in points if point.curve == name and point.e >= e[0]])
-            axes.plot(curve[:, 0] - base(curve[:, 1]), curve[:, 1], style, color="black", lw=1.0, label=LABELS[name])
-        axes.plot(end[0] - base(end[1]), end[1], "o", color="black", ms=4, label="tip: all four multipliers at -1")
+            curve = np.array(
+                [(point.mu, point.e) for point in points if point.curve == name and point.e >= e[0]]
+            )
+            axes.plot(
+                curve[:, 0] - base(curve[:, 1]),
+                curve[:, 1],
+                style,
+                color="black",
+                lw=1.0,
+                label=LABELS[name],
+            )
+        axes.plot(
+            end[0] - base(end[1]),
+            end[1],
+            "o",
+            color="black",
+            ms=4,
+            label="tip: all four multipliers at -1",
+        )
         axes.set(xlim=window[0], ylim=window[1], ylabel="eccentricity e")
 
     map_of(panels[0], FULL, lambda e: 0.0 * e)
@@ -160,7 +214,9 @@ def draw(points, end, path):
 
 def main():
     folder = parser(__doc__, "the page, table and picture").parse_args().output
-    page, listed, picture = (folder / f"libration_elliptic_boundaries.{kind}" for kind in ("md", "csv", "png"))
+    page, listed, picture = (
+        folder / f"libration_elliptic_boundaries.{kind}" for kind in ("md", "csv", "png")
+    )
     end, end_error = tip()
     say("the tip is found")
     points = curves(end[1])

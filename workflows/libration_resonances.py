@@ -1,10 +1,12 @@
-"""Resonances of order 3 and 4 on Danby's map: where they lie, and which of them destroy stability in the plane.
+"""Resonances of order 3 and 4 on Danby's map: where they lie, and which of them destroy stability
+in the plane.
 
     python workflows/libration_resonances.py -o results
 
-The planar motion about a triangular point of the elliptic problem has a symplectic map over one revolution. Its Taylor
-polynomial of degree 3 is carried along the motion; complex coordinates q1, q2 that diagonalise the linear map, with
-{q, conj q} = -i, remove all quadratic terms but resonant ones. With the angles theta of q1, q2 per revolution:
+The planar motion about a triangular point of the elliptic problem has a symplectic map over one
+revolution. Its Taylor polynomial of degree 3 is carried along the motion; complex coordinates q1,
+q2 that diagonalise the linear map, with {q, conj q} = -i, remove all quadratic terms but resonant
+ones. With the angles theta of q1, q2 per revolution:
 
     order 3, k1 theta1 + k2 theta2 = 0 (mod 2 pi), k1 + k2 = 3, k >= 0: unstable if the resonant term is not 0;
     order 4, H4 = a11 I1^2 + a12 I1 I2 + a22 I2^2 + 2 B I1^(k1/2) I2^(k2/2) cos(...): unstable if
@@ -12,7 +14,8 @@ polynomial of degree 3 is carried along the motion; complex coordinates q1, q2 t
 
 Resonances with k1 k2 < 0 keep |k2| I1 + |k1| I2 to all orders and do no harm alone.
 
-Source: A. P. Markeev, Libration points in celestial mechanics and cosmodynamics (1978), chapters 2, 3 and 9.
+Source: A. P. Markeev, Libration points in celestial mechanics and cosmodynamics (1978), chapters 2,
+3 and 9.
 """
 
 import csv
@@ -33,12 +36,15 @@ DEGREE = 3
 ROWS = np.round(np.arange(0.0, 0.901, 0.025), 4)
 COLUMNS = np.linspace(1e-4, 0.048, 1600)
 CALM = 1e-6  # resonant terms below it, over the next order's, cannot be told from 0
-VECTORS = [(k1, k2) for order in (3, 4) for k1 in range(order + 1) for k2 in {order - k1, k1 - order}]
+VECTORS = [
+    (k1, k2) for order in (3, 4) for k1 in range(order + 1) for k2 in {order - k1, k1 - order}
+]
 HARMLESS, STABLE, UNSTABLE, OPEN = "harmless", "stable to order 4", "unstable", "open"
 
 POWERS = [p for p in product(range(DEGREE + 1), repeat=4) if sum(p) <= DEGREE]
 PLACE = {p: i for i, p in enumerate(POWERS)}
-LINEAR = [PLACE[tuple(row)] for row in np.eye(4, dtype=int)]  # the places of the variables themselves
+# the places of the variables themselves
+LINEAR = [PLACE[tuple(row)] for row in np.eye(4, dtype=int)]
 PAIRS = np.array([(i, j, PLACE[tuple(np.add(p, q))]) for i, p in enumerate(POWERS) for j, q in enumerate(POWERS)
                   if sum(p) + sum(q) <= DEGREE]).T  # fmt: skip
 
@@ -100,12 +106,16 @@ def revolution(mu, e):
 
     start = np.zeros((4, len(POWERS)))
     start[range(4), LINEAR] = 1.0
-    end = solve_ivp(slope, (0.0, 2.0 * np.pi), start.ravel(), method="DOP853", rtol=1e-11, atol=1e-13).y[:, -1]
+    end = solve_ivp(
+        slope, (0.0, 2.0 * np.pi), start.ravel(), method="DOP853", rtol=1e-11, atol=1e-13
+    ).y[:, -1]
     return end.reshape(4, -1)
 
 
 def diagonal(linear):
-    """(multipliers l1, l2, vectors (4, 4)): u = V (q1, q2, conj q1, conj q2), {q, conj q} = -i, |arg l1| < |arg l2|."""
+    """(multipliers l1, l2, vectors (4, 4)): u = V (q1, q2, conj q1, conj q2), {q, conj q} = -i,
+    |arg l1| < |arg l2|.
+    """
     J = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.eye(2), np.zeros((2, 2))]])
     values, vectors = np.linalg.eig(linear)
     sizes = np.array([(v @ J @ v.conj()).imag for v in vectors.T])
@@ -129,7 +139,9 @@ def of_coordinates(images, V):
 
 
 def normal_form(mu, e):
-    """(theta1, theta2, quadratic map (4, monomials), cubic map) in coordinates without quadratic terms that can go."""
+    """(theta1, theta2, quadratic map (4, monomials), cubic map) in coordinates without quadratic
+    terms that can go.
+    """
     images = revolution(mu, e)
     own, V = diagonal(images[:, LINEAR])
     if len(own) != 2:
@@ -139,16 +151,22 @@ def normal_form(mu, e):
     for p in POWERS:
         if sum(p) == 2:
             gaps = np.prod(both**p) - both
-            h[:, PLACE[p]] = np.where(abs(gaps) > 1e-6, F[:, PLACE[p]] / np.where(abs(gaps) > 1e-6, gaps, 1.0), 0.0)
+            h[:, PLACE[p]] = np.where(
+                abs(gaps) > 1e-6, F[:, PLACE[p]] / np.where(abs(gaps) > 1e-6, gaps, 1.0), 0.0
+            )
     # G3 = F3 + DF2 h
-    cubic = np.array([F[:, PLACE[p]] if sum(p) == 3 else np.zeros(4) for p in POWERS]).T.astype(complex)
+    cubic = np.array([F[:, PLACE[p]] if sum(p) == 3 else np.zeros(4) for p in POWERS]).T.astype(
+        complex
+    )
     for p in POWERS:
         for k in range(4):
             if sum(p) == 2 and p[k]:
                 rest = tuple(p[m] - (m == k) for m in range(4))
                 for q in POWERS:
                     if sum(q) == 2:
-                        cubic[:, PLACE[tuple(np.add(rest, q))]] += p[k] * F[:, PLACE[p]] * h[k, PLACE[q]]
+                        cubic[:, PLACE[tuple(np.add(rest, q))]] += (
+                            p[k] * F[:, PLACE[p]] * h[k, PLACE[q]]
+                        )
     return np.angle(own), F, cubic
 
 
@@ -176,14 +194,22 @@ def effect(k, theta, F, cubic):
         return (UNSTABLE if B > CALM else OPEN), B, 0.0
     size = 2.0 * B * np.prod([float(n) ** (n / 2) for n in k if n])
     against = abs(twist(theta, cubic) @ [k[0] ** 2, k[0] * k[1], k[1] ** 2])
-    return (OPEN if abs(size - against) < CALM * against else UNSTABLE if size > against else STABLE), size, against
+    return (
+        (OPEN if abs(size - against) < CALM * against else UNSTABLE if size > against else STABLE),
+        size,
+        against,
+    )
 
 
 def angles(mu, e):
-    """theta1, theta2 over 2 pi and the verdict, from the outputs of the scene; the signs are those of Krein."""
+    """theta1, theta2 over 2 pi and the verdict, from the outputs of the scene; the signs are those
+    of Krein.
+    """
     ds = survey.evaluate("libration_elliptic", mu=mu, e=e)
     root = np.sqrt(np.maximum(ds.a**2 / 4.0 - ds.b + 2.0, 0.0))
-    first, second = (np.arccos(np.clip((ds.a / 2.0 + s * root) / 2.0, -1.0, 1.0)) / (2 * np.pi) for s in (1, -1))
+    first, second = (
+        np.arccos(np.clip((ds.a / 2.0 + s * root) / 2.0, -1.0, 1.0)) / (2 * np.pi) for s in (1, -1)
+    )
     # below the curve B the slow mode turns by less than half a turn, above A by more
     return -first.values, second.values, ds.verdict.values
 
@@ -210,7 +236,15 @@ def places(e):
             if stable[i] and stable[j] and above[i] == above[j] and values[i] * values[j] <= 0 and (
                     abs(values[i] - values[j]) < 0.2):  # fmt: skip
                 up = bool(above[i])
-                found.append((k, _zero(lambda mu, up=up, off=off: off(*angles(mu, e)[:2], up), *COLUMNS[[i, j]]), up))
+                found.append(
+                    (
+                        k,
+                        _zero(
+                            lambda mu, up=up, off=off: off(*angles(mu, e)[:2], up), *COLUMNS[[i, j]]
+                        ),
+                        up,
+                    )
+                )
     return found
 
 
@@ -230,9 +264,12 @@ def table(rows):
     out = []
     for e in map(float, rows):
         for k, mu, up in places(e):
-            what, term, against = effect(k, *normal_form(mu, e)) if k[0] * k[1] >= 0 else (HARMLESS, np.nan, np.nan)
+            what, term, against = (
+                effect(k, *normal_form(mu, e)) if k[0] * k[1] >= 0 else (HARMLESS, np.nan, np.nan)
+            )
             if e == 0.0 and what == OPEN:
-                what = HARMLESS  # the circular problem does not depend on f: it has terms of k1 w1 = k2 w2 alone
+                # the circular problem does not depend on f: it has terms of k1 w1 = k2 w2 alone
+                what = HARMLESS
             out.append((k, e, mu, what, term, against, up))
         say(f"e = {e:g}")
     return out
@@ -252,13 +289,19 @@ def main(arguments=None):
 def draw(found):
     figure, axes = plt.subplots(figsize=(8.0, 5.6), layout="constrained")
     mu, e = np.linspace(1e-4, 0.0485, 400), np.linspace(0.0, 0.92, 300)
-    ds = survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="mu"), e=xr.DataArray(e, dims="e"))
-    axes.contourf(mu, e, (ds.verdict == 1).transpose("e", "mu"), levels=[0.5, 1.5], colors=["#dbe9f4"])
+    ds = survey.evaluate(
+        "libration_elliptic", mu=xr.DataArray(mu, dims="mu"), e=xr.DataArray(e, dims="e")
+    )
+    axes.contourf(
+        mu, e, (ds.verdict == 1).transpose("e", "mu"), levels=[0.5, 1.5], colors=["#dbe9f4"]
+    )
     colors, ends = {HARMLESS: "0.6", STABLE: "tab:blue", UNSTABLE: "tab:orange", OPEN: "black"}, []
     for k, up in dict.fromkeys((row[0], row[-1]) for row in found):
         own = sorted((row for row in found if (row[0], row[-1]) == (k, up)), key=lambda row: row[1])
         for one in own:
-            after = [two for two in own if 0.0 < two[1] - one[1] < 0.03 and abs(two[2] - one[2]) < 0.0015]
+            after = [
+                two for two in own if 0.0 < two[1] - one[1] < 0.03 and abs(two[2] - one[2]) < 0.0015
+            ]
             for two in sorted(after, key=lambda two, one=one: abs(two[2] - one[2]))[:1]:
                 what = two[3] if one[1] == 0.0 else one[3]
                 axes.plot([one[2], two[2]], [one[1], two[1]], color=colors[what], linewidth=1.4)

@@ -1,13 +1,15 @@
-r"""Planar Lyapunov orbits about L1 of the restricted problem of three bodies: are they stable out of the plane?
+r"""Planar Lyapunov orbits about L1 of the restricted problem of three bodies: are they stable out
+of the plane?
 
 In the rotating frame, the primaries of masses $1 - \mu$ and $\mu$ at $x = -\mu$ and $1 - \mu$,
 
 $$\ddot x - 2\dot y = \Omega_x,\quad \ddot y + 2\dot x = \Omega_y,\quad \ddot z = \Omega_z,\qquad
 \Omega = \tfrac12 (x^2 + y^2) + \frac{1 - \mu}{r_1} + \frac{\mu}{r_2}.$$
 
-The orbits cross the x axis at right angles, on the side of the smaller primary at $x = x_{L1} + a\gamma$, $\gamma$ its
-distance from L1: $a$ goes from 0 to a collision at 1. In the plane all of them near L1 are unstable, by multipliers of
-thousands. Out of it the first loss of stability, by a multiplier 1, is where halo orbits branch off.
+The orbits cross the x axis at right angles, on the side of the smaller primary at $x = x_{L1} +
+a\gamma$, $\gamma$ its distance from L1: $a$ goes from 0 to a collision at 1. In the plane all of
+them near L1 are unstable, by multipliers of thousands. Out of it the first loss of stability, by a
+multiplier 1, is where halo orbits branch off.
 """
 
 from math import nan, pi, sqrt
@@ -45,7 +47,9 @@ def distance(mu):
 
 
 def START(p):
-    """The linear motion about L1; where it is no guess of the period, NaN: orbits are followed from small ones."""
+    """The linear motion about L1; where it is no guess of the period, NaN: orbits are followed from
+    small ones.
+    """
     mu, a = p
     g = distance(mu)
     c = (1 - mu) / (1 - g) ** 3 + mu / g**3

@@ -1,10 +1,12 @@
-"""Meissner's equation, a square wave: y'' + (a + q sgn(cos 2u)) y = 0, with its share `duty` of the period at a + q.
+"""Meissner's equation, a square wave: y'' + (a + q sgn(cos 2u)) y = 0, with its share `duty` of the
+period at a + q.
 
-Parameters, in order: a (mean value where duty is one half), q (half the jump), duty (0 < duty < 1, by default 1/2).
+Parameters, in order: a (mean value where duty is one half), q (half the jump), duty (0 < duty < 1,
+by default 1/2).
 
-Known: with s = sqrt(a + q) duty pi, r = sqrt(a - q) (1 - duty) pi, the discriminant is
-D = 2 cos s cos r - (sqrt((a + q) / (a - q)) + sqrt((a - q) / (a + q))) sin s sin r. Gaps close, and all solutions
-coexist, where sin s = sin r = 0.
+Known: with s = sqrt(a + q) duty pi, r = sqrt(a - q) (1 - duty) pi, the discriminant is D = 2 cos s
+cos r - (sqrt((a + q) / (a - q)) + sqrt((a - q) / (a + q))) sin s sin r. Gaps close, and all
+solutions coexist, where sin s = sin r = 0.
 """
 
 from math import pi

@@ -1,9 +1,11 @@
-"""Which model, and why it suffices: the full models, integrated without any reduction, beside the scenes.
+"""Which model, and why it suffices: the full models, integrated without any reduction, beside the
+scenes.
 
     python workflows/models.py [-o results] [--points 2000]
 
-Needs scipy: pip install -e ".[test]". The full models are integrated by DOP853 with fixed steps, many points side by
-side; what a small deviation does is their derivative, by a complex step (no difference is taken, nothing cancels).
+Needs scipy: pip install -e ".[test]". The full models are integrated by DOP853 with fixed steps,
+many points side by side; what a small deviation does is their derivative, by a complex step (no
+difference is taken, nothing cancels).
 """
 
 import time
@@ -38,21 +40,32 @@ def integrate(slope, state, span, steps):
     for i in range(steps):
         slopes = []
         for j in range(STAGES):
-            at = state + h * sum((a * k for a, k in zip(tableau.A[j, :j], slopes, strict=True) if a), 0.0 * state)
+            at = state + h * sum(
+                (a * k for a, k in zip(tableau.A[j, :j], slopes, strict=True) if a), 0.0 * state
+            )
             slopes.append(slope((i + tableau.C[j]) * h, at))
         state = state + h * sum(b * k for b, k in zip(tableau.B, slopes, strict=True) if b)
     return state
 
 
 def satellite(number, rng):
-    """The axis e on the sphere, e'' = -|e'|^2 e + 3 (Iz - I)/I (r.e) ((r.e) e - r), r the vertical, in orbital time."""
-    alpha = np.where(rng.random(number) < 0.5, rng.uniform(0.0, 0.95, number), rng.uniform(1.05, 2.0, number))
-    k = np.where(rng.random(number) < 0.5, rng.uniform(0.05, 0.95, number), rng.uniform(1.05, 4.0, number))
+    """The axis e on the sphere, e'' = -|e'|^2 e + 3 (Iz - I)/I (r.e) ((r.e) e - r), r the vertical,
+    in orbital time.
+    """
+    alpha = np.where(
+        rng.random(number) < 0.5, rng.uniform(0.0, 0.95, number), rng.uniform(1.05, 2.0, number)
+    )
+    k = np.where(
+        rng.random(number) < 0.5, rng.uniform(0.05, 0.95, number), rng.uniform(1.05, 4.0, number)
+    )
     sense = np.where((k > 1) & (rng.random(number) < 0.5), -1.0, 1.0)
     rho = 1 / np.sqrt(3 * abs(1 - alpha))
     rate = 1 + sense * k / rho  # of the axis at x = 0, in space
-    turn = np.where(k < 1, 4 * ellipk(np.minimum(k, 1) ** 2), 2 * ellipk(1 / np.maximum(k, 1) ** 2) / k)
-    at = np.where(alpha < 1, 0.0, 1.0)  # x = 0: the axis on the vertical, or on the tangent of the orbit
+    turn = np.where(
+        k < 1, 4 * ellipk(np.minimum(k, 1) ** 2), 2 * ellipk(1 / np.maximum(k, 1) ** 2) / k
+    )
+    # x = 0: the axis on the vertical, or on the tangent of the orbit
+    at = np.where(alpha < 1, 0.0, 1.0)
     start = np.array([1 - at, at, 0 * at, -at * rate, (1 - at) * rate, 0 * at])
 
     def slope(t, y):
@@ -68,8 +81,12 @@ def satellite(number, rng):
         y[across] += 1j * TINY
         trace = trace + integrate(slope, y, turn * rho, 1600)[across].imag / TINY
     full = time.process_time() - clock
-    ds, reduced = timed("satellite", k=along(k), rho=along(sense * rho), variables=["discriminant"], body="prolate")
-    oblate, more = timed("satellite", k=along(k), rho=along(sense * rho), variables=["discriminant"], body="oblate")
+    ds, reduced = timed(
+        "satellite", k=along(k), rho=along(sense * rho), variables=["discriminant"], body="prolate"
+    )
+    oblate, more = timed(
+        "satellite", k=along(k), rho=along(sense * rho), variables=["discriminant"], body="oblate"
+    )
     found = np.where(alpha < 1, ds.discriminant.values, oblate.discriminant.values)
     return row(
         "`satellite`", "the axis on the sphere, two deviations across the plane", "trace over a period", number,
@@ -80,13 +97,21 @@ def satellite(number, rng):
 def gyrostat(number, rng):
     """The six equations in a body that the reduced motion leaves free: the scene's method `full`."""
     number = max(number // 20, 20)
-    system = {name: along(rng.uniform(-1, 1, number)) for name in ("b12", "b31", "d", "c23", "s2", "s3")}
-    system |= {"phi0": along(rng.uniform(0, 6, number)), "w0": along(rng.uniform(-2, 2, number)), "t": 5.0}
+    system = {
+        name: along(rng.uniform(-1, 1, number)) for name in ("b12", "b31", "d", "c23", "s2", "s3")
+    }
+    system |= {
+        "phi0": along(rng.uniform(0, 6, number)),
+        "w0": along(rng.uniform(-2, 2, number)),
+        "t": 5.0,
+    }
     asked = {"question": "trajectory", "variables": ["phi", "w"], **system}
     ds, reduced = timed("gyrostat", **asked)
     whole, full = timed("gyrostat", method="full", **asked)
     off = np.maximum(abs(ds.phi - whole.phi), abs(ds.w - whole.w)).values
-    return row("`gyrostat`", "equations (1)-(6)", "angle and rate at t = 5", number, off, full, reduced)
+    return row(
+        "`gyrostat`", "equations (1)-(6)", "angle and rate at t = 5", number, off, full, reduced
+    )
 
 
 def brun(number, rng):
@@ -98,11 +123,15 @@ def brun(number, rng):
         "p_theta0": rng.uniform(0.2, 1.0, number), "p_psi": rng.uniform(0.6, 2, number),
         "p_phi": rng.uniform(-0.5, 0.5, number),
     }  # fmt: skip
-    ds, reduced = timed("brun", **{n: along(v) for n, v in state.items()}, variables=["period", "precession"])
+    ds, reduced = timed(
+        "brun", **{n: along(v) for n, v in state.items()}, variables=["period", "precession"]
+    )
     tensor = np.array([a, a, c])
     sin, cos = np.sin(state["theta0"]), np.cos(state["theta0"])
     # phi = psi = 0: nodes along body axis 1; the fixed horizontal axis is that of the nodes
-    momentum = np.array([state["p_theta0"], (state["p_psi"] - state["p_phi"] * cos) / sin, state["p_phi"]])
+    momentum = np.array(
+        [state["p_theta0"], (state["p_psi"] - state["p_phi"] * cos) / sin, state["p_phi"]]
+    )
     start = np.concatenate([momentum, [0 * sin, sin, cos], [1 + 0 * sin, 0 * sin, 0 * sin]])
 
     def slope(t, y):
@@ -116,16 +145,25 @@ def brun(number, rng):
     end = integrate(slope, start, ds.period.values, 600)
     full = time.process_time() - clock
     g, x = end[3:6], end[6:]
-    nodes = np.array([g[1], -g[0], 0 * g[0]]) / np.hypot(g[0], g[1])  # from the fixed axis x by psi about g
+    # from the fixed axis x by psi about g
+    nodes = np.array([g[1], -g[0], 0 * g[0]]) / np.hypot(g[0], g[1])
     psi = np.arctan2((np.cross(x, nodes, axis=0) * g).sum(0), (x * nodes).sum(0))
     off = abs(np.angle(np.exp(1j * (psi - ds.precession.values)))) + abs(g[2] - cos)
     return row(
-        "`brun`", "Euler and Poisson, 9 equations", "precession and theta after a period", number, off, full, reduced
+        "`brun`",
+        "Euler and Poisson, 9 equations",
+        "precession and theta after a period",
+        number,
+        off,
+        full,
+        reduced,
     )
 
 
 def libration_elliptic(number, rng):
-    """The elliptic problem in pulsating axes: x'' - 2 y' = r Om_x, y'' + 2 x' = r Om_y, z'' + z = r Om_z, about L4."""
+    """The elliptic problem in pulsating axes: x'' - 2 y' = r Om_x, y'' + 2 x' = r Om_y, z'' + z = r
+    Om_z, about L4.
+    """
     number = max(number // 10, 50)
     mu, e = rng.uniform(1e-3, 0.05, number), rng.uniform(0.0, 0.8, number)
     ds, reduced = timed("libration_elliptic", mu=along(mu), e=along(e), variables=["a", "b"])
@@ -145,7 +183,9 @@ def libration_elliptic(number, rng):
     for j, column in enumerate(planar):
         y = np.concatenate([point, 0 * point]).astype(complex)
         y[column] += 1j * TINY
-        matrix[:, j] = integrate(slope, y, np.full(number, 2 * np.pi), 1500)[list(planar)].imag / TINY
+        matrix[:, j] = (
+            integrate(slope, y, np.full(number, 2 * np.pi), 1500)[list(planar)].imag / TINY
+        )
     full = time.process_time() - clock
     trace = np.trace(matrix)
     second = 0.5 * (trace**2 - np.einsum("ijn,jin->n", matrix, matrix))
@@ -164,10 +204,16 @@ def gyrostat_body(number, rng):
     for name in "ABC":
         half = rng.uniform(-0.4, 0.4, (3, 3, number))
         tensors[name] = half + half.swapaxes(0, 1)
-    tensors["A"] = 0.2 * tensors["A"] + np.array([1.0, 1.5, 2.0])[:, None, None] * np.eye(3)[:, :, None]
+    tensors["A"] = (
+        0.2 * tensors["A"] + np.array([1.0, 1.5, 2.0])[:, None, None] * np.eye(3)[:, :, None]
+    )
     moment, s, w, nu = rng.uniform(-0.5, 0.5, (4, 3, number))
     nu = nu / np.sqrt((nu * nu).sum(0))
-    body = {f"{name}{key}": along(of[int(key[0]) - 1, int(key[1]) - 1]) for name, of in tensors.items() for key in KEYS}
+    body = {
+        f"{name}{key}": along(of[int(key[0]) - 1, int(key[1]) - 1])
+        for name, of in tensors.items()
+        for key in KEYS
+    }
     for name, vector in (("lambda", moment), ("s", s), ("omega", w), ("gamma", nu)):
         body |= {f"{name}{i + 1}": along(vector[i]) for i in range(3)}
     ds, reduced = timed("gyrostat_body", question="trajectory", t=5.0, **body)
@@ -178,7 +224,9 @@ def gyrostat_body(number, rng):
 
     def slope(t, y):
         w, nu = y[:3], y[3:]
-        torque = np.cross(by(tensors["A"], w) + moment, w, axis=0) + np.cross(by(tensors["B"], w), nu, axis=0)
+        torque = np.cross(by(tensors["A"], w) + moment, w, axis=0) + np.cross(
+            by(tensors["B"], w), nu, axis=0
+        )
         torque = torque + np.cross(nu, by(tensors["C"], nu), axis=0) + np.cross(s, nu, axis=0)
         return np.concatenate([by(inverse, torque), np.cross(nu, w, axis=0)])
 
@@ -187,18 +235,37 @@ def gyrostat_body(number, rng):
     full = time.process_time() - clock
     off = np.max([abs(ds[name].values - x) for name, x in zip(BODY, end, strict=True)], axis=0)
     return row(
-        "`gyrostat_body`", "equations (1)-(6), by another program", "w and nu at t = 5", number, off, full, reduced
+        "`gyrostat_body`",
+        "equations (1)-(6), by another program",
+        "w and nu at t = 5",
+        number,
+        off,
+        full,
+        reduced,
     )
 
 
 def gyrostat_integrable(number, rng):
-    """The flow on the cylinder where b = 0: A11 phi'' = (C33 - C22) sin 2 phi / 2 - C23 cos 2 phi + S2 cos - S3 sin."""
+    """The flow on the cylinder where b = 0: A11 phi'' = (C33 - C22) sin 2 phi / 2 - C23 cos 2 phi +
+    S2 cos - S3 sin.
+    """
     number = max(number // 10, 50)
     a11 = rng.uniform(0.5, 2.0, number)
     c22, c33, c23, s2, s3 = rng.uniform(-1.0, 1.0, (5, number))
     phi0, w0 = rng.uniform(0.0, 6.0, number), rng.uniform(3.0, 5.0, number)  # it turns for ever
-    given = {"A11": a11, "C22": c22, "C33": c33, "C23": c23, "S2": s2, "S3": s3, "phi0": phi0, "w0": w0}
-    asked = {"case": "elliptic", "t": 5.0, "variables": ["phi", "w"]} | {name: along(v) for name, v in given.items()}
+    given = {
+        "A11": a11,
+        "C22": c22,
+        "C33": c33,
+        "C23": c23,
+        "S2": s2,
+        "S3": s3,
+        "phi0": phi0,
+        "w0": w0,
+    }
+    asked = {"case": "elliptic", "t": 5.0, "variables": ["phi", "w"]} | {
+        name: along(v) for name, v in given.items()
+    }
     ds, reduced = timed("gyrostat_integrable", **asked)
 
     def slope(t, y):
@@ -211,7 +278,13 @@ def gyrostat_integrable(number, rng):
     full = time.process_time() - clock
     off = np.maximum(abs(ds.phi.values - end[0]), abs(ds.w.values - end[1]))
     return row(
-        "`gyrostat_integrable`", "the flow on the cylinder", "angle and rate at t = 5", number, off, full, reduced
+        "`gyrostat_integrable`",
+        "the flow on the cylinder",
+        "angle and rate at t = 5",
+        number,
+        off,
+        full,
+        reduced,
     )
 
 
@@ -232,11 +305,21 @@ def mathieu(number, rng):
         trace = trace + integrate(slope, y, np.full(number, np.pi), 600)[i].imag / TINY
     full = time.process_time() - clock
     off = abs(trace - ds.discriminant.values) / (1 + abs(trace))
-    return row("`mathieu`", "a pendulum on a moving support", "trace over a period", number, off, full, reduced)
+    return row(
+        "`mathieu`",
+        "a pendulum on a moving support",
+        "trace over a period",
+        number,
+        off,
+        full,
+        reduced,
+    )
 
 
 def libration(number, rng):
-    """The spatial circular problem about L4: the frequencies of what is small, from the flow over a unit of time."""
+    """The spatial circular problem about L4: the frequencies of what is small, from the flow over a
+    unit of time.
+    """
     number = max(number // 10, 50)
     mu = rng.uniform(1e-3, 0.038, number)
     ds, reduced = timed("libration", mu=along(mu))
@@ -267,7 +350,16 @@ def libration(number, rng):
 
 KEYS = ("11", "22", "33", "12", "23", "31")
 BODY = ("w1", "w2", "w3", "nu1", "nu2", "nu3")
-CHECKS = (satellite, mathieu, gyrostat, gyrostat_body, gyrostat_integrable, brun, libration, libration_elliptic)
+CHECKS = (
+    satellite,
+    mathieu,
+    gyrostat,
+    gyrostat_body,
+    gyrostat_integrable,
+    brun,
+    libration,
+    libration_elliptic,
+)
 
 
 def along(values):

@@ -1,10 +1,11 @@
-"""Frames a second of a shared page while it is moved and zoomed, in headless Chromium; and how soon it is sharp.
+"""Frames a second of a shared page while it is moved and zoomed, in headless Chromium; and how soon
+it is sharp.
 
     survey share results/satellite_prolate_small.nc -o map.html
     python workflows/page_frames.py map.html --size 3840x2160
 
-A frame is a call of requestAnimationFrame, in which the view changes; the browser's compositor draws each. Needs
-selenium, and Chromium with its driver (Debian: chromium chromium-driver).
+A frame is a call of requestAnimationFrame, in which the view changes; the browser's compositor
+draws each. Needs selenium, and Chromium with its driver (Debian: chromium chromium-driver).
 """
 
 import argparse
@@ -88,7 +89,9 @@ def main():
     with viewer.browser(f"--window-size={given.size.replace('x', ',')}") as driver:
         driver.set_script_timeout(120)
         driver.get(f"file://{given.path.resolve()}")
-        while not driver.execute_script("return typeof idle == 'function' && model !== null && idle()"):
+        while not driver.execute_script(
+            "return typeof idle == 'function' && model !== null && idle()"
+        ):
             time.sleep(0.1)
         size = driver.execute_script("return [plot.box.width, plot.box.height, devicePixelRatio]")
         print(f"plot of {size[0]} x {size[1]} pixels in a window of {given.size}")

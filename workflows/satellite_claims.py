@@ -2,8 +2,9 @@
 
     python workflows/satellite_claims.py [-o results]
 
-Needs scipy: pip install -e ".[test]". The corrections are derived in survey/scenes/satellite.md; here they and the
-printed ones are checked against the rigid body itself: Euler's equations with direction cosines and gravity gradient.
+Needs scipy: pip install -e ".[test]". The corrections are derived in survey/scenes/satellite.md;
+here they and the printed ones are checked against the rigid body itself: Euler's equations with
+direction cosines and gravity gradient.
 """
 
 # ruff: noqa: E501  (the rows of the page's tables)
@@ -27,19 +28,24 @@ CASES = (
     ("oblate", 0.3, 0.9), ("oblate", 0.6, 1.1), ("oblate", 0.9, 0.65),
     ("prolate", 1.2, 0.69), ("prolate", 1.2, -0.69), ("oblate", 1.6, 0.8), ("oblate", 1.6, -0.8),
 )  # fmt: skip
-IT, IZ, W0, WZ = 1.3, 0.5, 0.7, 0.6  # a body, its orbital rate and its spin; none is 1, or a missing factor would hide
+# a body, its orbital rate and its spin; none is 1, or a missing factor would hide
+IT, IZ, W0, WZ = 1.3, 0.5, 0.7, 0.6
 START = (0.4, 0.3, 0.5, -0.4)  # x, y and their derivatives by tau
 STEP = 1e-25  # of complex-step derivatives: exact to rounding
 
 
 def rigid_body(t, state, inertia, w0):
-    """Euler's equations with the gravity-gradient torque; the body's axes, resolved in space; motions side by side."""
+    """Euler's equations with the gravity-gradient torque; the body's axes, resolved in space;
+    motions side by side.
+    """
     axes, (p, q, r) = np.split(state.reshape(12, -1), [9])
     axes = axes.reshape(3, 3, -1)
     a, b, c = np.cos(w0 * t) * axes[:, 0] + np.sin(w0 * t) * axes[:, 1]
     first, second, third = inertia
     pull = 3 * w0 * w0
-    turned = np.stack([r * axes[1] - q * axes[2], p * axes[2] - r * axes[0], q * axes[0] - p * axes[1]])
+    turned = np.stack(
+        [r * axes[1] - q * axes[2], p * axes[2] - r * axes[0], q * axes[0] - p * axes[1]]
+    )
     spun = np.stack([
         (second - third) * (q * r - pull * b * c) / first,
         (third - first) * (r * p - pull * c * a) / second,
@@ -51,10 +57,12 @@ def rigid_body(t, state, inertia, w0):
 def body_trace(body, k, rho, tolerance=1e-13):
     """Trace of the out-of-plane monodromy of the rigid body, by complex steps off its planar motion."""
     alpha = 1 + (1 if body == "oblate" else -1) / (3 * rho * rho)
-    # at u = 0 the axis is on the vertical, or (oblate) on the tangent; the first axis is the orbit's normal
+    # at u = 0 the axis is on the vertical, or (oblate) on the tangent; the first axis is the
+    # orbit's normal
     third = np.array([1.0, 0, 0]) if body == "prolate" else np.array([0, 1.0, 0])
     axes = np.array([[0, 0, 1.0], np.cross(third, [0, 0, 1.0]), third])
-    tilt = np.array([-axes[2], 0 * third, axes[0]])  # the change of the axes in a turn about the second
+    # the change of the axes in a turn about the second
+    tilt = np.array([-axes[2], 0 * third, axes[0]])
     state = np.zeros((12, 2), complex)
     state[:9, 0], state[:9, 1] = (axes + 1j * STEP * tilt).ravel(), axes.ravel()
     state[9], state[10, 1] = 1 + k / rho, 1j * STEP
@@ -88,22 +96,30 @@ def hill_trace(k, rho, c, tolerance=1e-12):
         w = rate(u, k)
         return [state[2], state[3], *(-(2 * w * w + 2 * rho * w + rho * rho + c) * state[:2])]
 
-    end = solve_ivp(equations, (0, period(k)), [1, 0, 0, 1], "DOP853", rtol=tolerance, atol=tolerance).y[:, -1]
+    end = solve_ivp(
+        equations, (0, period(k)), [1, 0, 0, 1], "DOP853", rtol=tolerance, atol=tolerance
+    ).y[:, -1]
     return end[0] + end[3]
 
 
 def traces():
-    """The cases' traces: rigid body, survey, the printed z, and the printed z with only its constant corrected."""
+    """The cases' traces: rigid body, survey, the printed z, and the printed z with only its
+    constant corrected.
+    """
     rows = []
     for body, k, rho in CASES:
-        known = float(survey.evaluate("satellite", k=k, rho=rho, body=body, rtol=1e-13).discriminant)
+        known = float(
+            survey.evaluate("satellite", k=k, rho=rho, body=body, rtol=1e-13).discriminant
+        )
         wrong = hill_trace(k, -rho, k * k), hill_trace(k, -rho, constant(body, k))
         rows.append((body, k, rho, body_trace(body, k, rho), known, *wrong))
     return rows
 
 
 def samples(count=1000, seed=1):
-    """Random bodies, orbits, spins and states: a dictionary of columns; x, y as in the paper, and their rates."""
+    """Random bodies, orbits, spins and states: a dictionary of columns; x, y as in the paper, and
+    their rates.
+    """
     random = np.random.default_rng(seed)
     low = dict(I=0.5, Iz=0.2, w0=0.3, wz=-1, x=-np.pi, y=-1.5, dx=-1.5, dy=-1.5, phi=-np.pi)
     high = dict(I=2, Iz=2, w0=1.5, wz=1, x=np.pi, y=1.5, dx=1.5, dy=1.5, phi=np.pi)
@@ -145,12 +161,19 @@ def printed_lagrangian(s, corrected):
     """L in Euler's angles: as printed (T read as I, theta^2 as theta'^2), or with its brackets corrected."""
     theta, dtheta, dphi = euler(s, 1)
     total = s["dx"] + s["w0"]
-    flat, spun = dtheta**2 + (total * np.sin(theta)) ** 2, 2 * dphi * total * np.cos(theta) + dphi**2
+    flat, spun = (
+        dtheta**2 + (total * np.sin(theta)) ** 2,
+        2 * dphi * total * np.cos(theta) + dphi**2,
+    )
     up = (total * np.cos(theta)) ** 2
     energy = (
-        s["I"] / 2 * flat + s["Iz"] / 2 * (up + spun) if corrected else s["I"] / 2 * (flat + s["Iz"] / 2 * up + spun)
+        s["I"] / 2 * flat + s["Iz"] / 2 * (up + spun)
+        if corrected
+        else s["I"] / 2 * (flat + s["Iz"] / 2 * up + spun)
     )
-    return energy - 1.5 * s["w0"] ** 2 * (s["Iz"] - s["I"]) * np.sin(s["x"]) ** 2 * np.sin(theta) ** 2
+    return (
+        energy - 1.5 * s["w0"] ** 2 * (s["Iz"] - s["I"]) * np.sin(s["x"]) ** 2 * np.sin(theta) ** 2
+    )
 
 
 def routhian(s, branch, first=None, gravity=None):
@@ -205,7 +228,12 @@ def potential(x, y, misprint, h):
         ch2 = np.cosh(y) ** 2
         wave = np.cos(x) if misprint == "cos^2" else np.sin(x)
         spin = IZ * WZ * (1 if misprint == "w0" else W0)
-        inside = h + spin * np.tanh(y) - IZ * WZ**2 / 2 + (IT / 2 + 1.5 * (IT - IZ) * wave**2) * W0**2 / ch2
+        inside = (
+            h
+            + spin * np.tanh(y)
+            - IZ * WZ**2 / 2
+            + (IT / 2 + 1.5 * (IT - IZ) * wave**2) * W0**2 / ch2
+        )
         return inside / (IT * ch2)
 
     return value(x, y), value(x + 1j * STEP, y).imag / STEP, value(x, y + 1j * STEP).imag / STEP
@@ -217,7 +245,9 @@ def axis(x, y):
 
 
 def trajectory(misprint=None, orbits=1.0, tolerance=1e-12):
-    """Largest angle in degrees between the rigid body's axis and (2)'s, and Jacobi's residual, over an orbit."""
+    """Largest angle in degrees between the rigid body's axis and (2)'s, and Jacobi's residual, over
+    an orbit.
+    """
     x, y, dx, dy = START
     end = orbits * 2 * np.pi / W0
     times = np.linspace(0, end, 200)
@@ -235,7 +265,9 @@ def trajectory(misprint=None, orbits=1.0, tolerance=1e-12):
     solved = solve_ivp(point, (0, end), START, args=(misprint, h), **how).y
     chord = np.linalg.norm(axis(*solved[:2]) - true, axis=0)
     square = (solved[2] ** 2 + solved[3] ** 2) - 2 * potential(*solved[:2], misprint, h)[0]
-    return float(np.degrees(2 * np.arcsin(np.minimum(chord / 2, 1))).max()), float(abs(square).max())
+    return float(np.degrees(2 * np.arcsin(np.minimum(chord / 2, 1))).max()), float(
+        abs(square).max()
+    )
 
 
 def lyapunov(body, k, rho):
@@ -266,15 +298,24 @@ def rotations(body, size=300):
     """The map of rotations over 1/k and r = rho / k."""
     inverse = xr.DataArray((np.arange(size) + 0.5) / size, dims="inverse")
     ratio = xr.DataArray(np.linspace(-2.2, 0.4, size), dims="r")
-    ds = survey.evaluate("satellite", k=1 / inverse, rho=ratio / inverse, body=body, variables=["verdict", "lyapunov"])
+    ds = survey.evaluate(
+        "satellite",
+        k=1 / inverse,
+        rho=ratio / inverse,
+        body=body,
+        variables=["verdict", "lyapunov"],
+    )
     return classified(ds.assign_coords(inverse=inverse, r=ratio), body)
 
 
 def classified(ds, body):
-    """Add T int z, the least z, and the points that the printed criterion, and the corrected one, call stable."""
+    """Add T int z, the least z, and the points that the printed criterion, and the corrected one,
+    call stable.
+    """
     k, rho = xr.broadcast(ds.k, ds.rho)
     total, least, length, literal = (
-        xr.DataArray(v, dims=k.dims).transpose(*ds.verdict.dims) for v in lyapunov(body, k.values, rho.values)
+        xr.DataArray(v, dims=k.dims).transpose(*ds.verdict.dims)
+        for v in lyapunov(body, k.values, rho.values)
     )
     ds["total"], ds["least"] = total, least
     ds["printed"] = (least >= 0) & (total <= 4 * length**2)
@@ -353,12 +394,20 @@ def main():
         for body, k, rho, true, known, printed, sign in traces()
     ]
     say("rigid body against equations (1), (2)")
-    paths = {(name or "corrected").replace("^", ""): trajectory(name) for name in (None, "Phi", "h", "w0", "cos^2")}
+    paths = {
+        (name or "corrected").replace("^", ""): trajectory(name)
+        for name in (None, "Phi", "h", "w0", "cos^2")
+    }
     say("Lyapunov's criterion")
     maps, turns = [librations(body) for body in BODIES], [rotations(body) for body in BODIES]
     errors = {name.replace(" ", "_"): value for name, value in formula_errors().items()}
     number = [
-        [int(ds.unstable.sum()), int(ds.certified.sum()), int(ds.printed.sum()), int((ds.printed & ds.unstable).sum())]
+        [
+            int(ds.unstable.sum()),
+            int(ds.certified.sum()),
+            int(ds.printed.sum()),
+            int((ds.printed & ds.unstable).sum()),
+        ]
         for ds in maps
     ]
     cells = [" | ".join(f"{values[i]:,}" for values in number) for i in range(4)]
@@ -376,20 +425,31 @@ def main():
 
 
 def draw(maps, turns, path):
-    """Where the printed criterion is wrong (librations), and where the corrected one certifies (rotations)."""
+    """Where the printed criterion is wrong (librations), and where the corrected one certifies
+    (rotations).
+    """
     figure, panels = plt.subplots(2, 2, figsize=(10, 8.4), layout="constrained")
     colours = ListedColormap(COLOURS[:2])
     for axes, ds, body in zip(panels[0], maps, BODIES, strict=True):
         axes.pcolormesh(ds.k, ds.rho, ds.verdict.T, cmap=colours, vmin=0, vmax=1, rasterized=True)
         hatch(axes, ds.k, ds.rho, (ds.printed & ds.unstable).T, "///")
-        axes.set(title=f"librations, {body}", xlabel="modulus, $k$", ylabel=r"orbital rate over libration rate, $\rho$")
+        axes.set(
+            title=f"librations, {body}",
+            xlabel="modulus, $k$",
+            ylabel=r"orbital rate over libration rate, $\rho$",
+        )
     for axes, ds, body in zip(panels[1], turns, BODIES, strict=True):
         shown = ds.verdict.transpose("r", "inverse")
         axes.pcolormesh(ds.inverse, ds.r, shown, cmap=colours, vmin=0, vmax=1, rasterized=True)
         hatch(axes, ds.inverse, ds.r, ds.certified.transpose("r", "inverse"), "...")
-        axes.set(title=f"rotations, {body}", xlabel="$1/k$", ylabel=r"$r = \rho / k$ (negative: against the orbit)")
+        axes.set(
+            title=f"rotations, {body}",
+            xlabel="$1/k$",
+            ylabel=r"$r = \rho / k$ (negative: against the orbit)",
+        )
     handles = [
-        Patch(facecolor=colour, label=name) for colour, name in zip(COLOURS, ("unstable", "stable"), strict=False)
+        Patch(facecolor=colour, label=name)
+        for colour, name in zip(COLOURS, ("unstable", "stable"), strict=False)
     ]
     for pattern, name in (
         ("///", "unstable, printed criterion says stable"),
@@ -404,7 +464,9 @@ def draw(maps, turns, path):
 
 def hatch(axes, x, y, where, pattern):
     if where.any():
-        axes.contourf(x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[pattern])
+        axes.contourf(
+            x, y, where.astype(float), levels=[0.5, 1.5], colors="none", hatches=[pattern]
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""Critical amplitudes of the thin rod and the flat disc: where planar motions lose and regain stability out of plane.
+"""Critical amplitudes of the thin rod and the flat disc: where planar motions lose and regain
+stability out of plane.
 
     python workflows/satellite_critical_amplitudes.py [-o results]
 
@@ -29,7 +30,9 @@ CLASSES = list(hill_edges.CLASSES)
 
 @dataclass(frozen=True)
 class Case:
-    """A body (inertia ratio alpha), its librations (side 1) or rotations (side -1), with or against the orbit."""
+    """A body (inertia ratio alpha), its librations (side 1) or rotations (side -1), with or against
+    the orbit.
+    """
 
     body: str
     motion: str
@@ -49,7 +52,11 @@ class Case:
 CASES = tuple(
     Case(body, *motion[:1], alpha, *motion[1:])
     for body, alpha in (("thin rod", 0.0), ("disc", 2.0))
-    for motion in (("librations", 1), ("rotations with the orbit", -1, 1), ("rotations against the orbit", -1, -1))
+    for motion in (
+        ("librations", 1),
+        ("rotations with the orbit", -1, 1),
+        ("rotations against the orbit", -1, -1),
+    )
 )
 
 
@@ -65,23 +72,31 @@ class Edge:
 
 
 def edges(case, panels=8):
-    """All edges of the case, from the mildest motion on; two rows, the second of a slightly different body."""
+    """All edges of the case, from the mildest motion on; two rows, the second of a slightly
+    different body.
+    """
     alpha = np.array([case.alpha, case.alpha + np.sign(1 - case.alpha) * MOVED])
 
     def solve(row, x, wanted):
         request = Request({"direction": str(case.direction)}, "auto", 1e-13, frozenset(wanted))
-        return satellite.solve({"inertia_ratio": alpha[row][:, None], "one_minus_k": case.one_minus_k(x)}, request)
+        return satellite.solve(
+            {"inertia_ratio": alpha[row][:, None], "one_minus_k": case.one_minus_k(x)}, request
+        )
 
     found = hill_edges.find(solve, alpha.size, *case.range, panels)
     own, other = (found.row == 0), (found.row == 1)
     if not found.complete.all() or list(found.index[own]) != list(found.index[other]):
-        raise SystemExit(f"satellite_critical_amplitudes: {case.body}, {case.motion}: an edge is missing")
+        raise SystemExit(
+            f"satellite_critical_amplitudes: {case.body}, {case.motion}: an edge is missing"
+        )
     # rho is the square root of 1 / 3 |1 - alpha|, so it moves by half as much
     slope = abs(found.position[other] - found.position[own]) / (0.5 * MOVED)
     error = found.error[own] + slope * RHO_ROUNDING + 1e-15  # the last for exp
     return [
         Edge(x, np.exp(-x), e, CLASSES[kind], index)
-        for x, e, kind, index in zip(found.position[own], error, found.kind[own], found.index[own], strict=True)
+        for x, e, kind, index in zip(
+            found.position[own], error, found.kind[own], found.index[own], strict=True
+        )
     ]
 
 
@@ -201,7 +216,11 @@ def growth_line(case, first, last):
     x, value = largest(case, first.x, last.x)
     short = np.exp(-x)
     left = rest(short)
-    position = f"{90 - np.degrees(left):.5f} | {left:.5e}" if case.side > 0 else f"{1 + short:.7f} | {short:.5e}"
+    position = (
+        f"{90 - np.degrees(left):.5f} | {left:.5e}"
+        if case.side > 0
+        else f"{1 + short:.7f} | {short:.5e}"
+    )
     return f"| {first.index} | {value:.10f} | {position} |"
 
 
@@ -213,7 +232,10 @@ def upward(error):
 
 def main():
     folder = parser(__doc__, "the page and its table").parse_args().output
-    page, listed = folder / "satellite_critical_amplitudes.md", folder / "satellite_critical_amplitudes.csv"
+    page, listed = (
+        folder / "satellite_critical_amplitudes.md",
+        folder / "satellite_critical_amplitudes.csv",
+    )
     found = {}
     for case in CASES:
         say(f"{case.body}, {case.motion}")

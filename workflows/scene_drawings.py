@@ -18,7 +18,9 @@ INK, BODY, PALE, MARK = "#222222", "#b9cfe4", "#999999", "#c04010"
 
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("-o", "--output", type=Path, default=Path("results"), help="folder of the drawings")
+    words.add_argument(
+        "-o", "--output", type=Path, default=Path("results"), help="folder of the drawings"
+    )
     folder = words.parse_args().output
     for scene, draw in DRAWINGS.items():
         name = f"drawing_{scene}.png"
@@ -62,7 +64,9 @@ def satellite_triaxial():
     _line(orbit, 0.35 * _unit(40), 1.75 * at, PALE, "--")
     orbit.text(*(1.78 * at), "local vertical", color=PALE, va="top", ha="left")
     first, second = _unit(62), _unit(152)
-    corners = [at + 0.75 * i * first + 0.3 * j * second for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
+    corners = [
+        at + 0.75 * i * first + 0.3 * j * second for i, j in ((1, 1), (1, -1), (-1, -1), (-1, 1))
+    ]
     orbit.add_patch(Polygon(corners, facecolor=BODY, edgecolor=INK))
     _arrow(orbit, at, at + 1.3 * first, INK)
     orbit.text(*(at + 1.38 * first), "A", ha="center", va="bottom")
@@ -87,7 +91,9 @@ def satellite_triaxial():
 
 
 def mathieu():
-    figure, (pendulum, trap) = _panels(2, "a pendulum on a vibrating pivot", "an ion in a quadrupole (Paul) trap")
+    figure, (pendulum, trap) = _panels(
+        2, "a pendulum on a vibrating pivot", "an ion in a quadrupole (Paul) trap"
+    )
     _arrow(pendulum, (0, -0.35), (0, 0.35), MARK, "<->")
     pendulum.text(0.12, 0.2, r"$\propto\cos 2t$", color=MARK)
     bob = 1.7 * _unit(-65)
@@ -113,7 +119,9 @@ def mathieu():
 
 
 def gyrostat():
-    figure, (body, turn) = _panels(2, "the body turns about its axis 1", r"the angle $\varphi$, seen along axis 1")
+    figure, (body, turn) = _panels(
+        2, "the body turns about its axis 1", r"the angle $\varphi$, seen along axis 1"
+    )
     body.add_patch(Ellipse((0, 0), 2.2, 1.3, facecolor=BODY, edgecolor=INK))
     body.add_patch(Ellipse((-0.45, 0), 0.28, 0.8, facecolor="white", edgecolor=INK))
     body.text(-0.45, -0.74, r"rotor, $\lambda$", ha="center", va="top")
@@ -140,7 +148,9 @@ def _axes_with(axes, degrees):
 
 
 def gyrostat_body():
-    figure, (body, beside) = _panels(2, "the axis of rotation in the body", "motions beside the set")
+    figure, (body, beside) = _panels(
+        2, "the axis of rotation in the body", "motions beside the set"
+    )
     body.add_patch(Ellipse((0, 0), 2.6, 1.4, angle=20, facecolor=BODY, edgecolor=INK))
     for degrees, words in ((20, "x"), (110, "y")):
         _arrow(body, (0, 0), 1.8 * _unit(degrees), PALE)
@@ -153,7 +163,9 @@ def gyrostat_body():
     beside.fill_between(x, y - 0.03, y + 0.03, color=BODY, edgecolor=INK)
     beside.text(0, -0.45, "the set: rotation about axis 1")
     beside.plot(x, y + 0.06 * np.exp(0.45 * x) * np.cos(2 * x), color=MARK)
-    beside.text(3.4, 1.2, r"$\omega_2,\ \omega_3,\ \eta$ grow: not observable", color=MARK, ha="center")
+    beside.text(
+        3.4, 1.2, r"$\omega_2,\ \omega_3,\ \eta$ grow: not observable", color=MARK, ha="center"
+    )
     beside.set(xlim=(-0.2, 6.8), ylim=(-1.1, 1.6))
     return figure
 
@@ -163,8 +175,14 @@ def brun():
     _arrow(space, (0, 0), (0, 1.9), PALE)
     space.text(-0.08, 1.9, r"$\gamma$, to the attracting centre", ha="right", va="top", color=PALE)
     axis = _unit(55)
-    space.add_patch(Polygon([(0, 0) + 0.95 * axis + 0.45 * _unit(55 + d) for d in (90, -90)] + [(0, 0)], color=BODY))
-    space.add_patch(Ellipse(tuple(0.95 * axis), 0.9, 0.34, angle=55 - 90, facecolor="white", edgecolor=INK))
+    space.add_patch(
+        Polygon(
+            [(0, 0) + 0.95 * axis + 0.45 * _unit(55 + d) for d in (90, -90)] + [(0, 0)], color=BODY
+        )
+    )
+    space.add_patch(
+        Ellipse(tuple(0.95 * axis), 0.9, 0.34, angle=55 - 90, facecolor="white", edgecolor=INK)
+    )
     _arrow(space, (0, 0), 1.9 * axis, INK)
     space.text(*(1.95 * axis), "axis of symmetry", ha="center", va="bottom")
     _angle(space, (0, 0), 1.1, 55, 90, r"$\theta$")
@@ -175,7 +193,8 @@ def brun():
     _line(space, (-1.4, 0), (1.6, 0), PALE, "--")
     _limits(space, (-1.9, 2.1), (-0.4, 2.2))
     u = np.linspace(-1, 1, 400)
-    p = (1 - u**2) * (0.8 + u**2) - (0.3**2 + 0.5**2 - 2 * 0.3 * 0.5 * u)  # (S2): k = 1, L = 0.8, a = 0.3, b = 0.5
+    # (S2): k = 1, L = 0.8, a = 0.3, b = 0.5
+    p = (1 - u**2) * (0.8 + u**2) - (0.3**2 + 0.5**2 - 2 * 0.3 * 0.5 * u)
     well.plot(u, p, color=INK)
     well.axhline(0, color=PALE, linewidth=0.8)
     well.fill_between(u, 0, p, where=p > 0, color=BODY)
@@ -221,10 +240,20 @@ def libration():
 
 
 def libration_elliptic():
-    figure, (orbits, axes) = _panels(2, "the primaries' orbits", "in pulsating axes, their distance the unit")
+    figure, (orbits, axes) = _panels(
+        2, "the primaries' orbits", "in pulsating axes, their distance the unit"
+    )
     e, mu = 0.4, 0.25
     for size, side in ((mu, -1), (1 - mu, 1)):
-        orbits.add_patch(Ellipse((-side * size * e, 0), 2 * size, 2 * size * np.sqrt(1 - e**2), fill=False, color=PALE))
+        orbits.add_patch(
+            Ellipse(
+                (-side * size * e, 0),
+                2 * size,
+                2 * size * np.sqrt(1 - e**2),
+                fill=False,
+                color=PALE,
+            )
+        )
     f = np.radians(65)
     r = (1 - e**2) / (1 + e * np.cos(f)) * np.array([np.cos(f), np.sin(f)])
     _ball(orbits, -mu * r, 0.09, r"$1-\mu$")
@@ -249,7 +278,9 @@ def libration_elliptic():
 def _triangle(axes):
     left, right = (-0.04, 0), (0.96, 0)
     for side in (1, -1):
-        axes.add_patch(Polygon([left, right, (0.46, side * 0.866)], fill=False, color=PALE, linestyle=":"))
+        axes.add_patch(
+            Polygon([left, right, (0.46, side * 0.866)], fill=False, color=PALE, linestyle=":")
+        )
         _ball(axes, (0.46, side * 0.866), 0.035, "$L_4$" if side > 0 else "$L_5$", MARK)
     _ball(axes, left, 0.13, r"$1-\mu$")
     _ball(axes, right, 0.06, r"$\mu$")
@@ -266,7 +297,9 @@ DRAWINGS = {
 
 
 def _panels(count, *titles):
-    figure, panels = plt.subplots(1, count, figsize=(4.2 * count, 3.4), squeeze=False, layout="constrained")
+    figure, panels = plt.subplots(
+        1, count, figsize=(4.2 * count, 3.4), squeeze=False, layout="constrained"
+    )
     for axes, title in zip(panels[0], titles, strict=True):
         axes.set_axis_off()
         axes.set_title(title, fontsize=10)
@@ -305,8 +338,16 @@ def _rod(axes, at, along, half):
 
 
 def _angle(axes, at, size, start, end, words, color=MARK):
-    axes.add_patch(Arc(at, size, size, theta1=start, theta2=end, color=color, linewidth=1.5, zorder=4))
-    axes.text(*(np.array(at) + 0.62 * size * _unit((start + end) / 2)), words, color=color, ha="center", va="center")
+    axes.add_patch(
+        Arc(at, size, size, theta1=start, theta2=end, color=color, linewidth=1.5, zorder=4)
+    )
+    axes.text(
+        *(np.array(at) + 0.62 * size * _unit((start + end) / 2)),
+        words,
+        color=color,
+        ha="center",
+        va="center",
+    )
 
 
 if __name__ == "__main__":

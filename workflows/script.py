@@ -6,9 +6,13 @@ from pathlib import Path
 
 
 def parser(doc, what):
-    """Parser of a script's command line; its `output`, where `what` goes, is a folder that is made where none is."""
+    """Parser of a script's command line; its `output`, where `what` goes, is a folder that is made
+    where none is.
+    """
     words = argparse.ArgumentParser(description=doc.splitlines()[0])
-    words.add_argument("-o", "--output", default="results", metavar="DIR", type=_folder, help=f"folder for {what}")
+    words.add_argument(
+        "-o", "--output", default="results", metavar="DIR", type=_folder, help=f"folder for {what}"
+    )
     return words
 
 

@@ -1,4 +1,5 @@
-"""Ratios of speed: the time of heyoka's batch integrator over that of survey, both interleaved in one run on one core.
+"""Ratios of speed: the time of heyoka's batch integrator over that of survey, both interleaved in
+one run on one core.
 
     python workflows/speed.py [PART ...]    prints `name ratio`, and to stderr times, errors and what is below its floor
 
@@ -10,8 +11,8 @@ Times are of the processor (`time.process_time`), medians of REPEATS interleaved
 by a rounding from one to the next, so that no map is remembered. Needs heyoka; exit code 1 where a ratio is below its
 floor or an error too large.
 
-FLOORS are 0.7 of the ratios measured on an Intel Xeon (AVX-512), one thread, 2026-11-23; those of scattered points, own
-equations and edges on an AMD EPYC, 2026-11-25, the other core at work.
+FLOORS are 0.7 of the ratios measured on an Intel Xeon (AVX-512), one thread, 2026-11-23; those of
+scattered points, own equations and edges on an AMD EPYC, 2026-11-25, the other core at work.
 """
 
 import os
@@ -83,12 +84,18 @@ def z(u, p):
 
 
 class Batch:
-    """heyoka's batch integrator over many points: `run(states, parameters, spans, order)`, states at the ends."""
+    """heyoka's batch integrator over many points: `run(states, parameters, spans, order)`, states
+    at the ends.
+    """
 
     def __init__(self, equations, parameters, tolerance):
         n = len(equations)
         self.ta = hy.taylor_adaptive_batch(
-            equations, np.zeros((n, LANES)), pars=np.zeros((parameters, LANES)), tol=tolerance, fast_math=True
+            equations,
+            np.zeros((n, LANES)),
+            pars=np.zeros((parameters, LANES)),
+            tol=tolerance,
+            fast_math=True,
         )
         self.state, self.pars = self.ta.state, self.ta.pars
 
@@ -107,13 +114,17 @@ class Batch:
 
 
 class Harness:
-    """Measured ratios, printed as they come; `failed` where one is below its floor or an error is too large."""
+    """Measured ratios, printed as they come; `failed` where one is below its floor or an error is
+    too large.
+    """
 
     def __init__(self):
         self.failed = False
 
     def compare(self, name, ours, points, theirs, their_points, check=None):
-        """Print the ratio of the medians of CPU time per point; `check()` gives the larger error of both sides."""
+        """Print the ratio of the medians of CPU time per point; `check()` gives the larger error of
+        both sides.
+        """
         ours(0), theirs()
         times = [], []
         for i in range(REPEATS):
@@ -121,12 +132,19 @@ class Harness:
                 begin = time.process_time()
                 call()
                 kept.append(time.process_time() - begin)
-        mine, other = (statistics.median(kept) / n for kept, n in zip(times, (points, their_points), strict=True))
+        mine, other = (
+            statistics.median(kept) / n
+            for kept, n in zip(times, (points, their_points), strict=True)
+        )
         ratio, error = other / mine, check() if check else 0.0
         low = ratio < FLOORS.get(name, 0.0)
         print(f"{name} {ratio:.3g}", flush=True)
         words = f"    {mine * 1e6:.4g} us against {other * 1e6:.4g} us a point, error {error:.1e}"
-        print(words + (f"; BELOW ITS FLOOR {FLOORS[name]:.3g}" if low else ""), file=sys.stderr, flush=True)
+        print(
+            words + (f"; BELOW ITS FLOOR {FLOORS[name]:.3g}" if low else ""),
+            file=sys.stderr,
+            flush=True,
+        )
         self.failed |= low or not error <= WORST
 
 
@@ -144,13 +162,16 @@ def some_of(size):
 
 
 def evaluated(scene, i, given, **options):
-    return survey.evaluate(scene, **{name: moved(axis, i) for name, axis in given.items()}, **options)
+    return survey.evaluate(
+        scene, **{name: moved(axis, i) for name, axis in given.items()}, **options
+    )
 
 
 DECIDED = ("discriminant", "verdict")
 
 
-# ------------------------------------------------------------------------------------------------ Hill, satellite
+# ------------------------------------------------------------------------------------------------
+# Hill, satellite
 def satellite_equations():
     w, wp, y, v, z, u = hy.make_vars("w", "wp", "y", "v", "z", "u")
     square = w * w
@@ -163,7 +184,9 @@ def satellite_by(batch, k, rho, oblate=False):
     zero, one, short = np.zeros(k.size), np.ones(k.size), (1 - k) * (1 + k)
     span = 2 * ellipkm1(short)
     states = np.stack([np.sqrt(2) * k, zero, one, zero, zero, one])
-    parameters = np.stack([2 * k * k - 1, np.sqrt(2) * rho, rho * rho + (-k * k if oblate else short)])
+    parameters = np.stack(
+        [2 * k * k - 1, np.sqrt(2) * rho, rho * rho + (-k * k if oblate else short)]
+    )
     e = batch.run(states, parameters, span, np.argsort(span * (abs(rho) + k + 1)))
     return 2 * (e[2] * e[5] + e[3] * e[4]), e[2:]
 
@@ -185,7 +208,10 @@ def hill(harness):
                 return evaluated("satellite", i, given, variables=variables, **options)
 
             def check():
-                right, mine = satellite_by(exact, k, rho)[0], ours(0).discriminant.values.ravel()[some_of(points)]
+                right, mine = (
+                    satellite_by(exact, k, rho)[0],
+                    ours(0).discriminant.values.ravel()[some_of(points)],
+                )
                 return max(relative(mine, right), relative(theirs()[0], right))
 
             harness.compare(name + what, ours, points, theirs, k.size, check)
@@ -228,7 +254,12 @@ def mathieu(harness):
     def theirs(batch=fast):
         one, zero = np.ones(some.size), np.zeros(some.size)
         parameters = np.stack([a[some], -2 * b[some]])
-        e = batch.run(np.stack([one, zero, one, zero, zero, one]), parameters, 0.5 * np.pi * one, np.argsort(a[some]))
+        e = batch.run(
+            np.stack([one, zero, one, zero, zero, one]),
+            parameters,
+            0.5 * np.pi * one,
+            np.argsort(a[some]),
+        )
         return 2 * (e[2] * e[5] + e[3] * e[4])
 
     def ours(i):
@@ -241,7 +272,8 @@ def mathieu(harness):
     harness.compare("mathieu_scattered", ours, n, theirs, some.size, check)
 
 
-# ---------------------------------------------------------------------------------------------- a user's equation
+# ---------------------------------------------------------------------------------------------- a
+# user's equation
 def own(harness):
     """A row, a map and scattered points of one's own equation with two harmonics."""
     path = Path(harness.folder) / "two_harmonics.py"
@@ -256,7 +288,12 @@ def own(harness):
         def theirs(batch=fast):
             one, zero = np.ones(a.size), np.zeros(a.size)
             parameters = np.stack([a, b, 1.3 * one])
-            e = batch.run(np.stack([one, zero, one, zero, zero, one]), parameters, 0.5 * np.pi * one, np.argsort(a))
+            e = batch.run(
+                np.stack([one, zero, one, zero, zero, one]),
+                parameters,
+                0.5 * np.pi * one,
+                np.argsort(a),
+            )
             return 2 * (e[2] * e[5] + e[3] * e[4])
 
         def ours(i):
@@ -271,7 +308,9 @@ def own(harness):
     a, b = np.linspace(0, 25, 300), np.linspace(0, 15, 200)
     bs, as_ = (v.ravel()[some_of(60_000)] for v in np.meshgrid(b, a, indexing="ij"))
     row = np.linspace(0, 25, 10_000)
-    case("own_hill_row", {"a": row}, row.size, row[some_of(row.size)], np.full(row.size, 3.0), q=3.0)
+    case(
+        "own_hill_row", {"a": row}, row.size, row[some_of(row.size)], np.full(row.size, 3.0), q=3.0
+    )
     case("own_hill_map", {"q": b, "a": a}, 60_000, as_, bs)
     case("own_hill_map_all", {"q": b, "a": a}, 60_000, as_, bs, variables=None)
     n = 30_000
@@ -291,7 +330,9 @@ def wave(harness):
         """M of half a period, from y = 1, y' = 0 and from y = 0, y' = 1: two lengths pi / 2."""
         first, second = (np.emath.sqrt(as_ + sign * bs) for sign in (1, -1))
         with np.errstate(all="ignore"):
-            (c1, s1), (c2, s2) = ((np.cos(w * np.pi / 2), np.sin(w * np.pi / 2)) for w in (first, second))
+            (c1, s1), (c2, s2) = (
+                (np.cos(w * np.pi / 2), np.sin(w * np.pi / 2)) for w in (first, second)
+            )
             y1, dy2 = c2 * c1 - s2 / second * first * s1, c2 * c1 - second * s2 * s1 / first
         return (2 * (2 * y1 * dy2 - 1)).real
 
@@ -306,7 +347,8 @@ def wave(harness):
     harness.compare("own_square_wave", ours, as_.size, theirs, as_.size, check)
 
 
-# -------------------------------------------------------------------------------------------------- tongues' edges
+# --------------------------------------------------------------------------------------------------
+# tongues' edges
 def edges(harness):
     """Edges of tongues in 500 rows, the file included, against heyoka and SciPy's vectorised root finder."""
     rows, batch = 500, Batch(satellite_equations(), 3, 1e-12)
@@ -316,7 +358,9 @@ def edges(harness):
         return satellite_by(batch, k, rho, oblate=True)[1]
 
     def theirs():
-        signs = np.sign(factors(*(v.ravel() for v in np.meshgrid(k, rho, indexing="ij"))).reshape(4, rows, -1))
+        signs = np.sign(
+            factors(*(v.ravel() for v in np.meshgrid(k, rho, indexing="ij"))).reshape(4, rows, -1)
+        )
         kind, row, at = np.nonzero(signs[:, :, 1:] != signs[:, :, :-1])
 
         def f(x, kind, k):
@@ -324,12 +368,17 @@ def edges(harness):
             return factors(k, np.ravel(x))[kind.astype(int), np.arange(x.size)].reshape(x.shape)
 
         tolerances = {"xatol": 1e-12, "xrtol": 1e-12}
-        return np.sort(find_root(f, (rho[at], rho[at + 1]), args=(kind, k[row]), tolerances=tolerances).x)
+        return np.sort(
+            find_root(f, (rho[at], rho[at + 1]), args=(kind, k[row]), tolerances=tolerances).x
+        )
 
     def ours(i):
         path = Path(harness.folder) / f"edges_{i}.nc"
         path.unlink(missing_ok=True)
-        axes = {"k": {"values": list(moved(k, i))}, "rho": {"start": 0.57735, "stop": 3.2, "num": 2}}
+        axes = {
+            "k": {"values": list(moved(k, i))},
+            "rho": {"start": 0.57735, "stop": 3.2, "num": 2},
+        }
         return survey.run({
             "scene": "satellite", "options": {"body": "oblate"}, "boundaries": {"axis": "rho"}, "axes": axes,
             "output": {"path": str(path), "variables": ["verdict"]},
@@ -337,11 +386,13 @@ def edges(harness):
 
     a, b = np.sort(ours(0).edge_position.values), theirs()
     print(f"    edges: {a.size} against {b.size}", file=sys.stderr)
-    error = float(abs(a - b).max()) if a.size == b.size else 0.0  # narrow tongues are seen by us alone
+    # narrow tongues are seen by us alone
+    error = float(abs(a - b).max()) if a.size == b.size else 0.0
     harness.compare("tongue_edges", ours, a.size, theirs, b.size, lambda: error)
 
 
-# ------------------------------------------------------------------------------------------------------- gyrostat
+# -------------------------------------------------------------------------------------------------------
+# gyrostat
 NAMES = ("b12", "b31", "d", "c23", "s2", "s3")
 
 
@@ -352,7 +403,10 @@ def abel(harness):
     start = np.stack([rng.uniform(0, 2 * np.pi, n), rng.uniform(0.5, 3, n)])
     phi, w = hy.make_vars("phi", "w")
     s, c = hy.sin(phi), hy.cos(phi)  # in axes turned so that c23 = 0: the cheapest for heyoka
-    equations = [(phi, w), (w, (PAR[0] * c - PAR[1] * s) * w - PAR[2] * (c * s) + PAR[3] * c - PAR[4] * s)]
+    equations = [
+        (phi, w),
+        (w, (PAR[0] * c - PAR[1] * s) * w - PAR[2] * (c * s) + PAR[3] * c - PAR[4] * s),
+    ]
     turn = -0.5 * np.arctan2(2 * p[3], p[2])
     ca, sa = np.cos(turn), np.sin(turn)
     turned = np.stack([p[0] * ca - p[1] * sa, p[0] * sa + p[1] * ca, np.hypot(p[2], 2 * p[3]),
@@ -361,7 +415,8 @@ def abel(harness):
     order = np.argsort(abs(turned).sum(0) + abs(start[1]))
     fast, exact = Batch(equations, 5, 1e-12), Batch(equations, 5, 1e-17)
     given = {
-        name: xr.DataArray(values, dims="p") for name, values in zip((*NAMES, "phi0", "w0"), (*p, *start), strict=True)
+        name: xr.DataArray(values, dims="p")
+        for name, values in zip((*NAMES, "phi0", "w0"), (*p, *start), strict=True)
     }
 
     def theirs(batch=fast):
@@ -369,11 +424,15 @@ def abel(harness):
         return np.stack([ends[0] + turn, ends[1]])
 
     def ours(t=20.0, given=given):
-        return survey.evaluate("gyrostat", question="trajectory", t=t, rtol=1e-7, variables=["phi", "w"], **given)
+        return survey.evaluate(
+            "gyrostat", question="trajectory", t=t, rtol=1e-7, variables=["phi", "w"], **given
+        )
 
     def check():
         right, ds = theirs(exact), ours()
-        return max(relative(np.stack([ds.phi.values, ds.w.values]), right), relative(theirs(), right))
+        return max(
+            relative(np.stack([ds.phi.values, ds.w.values]), right), relative(theirs(), right)
+        )
 
     harness.compare("gyrostat_trajectory", lambda i: ours(), n, theirs, n, check)
     times, few = np.linspace(0, 20, 201), 1024
@@ -394,10 +453,18 @@ def abel(harness):
     def difference():
         return relative(ours(times[1:], part).phi.transpose("t", "p").values, dense())
 
-    harness.compare("gyrostat_200_times", lambda i: ours(times[1:], part), 200 * few, dense, 200 * few, difference)
+    harness.compare(
+        "gyrostat_200_times",
+        lambda i: ours(times[1:], part),
+        200 * few,
+        dense,
+        200 * few,
+        difference,
+    )
 
 
-# ---------------------------------------------------------------------------------------------------------- Danby
+# ----------------------------------------------------------------------------------------------------------
+# Danby
 def danby(harness):
     """A map of the elliptic restricted problem's triangular points."""
     mu, e = np.linspace(1e-4, 0.05, 600), np.linspace(1e-3, 0.7, 400)
@@ -408,7 +475,12 @@ def danby(harness):
     r = 1.0 / (1.0 + PAR[0] * c)
     equations = [(c, -s), (s, c)]
     for x, q, p, m in (y[i : i + 4] for i in range(0, 16, 4)):
-        equations += [(x, p - m), (q, m - p - PAR[2] * (r * m)), (p, PAR[1] * (r * x) - (x - q)), (m, x - q)]
+        equations += [
+            (x, p - m),
+            (q, m - p - PAR[2] * (r * m)),
+            (p, PAR[1] * (r * x) - (x - q)),
+            (m, x - q),
+        ]
     fast, exact = (Batch(equations, 3, tol) for tol in (5e-10, 1e-16))
     root = np.sqrt(1 - 3 * ms * (1 - ms))
     parameters = np.stack([es, 1.5 * (1 + root), 1.5 * (3 * ms * (1 - ms)) / (1 + root)])
@@ -431,7 +503,8 @@ def danby(harness):
     harness.compare("danby_map", ours, mu.size * e.size, theirs, es.size, check)
 
 
-# ----------------------------------------------------------------------------------------------------------- Brun
+# -----------------------------------------------------------------------------------------------------------
+# Brun
 def brun(harness):
     """Period, precession and spin of Brun's problem; heyoka is given the period."""
     n, rng = 60_000, np.random.default_rng(1)
@@ -446,12 +519,23 @@ def brun(harness):
     def ours(i, variables=("period", "precession", "spin", "verdict")):
         return survey.evaluate("brun", variables=variables, **given)
 
-    answer = {name: v.values for name, v in ours(0, ("period", "precession", "u_min", "u_max")).items()}
+    answer = {
+        name: v.values for name, v in ours(0, ("period", "precession", "u_min", "u_max")).items()
+    }
     u, v, psi, phi = hy.make_vars("u", "v", "psi", "phi")
     up, down = PAR[3] / (1.0 - u), PAR[4] / (1.0 + u)
-    equations = [(u, v), (v, PAR[2] + u * (PAR[1] - PAR[0] * u * u)), (psi, up + down), (phi, down - up)]
+    equations = [
+        (u, v),
+        (v, PAR[2] + u * (PAR[1] - PAR[0] * u * u)),
+        (psi, up + down),
+        (phi, down - up),
+    ]
     a, b, p = (body[name] / body["A"] for name in ("p_phi", "p_psi", "p_theta0"))
-    cosine, sine, k = np.cos(body["theta0"]), np.sin(body["theta0"]), body["epsilon"] * (1 - body["C"] / body["A"])
+    cosine, sine, k = (
+        np.cos(body["theta0"]),
+        np.sin(body["theta0"]),
+        body["epsilon"] * (1 - body["C"] / body["A"]),
+    )
     level = p * p + ((b - a * cosine) / sine) ** 2 - k * cosine**2 + a * a
     # heyoka loses its digits near the poles: it is given the states that stay off them
     off = np.isfinite(answer["period"]) & (answer["u_max"] < 0.97) & (answer["u_min"] > -0.97)

@@ -1,4 +1,5 @@
-"""A picture of `survey view` in headless Chromium: a map with its edges, the point under the pointer, and its motion.
+"""A picture of `survey view` in headless Chromium: a map with its edges, the point under the
+pointer, and its motion.
 
     python workflows/viewer.py results/satellite_tongues.nc -o results
 
@@ -41,7 +42,17 @@ return [area.left + box.left, area.top + box.top, box.width, box.height,
 @contextlib.contextmanager
 def served(path, *options):
     """The address at which the file is served by `survey view`, and the process."""
-    command = [sys.executable, "-m", "survey", "view", str(path), "--no-browser", "--port", "0", *options]
+    command = [
+        sys.executable,
+        "-m",
+        "survey",
+        "view",
+        str(path),
+        "--no-browser",
+        "--port",
+        "0",
+        *options,
+    ]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:
         line = process.stderr.readline()
@@ -61,7 +72,11 @@ def missing():
     except ImportError:
         return "selenium (pip install selenium)"
     absent = [name for name in ("chromium", "chromedriver") if not shutil.which(name)]
-    return f"{' and '.join(absent)} (Debian: apt-get install chromium chromium-driver)" if absent else ""
+    return (
+        f"{' and '.join(absent)} (Debian: apt-get install chromium chromium-driver)"
+        if absent
+        else ""
+    )
 
 
 @contextlib.contextmanager

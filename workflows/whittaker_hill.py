@@ -1,10 +1,11 @@
 """The Whittaker-Hill equation, whose gaps coexist: y'' + (a + b cos 2u + c cos 4u) y = 0.
 
-Parameters, in order: a (eigenvalue), m and alpha, with b = 4 m alpha, c = 2 alpha^2 (Magnus and Winkler, chapter 7).
+Parameters, in order: a (eigenvalue), m and alpha, with b = 4 m alpha, c = 2 alpha^2 (Magnus and
+Winkler, chapter 7).
 
-Known: for odd m all gaps with periodic edges are closed but the first (m - 1) / 2, for even m all with antiperiodic
-edges but the first m / 2: there both classes of edges coincide, and every solution is (anti)periodic. For m = 1 the
-lowest edge is a = -2 alpha^2, with y = exp(alpha cos 2u).
+Known: for odd m all gaps with periodic edges are closed but the first (m - 1) / 2, for even m all
+with antiperiodic edges but the first m / 2: there both classes of edges coincide, and every
+solution is (anti)periodic. For m = 1 the lowest edge is a = -2 alpha^2, with y = exp(alpha cos 2u).
 """
 
 from math import cos, pi

@@ -29,14 +29,19 @@ def of_map(ds):
         raise BadInput("areas: every axis needs two values or more; remove the others with slice")
     for dim in ds.status.dims:
         if dim in ds.coords and ds[dim].dtype.kind in "iuf" and not _is_monotonic(ds[dim].values):
-            raise BadInput(f"areas: the values of {dim} must rise, or fall, without repetition: use ds.sortby")
+            raise BadInput(
+                f"areas: the values of {dim} must rise, or fall, without repetition: use ds.sortby"
+            )
     codes = flag_codes(ds.verdict.attrs)
     codes["no_answer"] = NO_ANSWER
     area, least, most = _counted(ds, list(codes.values()))
     total = area.sum()
     kept = [i for i, name in enumerate(codes) if most[i] > 0 or name == "undecided"]
     bar = np.where(most > 0, np.maximum(most - area, area - least) + 1e-13 * total, 0.0)
-    units = " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1") or "1"
+    units = (
+        " ".join(u for u in (ds[dim].attrs.get("units", "1") for dim in ds.status.dims) if u != "1")
+        or "1"
+    )
     found = _described([list(codes)[i] for i in kept], area[kept], bar[kept], total, units, COMMENT)
     found.attrs["areas"] += "; from points: features narrower than their spacing are not seen"
     if len(ds.status.dims) == 2 and _can_be_refined(ds):
@@ -60,7 +65,9 @@ def _is_monotonic(values):
 
 
 def _can_be_refined(ds):
-    """Does the scene's family support [refine]? That of a user's own scene does, which is known without running it."""
+    """Does the scene's family support [refine]? That of a user's own scene does, which is known
+    without running it.
+    """
     if "scene_hash" in ds.attrs:
         return True
     try:
@@ -80,11 +87,15 @@ def _of_cells(ds):
     values, bars = [*ds.area.values, total * undecided_share(ds)], [*bar, 1e-13 * total]
     comment = "from cells that are decided as a whole; the area of the undecided cells is the others' error bar"
     units = ds.area.attrs.get("units", "1")
-    return _described([*names, "undecided"], np.array(values), np.array(bars), total, units, comment)
+    return _described(
+        [*names, "undecided"], np.array(values), np.array(bars), total, units, comment
+    )
 
 
 def _counted(ds, codes):
-    """Area of each verdict code (each cell between neighbours is divided among its corners), and its least and most."""
+    """Area of each verdict code (each cell between neighbours is divided among its corners), and
+    its least and most.
+    """
     dims = ds.status.dims
     widths = [abs(np.diff(positions(ds[dim].values))) for dim in dims]
     rest = int(np.prod(ds.status.shape[1:]))
@@ -95,12 +106,16 @@ def _counted(ds, codes):
         verdict = ds.verdict.transpose(*dims).isel(slab).values
         state = ds.status.isel(slab).values
         verdict = np.where(
-            np.isin(state, list(status.UNANSWERED)) | ((state != status.OK) & (verdict < 0)), NO_ANSWER, verdict
+            np.isin(state, list(status.UNANSWERED)) | ((state != status.OK) & (verdict < 0)),
+            NO_ANSWER,
+            verdict,
         )
         cell = np.ones(())
         for width in [widths[0][first : first + step], *widths[1:]]:
             cell = cell[..., None] * width
-        corners = [verdict[cut] for cut in product(*[(slice(None, -1), slice(1, None))] * len(dims))]
+        corners = [
+            verdict[cut] for cut in product(*[(slice(None, -1), slice(1, None))] * len(dims))
+        ]
         for i, code in enumerate(codes):
             number = sum((corner == code).astype(np.int8) for corner in corners)
             area[i] += (cell * number).sum() / len(corners)
@@ -110,12 +125,18 @@ def _counted(ds, codes):
 
 
 def _described(names, area, bar, total, units, comment):
-    line = ", ".join(f"{n}: {percent(a / total, b / total)}" for n, a, b in zip(names, area, bar, strict=True))
+    line = ", ".join(
+        f"{n}: {percent(a / total, b / total)}" for n, a, b in zip(names, area, bar, strict=True)
+    )
     found = {}
     for name, scale, unit, long_name in (
         ("area", 1.0, units, "area of the map with this verdict"),
         ("area_fraction", total, "1", "fraction of the map's area with this verdict"),
     ):
         found[name] = ("area_verdict", area / scale, {"long_name": long_name, "units": unit})
-        found[f"{name}_error"] = ("area_verdict", bar / scale, {"long_name": f"error bound of {name}", "units": unit})
+        found[f"{name}_error"] = (
+            "area_verdict",
+            bar / scale,
+            {"long_name": f"error bound of {name}", "units": unit},
+        )
     return xr.Dataset(found, {"area_verdict": names}, {"comment": comment, "areas": line})

@@ -1,7 +1,9 @@
-"""The spot audit of `survey verify`: random points solved again by the scene's independent methods (its AUDIT).
+"""The spot audit of `survey verify`: random points solved again by the scene's independent methods
+(its AUDIT).
 
-What is the same for all methods is evaluated again by the same formula: K, L and the equilibria of a gyrostat's
-portrait, the turning points of nutations, the frequencies and resonances at L4, exact rules for marginal points.
+What is the same for all methods is evaluated again by the same formula: K, L and the equilibria of
+a gyrostat's portrait, the turning points of nutations, the frequencies and resonances at L4, exact
+rules for marginal points.
 """
 
 from functools import partial
@@ -23,13 +25,22 @@ from survey.sweep import boundaries
 
 
 def audit(ds, points, seed=0):
-    """Solve random points of `ds` again by other methods at higher accuracy; floats, codes and counts must agree.
+    """Solve random points of `ds` again by other methods at higher accuracy; floats, codes and
+    counts must agree.
 
-    So must random edges and vertices of surfaces, and cells at random positions. Returns {"points": number that some
-    method answered, "silent": number that none did, "edges", "cells", "vertices": numbers checked, "method",
-    "complaints"}.
+    So must random edges and vertices of surfaces, and cells at random positions. Returns {"points":
+    number that some method answered, "silent": number that none did, "edges", "cells", "vertices":
+    numbers checked, "method", "complaints"}.
     """
-    report = {"points": 0, "silent": 0, "edges": 0, "cells": 0, "vertices": 0, "method": "", "complaints": []}
+    report = {
+        "points": 0,
+        "silent": 0,
+        "edges": 0,
+        "cells": 0,
+        "vertices": 0,
+        "method": "",
+        "complaints": [],
+    }
     if not points:
         return report
     name = user_scene.of_dataset(ds)
@@ -52,15 +63,22 @@ def audit(ds, points, seed=0):
         answered |= (solved.status == status.OK).values | (solved.status == flat.status).values
         for output, wrong, describe in _differences(flat, solved, outputs, decided):
             for i in np.flatnonzero(wrong.reshape(len(wrong), -1).any(axis=1)):
-                report["complaints"].append(f"{output} at {_position(given, i)}: {describe(i)}, by {method}")
+                report["complaints"].append(
+                    f"{output} at {_position(given, i)}: {describe(i)}, by {method}"
+                )
     vertices = partial(_vertices, module, options, used[:1], rtol)
-    with_factors = not hasattr(measures.curves(module), "refusal")  # whose edges are zeros of those of Hill's question
+    # whose edges are zeros of those of Hill's question
+    with_factors = not hasattr(measures.curves(module), "refusal")
     for what, dim, check in (("edges", "edge", _edges), ("cells", "cell", _cells),
                              ("vertices", "surface_vertex", vertices)):  # fmt: skip
         if ds.sizes.get(dim) and used and (what != "edges" or with_factors):
-            chosen = np.sort(random.choice(ds.sizes[dim], min(points, ds.sizes[dim]), replace=False))
+            chosen = np.sort(
+                random.choice(ds.sizes[dim], min(points, ds.sizes[dim]), replace=False)
+            )
             solve = partial(_solve, name, used[0], options, rtol, ds, module)
-            report["complaints"] += [f"{line}, by {used[0]}" for line in check(ds, chosen, solve, random)]
+            report["complaints"] += [
+                f"{line}, by {used[0]}" for line in check(ds, chosen, solve, random)
+            ]
             report[what] = chosen.size
     return report | {"points": int(answered.sum()), "silent": int((~answered).sum())}
 
@@ -86,9 +104,15 @@ def _position(given, i):
 
 def _solve(name, method, options, rtol, ds, module, variables, positions):
     """The variables at positions {axis: values (n)}, other parameters as in `ds`; arrays (n)."""
-    fixed = {p.name: float(ds[p.name]) for p in module.PARAMETERS if p.name in ds.coords and not ds[p.name].dims}
+    fixed = {
+        p.name: float(ds[p.name])
+        for p in module.PARAMETERS
+        if p.name in ds.coords and not ds[p.name].dims
+    }
     arrays = {key: xr.DataArray(values, dims="_point") for key, values in positions.items()}
-    return evaluate(name, method=method, rtol=rtol, variables=variables, **options, **(fixed | arrays))
+    return evaluate(
+        name, method=method, rtol=rtol, variables=variables, **options, **(fixed | arrays)
+    )
 
 
 def _edges(ds, chosen, solve, _):
@@ -98,28 +122,40 @@ def _edges(ds, chosen, solve, _):
         raise Damaged("edge_class contains codes that belong to no factor at T/2")
     axis, count = ds.attrs["boundaries"], ds.edge_count.values
     rows = np.repeat(np.arange(count.size), count.ravel())[chosen]
-    places = zip(ds.edge_count.dims, np.unravel_index(rows, count.shape) if count.ndim else (), strict=True)
+    places = zip(
+        ds.edge_count.dims, np.unravel_index(rows, count.shape) if count.ndim else (), strict=True
+    )
     point = {dim: ds[dim].values[place] for dim, place in places}
     x, width = ds.edge_position.values[chosen], ds.edge_position_error.values[chosen]
     of = np.array(FACTORS)[ds.edge_class.values[chosen]]
     signs = []
     for side in (x - width, x + width):
         out = solve(list(FACTORS), point | {axis: side})
-        values, bars = (np.array([float(out[f"{f}{end}"][i]) for i, f in enumerate(of)]) for end in ("", "_error"))
+        values, bars = (
+            np.array([float(out[f"{f}{end}"][i]) for i, f in enumerate(of)])
+            for end in ("", "_error")
+        )
         signs.append(np.where(abs(values) > bars, np.sign(values), 0.0))
     for i in np.flatnonzero(signs[0] * signs[1] > 0):
         yield f"edge_position at {_position(point | {axis: x}, i)}: {of[i]} has no zero within its error bar"
 
 
 def _vertices(module, options, methods, rtol, ds, chosen, _solve, _random):
-    """Complaints about vertices of surfaces where the function of their class certainly has the same sign on both
-    sides."""
+    """Complaints about vertices of surfaces where the function of their class certainly has the
+    same sign on both sides."""
     schema.surfaces(ds)
     measure, names = measures.question(module.FAMILY, "surfaces"), list(ds.status.dims)
-    if measure is None or not np.isin(ds.surface_class.values, list(measure.CLASSES.values())).all():
+    if (
+        measure is None
+        or not np.isin(ds.surface_class.values, list(measure.CLASSES.values())).all()
+    ):
         raise Damaged(f"surface_class contains codes that are no boundaries of {ds.attrs['scene']}")
     box = boundaries.square_over([ds[name].values for name in names])
-    fixed = {p.name: float(ds[p.name]) for p in module.PARAMETERS if p.name in ds.coords and not ds[p.name].dims}
+    fixed = {
+        p.name: float(ds[p.name])
+        for p in module.PARAMETERS
+        if p.name in ds.coords and not ds[p.name].dims
+    }
     functions = measure.Functions(module, box, names, fixed, options, *methods, rtol)
     numbers = np.searchsorted(np.cumsum(ds.surface_vertices.values), chosen, side="right")
     kinds, axis = ds.surface_class.values[numbers], ds.surface_axis.values[chosen].astype(int)
@@ -142,7 +178,9 @@ def _cells(ds, chosen, solve, random):
     schema.cells(ds)
     names, part = ds.attrs["refine"].split(", "), random.uniform(0.0, 1.0, (2, chosen.size))
     ends = [[ds[f"cell_{name}_{end}"].values[chosen] for end in ("low", "high")] for name in names]
-    point = {name: low + (high - low) * p for name, (low, high), p in zip(names, ends, part, strict=True)}
+    point = {
+        name: low + (high - low) * p for name, (low, high), p in zip(names, ends, part, strict=True)
+    }
     verdict, other = ds.cell_verdict.values[chosen], solve(["verdict"], point).verdict.values
     for i in np.flatnonzero((verdict != -1) & np.isin(other, (0, 1)) & (verdict != other)):
         yield f"cell_verdict at {_position(point, i)}: {verdict[i]}, not {other[i]}"
@@ -155,18 +193,24 @@ def _chosen(ds, module, points, random):
     chosen = np.sort(random.choice(ds.status.size, size, replace=False, shuffle=False))
     indices = np.unravel_index(chosen, ds.status.shape)
     ds = ds[[name for name in ds.data_vars if set(ds.status.dims) <= set(ds[name].dims)]]
-    flat = ds.isel({dim: ("_point", index) for dim, index in zip(ds.status.dims, indices, strict=True)}).load()
+    flat = ds.isel(
+        {dim: ("_point", index) for dim, index in zip(ds.status.dims, indices, strict=True)}
+    ).load()
     names = [p.name for p in module.PARAMETERS if p.name in ds.coords]
     given = {key: np.broadcast_to(flat[key].values, size).copy() for key in names}
     return flat.transpose("_point", ...), given
 
 
 def _differences(flat, solved, outputs, decided):
-    """Yield (output, where it is wrong: (points, ...), description of point i) for everything in both answers.
+    """Yield (output, where it is wrong: (points, ...), description of point i) for everything in
+    both answers.
 
-    `decided`: the scene gives verdicts. Counts, and what applies, must agree where both give the same verdict.
+    `decided`: the scene gives verdicts. Counts, and what applies, must agree where both give the
+    same verdict.
     """
-    invalid = (flat.status == status.INVALID_PARAMETERS).values != (solved.status == status.INVALID_PARAMETERS).values
+    invalid = (flat.status == status.INVALID_PARAMETERS).values != (
+        solved.status == status.INVALID_PARAMETERS
+    ).values
     yield "status", invalid, lambda i: "the parameters are invalid in one answer only"
     both = (flat.status == solved.status).values
     same = both & (_same_verdict(flat, solved) if "verdict" in flat else not decided)
@@ -179,9 +223,15 @@ def _differences(flat, solved, outputs, decided):
             yield (
                 o.name,
                 off > bar,
-                lambda i, off=off, bar=bar: f"off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}",
+                lambda i, off=off, bar=bar: (
+                    f"off by {np.nanmax(off[i]):.3g}, error bars {np.nanmax(bar[i]):.3g}"
+                ),
             )
-            yield o.name, (np.isnan(one) != np.isnan(other)) & same[wide], lambda i: "only one answer gives a value"
+            yield (
+                o.name,
+                (np.isnan(one) != np.isnan(other)) & same[wide],
+                lambda i: "only one answer gives a value",
+            )
             continue
         unknown = o.flags.get("undecided") if o.flags is not None else o.fill
         sure = both if o.name == "verdict" else same
@@ -191,4 +241,6 @@ def _differences(flat, solved, outputs, decided):
 
 def _same_verdict(flat, solved):
     """Where both verdicts are the same, and decided if the status is ok."""
-    return ((flat.verdict == solved.verdict) & ((flat.verdict != -1) | (flat.status != status.OK))).values
+    return (
+        (flat.verdict == solved.verdict) & ((flat.verdict != -1) | (flat.status != status.OK))
+    ).values

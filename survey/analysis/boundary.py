@@ -1,4 +1,6 @@
-"""Where the verdict changes: edges, curves, surfaces or cells of the file, or neighbouring points, as one table."""
+"""Where the verdict changes: edges, curves, surfaces or cells of the file, or neighbouring points,
+as one table.
+"""
 
 import numpy as np
 import xarray as xr
@@ -34,7 +36,9 @@ def find(ds, kind=None, index=None):
         if kind not in classes:
             raise BadInput(modules.unknown("kind", kind, list(classes)))
         found = found.isel(place=np.flatnonzero(found.kind.values == classes[kind]))
-    return found if index is None else found.isel(place=np.flatnonzero(found["index"].values == index))
+    return (
+        found if index is None else found.isel(place=np.flatnonzero(found["index"].values == index))
+    )
 
 
 def _curves(ds):
@@ -43,7 +47,9 @@ def _curves(ds):
     number = ds.curve_count.values
     which = np.repeat(np.arange(number.size), number)
     along = [name for name, v in ds.data_vars.items() if v.dims == ("curve_point",)]
-    found = {name.removeprefix("curve_"): ("place", ds[name].values, ds[name].attrs) for name in along}
+    found = {
+        name.removeprefix("curve_"): ("place", ds[name].values, ds[name].attrs) for name in along
+    }
     found["curve"] = ("place", which, {"long_name": "curve, counted from 0", "units": "1"})
     for name, source in (("kind", "curve_class"), ("index", "curve_index")):
         if source in ds:
@@ -57,7 +63,9 @@ def _surfaces(ds):
     number = ds.surface_vertices.values
     which = np.repeat(np.arange(number.size), number)
     along = [name for name, v in ds.data_vars.items() if v.dims == ("surface_vertex",)]
-    found = {name.removeprefix("surface_"): ("place", ds[name].values, ds[name].attrs) for name in along}
+    found = {
+        name.removeprefix("surface_"): ("place", ds[name].values, ds[name].attrs) for name in along
+    }
     found["surface"] = ("place", which, {"long_name": "surface, counted from 0", "units": "1"})
     found["kind"] = ("place", ds.surface_class.values[which], ds.surface_class.attrs)
     return _table(ds, found, "vertices of surfaces from the file")
@@ -83,21 +91,30 @@ def _edges(ds):
 def _undecided_cells(ds):
     """The centres of the cells that [refine] left undecided: every boundary lies in one of them."""
     schema.cells(ds)
-    left, found = np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"]), {}
+    left, found = (
+        np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"]),
+        {},
+    )
     for dim in ds.attrs["refine"].split(", "):
         low, high = (ds[f"cell_{dim}_{end}"].values[left] for end in ("low", "high"))
         label = {"long_name": f"error bound of {dim}: half the width of the cell"}
         found[dim] = ("place", 0.5 * (low + high), ds[dim].attrs)
         found[f"{dim}_error"] = ("place", 0.5 * (high - low), ds[dim].attrs | label)
     return _table(
-        ds, found, "centres of the undecided cells, in which every boundary lies; not all of them contain one"
+        ds,
+        found,
+        "centres of the undecided cells, in which every boundary lies; not all of them contain one",
     )
 
 
 def _between_points(ds):
-    """Midpoints between neighbours of different verdict; the boundary between two lies within half their distance."""
+    """Midpoints between neighbours of different verdict; the boundary between two lies within half
+    their distance.
+    """
     if "verdict" not in ds:
-        raise BadInput("this survey has no verdict, so it has no boundary; draw one of its outputs with map")
+        raise BadInput(
+            "this survey has no verdict, so it has no boundary; draw one of its outputs with map"
+        )
     verdict = ds.verdict.values
     axes = ds.verdict.dims
     parts = [_along(ds, verdict, i) for i in range(len(axes)) if verdict.shape[i] > 1]
@@ -134,4 +151,7 @@ def _along(ds, verdict, i):
 
 
 def _table(ds, found, comment):
-    return xr.Dataset(found, attrs={"title": ds.attrs.get("title", ""), "scene": ds.attrs["scene"], "comment": comment})
+    return xr.Dataset(
+        found,
+        attrs={"title": ds.attrs.get("title", ""), "scene": ds.attrs["scene"], "comment": comment},
+    )

@@ -1,4 +1,6 @@
-"""Boundaries without a file: along one parameter, and the nearest one to a point in each of its parameters."""
+"""Boundaries without a file: along one parameter, and the nearest one to a point in each of its
+parameters.
+"""
 
 import os
 from typing import Any
@@ -18,7 +20,8 @@ from survey.sweep import boundaries
 from survey.sweep.progress import watched
 from survey.wording import shown
 
-FIRST, WIDER, MOST = 0.05, 8.0, 5  # half the first range around a value, relative to 1 + |value|; how it is widened
+# half the first range around a value, relative to 1 + |value|; how it is widened
+FIRST, WIDER, MOST = 0.05, 8.0, 5
 INSIDE = 1e-3  # of a range: how far from an end that does not belong to the domain
 WIDEST = 1e4  # of a domain that is searched as a whole
 _UNKNOWN = "no boundaries are known for the scene"
@@ -26,9 +29,14 @@ _INSTEAD = "run a line of points and see where the verdict changes: ds.survey.bo
 
 
 def edge(
-    scene: str | os.PathLike[str] | FunctionScene, *, along: str, near: float | None = None, **parameters: Any
+    scene: str | os.PathLike[str] | FunctionScene,
+    *,
+    along: str,
+    near: float | None = None,
+    **parameters: Any,
 ) -> xr.Dataset:
-    """The boundaries of stability along one parameter, exact as [boundaries] in a workflow are, without a file.
+    """The boundaries of stability along one parameter, exact as [boundaries] in a workflow are,
+    without a file.
 
     Parameters
     ----------
@@ -68,26 +76,33 @@ def _edge(scene, along, near, parameters, alone=False):
     if not isinstance(along, str):
         raise BadInput(f"along = {shown(along)}: give the name of one parameter")
     for key in parameters.keys() & {"rtol", "method", "variables"}:
-        raise BadInput(f"{key} does not apply here: edges are as exact as their error bounds say; leave it out")
+        raise BadInput(
+            f"{key} does not apply here: edges are as exact as their error bounds say; leave it out"
+        )
     names = {option.name for option in module.OPTIONS}
     given = {key: value for key, value in parameters.items() if key not in names}
     ends = given.pop(along, None)
     known = [p.name for p in module.PARAMETERS]
     if along not in known:
         raise BadInput(f"along: {modules.unknown('parameter', along, known)}")
-    named = physical.resolved(module, given | {along: np.nan})  # named bodies then give what is left
+    # named bodies then give what is left
+    named = physical.resolved(module, given | {along: np.nan})
     given = {key: _plain(value) for key, value in named.items() if key != along}
     chosen = {key: value for key, value in parameters.items() if key in names}
     options = check_options(module, chosen, [*given, along])
     used = check_parameters(module, name, options, dict.fromkeys([along, *given]))
-    fixed = {key: _number(key, given.get(key, p.default), p) for key, p in used.items() if key != along}
+    fixed = {
+        key: _number(key, given.get(key, p.default), p) for key, p in used.items() if key != along
+    }
     if near is not None:
         near = _number("near", near, used[along])
     ends = _range(used[along], ends, near)
     user_scene.check(module)
     found = _find(module, options, used[along], ends, near, fixed, alone)
     if not (found[0].position.size or alone):
-        _check_inside(scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options)
+        _check_inside(
+            scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options
+        )
     return _described(module, measure, used, along, fixed, *found)
 
 
@@ -110,7 +125,9 @@ def _check_inside(scene, module, point, options):
 
 def _number(key, value, parameter):
     if not is_number(value) or not parameter.holds([value]).all():
-        raise BadInput(f"{key} = {shown(value)}: it must be one number in its domain; allowed: {_domain(parameter)}")
+        raise BadInput(
+            f"{key} = {shown(value)}: it must be one number in its domain; allowed: {_domain(parameter)}"
+        )
     return float(value)
 
 
@@ -126,7 +143,9 @@ def _range(parameter, ends, near):
     low, high = parameter.minimum, parameter.maximum
     if ends is None:
         if high - low > WIDEST:
-            raise BadInput(f"edge: give near= a value of {name}, or a range, such as {name}=(0.5, 2.0)")
+            raise BadInput(
+                f"edge: give near= a value of {name}, or a range, such as {name}=(0.5, 2.0)"
+            )
         return low + INSIDE * (high - low) * parameter.open_minimum, high - INSIDE * (
             high - low
         ) * parameter.open_maximum
@@ -143,8 +162,8 @@ def _range(parameter, ends, near):
 
 
 def _find(scene, options, parameter, ends, near, fixed, alone):
-    """(OnLine, index or None, complete or None, (low, high) that was searched) between `ends`, or the nearest on each
-    side of `near`.
+    """(OnLine, index or None, complete or None, (low, high) that was searched) between `ends`, or
+    the nearest on each side of `near`.
     """
     if ends is not None:
         found = boundaries.along(scene, options, parameter.name, ends, fixed)
@@ -162,7 +181,9 @@ def _find(scene, options, parameter, ends, near, fixed, alone):
         width *= WIDER
         position = np.concatenate([part[0].position for part in parts])
         for side, (end, furthest) in ends.items():
-            if end != furthest and not (position.size if alone else (side * (position - near) >= 0.0).any()):
+            if end != furthest and not (
+                position.size if alone else (side * (position - near) >= 0.0).any()
+            ):
                 further = side * min(side * furthest, side * near + width)
                 parts.append(between(min(end, further), max(end, further)))
                 ends[side] = further, furthest
@@ -173,7 +194,10 @@ def _together(parts):
     """(OnLine, index or None, complete or None) of pieces of a line."""
     found, index, complete = zip(*parts, strict=True)
     order = np.argsort(np.concatenate([one.position for one in found]), kind="stable")
-    joined = (np.concatenate([getattr(one, name) for one in found])[order] for name in ("position", "error", "kind"))
+    joined = (
+        np.concatenate([getattr(one, name) for one in found])[order]
+        for name in ("position", "error", "kind")
+    )
     numbers = None if any(i is None for i in index) else np.concatenate(index)[order]
     return boundaries.OnLine(*joined), numbers, None if None in complete else all(complete)
 
@@ -181,7 +205,10 @@ def _together(parts):
 def _piece(parameter, near):
     """The part of the domain around `near` that does not contain an excluded value."""
     low, high = parameter.minimum, parameter.maximum
-    below, above = [x for x in parameter.excluded if x < near], [x for x in parameter.excluded if x > near]
+    below, above = (
+        [x for x in parameter.excluded if x < near],
+        [x for x in parameter.excluded if x > near],
+    )
     if below or parameter.open_minimum:
         low = max([low, *below])
         low += INSIDE * (near - low)
@@ -193,10 +220,15 @@ def _piece(parameter, near):
 
 def _nearest(found, index, complete, near):
     """Only the last boundary below `near`, and the first above."""
-    below, above = np.flatnonzero(found.position <= near)[-1:], np.flatnonzero(found.position > near)[:1]
+    below, above = (
+        np.flatnonzero(found.position <= near)[-1:],
+        np.flatnonzero(found.position > near)[:1],
+    )
     chosen = np.concatenate([below, above])
     return (
-        boundaries.OnLine(*(getattr(found, name)[chosen] for name in ("position", "error", "kind"))),
+        boundaries.OnLine(
+            *(getattr(found, name)[chosen] for name in ("position", "error", "kind"))
+        ),
         (None if index is None else index[chosen]),
         complete,
     )
@@ -219,8 +251,14 @@ def _described(module, measure, used, along, fixed, found, index, complete, sear
             "long_name": "number of the tongue, twice its rotation number", "symbol": "n"})  # fmt: skip
     coordinates = {key: ((), value, {"long_name": used[key].long_name, "units": used[key].units})
                    for key, value in fixed.items() if np.isfinite(value)}  # fmt: skip
-    attributes = {"title": f"{module.TITLE}: boundaries along {along}", "along": along, "searched": searched}
-    return xr.Dataset(data, coordinates, attributes | ({} if complete is None else {"complete": int(complete)}))
+    attributes = {
+        "title": f"{module.TITLE}: boundaries along {along}",
+        "along": along,
+        "searched": searched,
+    }
+    return xr.Dataset(
+        data, coordinates, attributes | ({} if complete is None else {"complete": int(complete)})
+    )
 
 
 def margin(ds):
@@ -232,13 +270,16 @@ def margin(ds):
         raise BadInput(f"margin: {_UNKNOWN} {ds.attrs['scene']}; {_INSTEAD}")
     here, options = parameters(ds), options_at(ds, module)
     rows, reasons = [], []
-    with watched(ds.attrs["scene"], module, 1, lambda: _seconds(measure, here), "parameters") as progress:
+    with watched(
+        ds.attrs["scene"], module, 1, lambda: _seconds(measure, here), "parameters"
+    ) as progress:
         for done, name in enumerate(here):
             if progress:
                 progress(done, len(here))
             try:
                 rows.append((name, *_margin(scene, options, name, here)))
-            except BadInput as refused:  # no boundaries are known along this parameter, or it cannot vary
+            # no boundaries are known along this parameter, or it cannot vary
+            except BadInput as refused:
                 reasons.append(str(refused))
         if progress:
             progress(len(here), len(here))
@@ -258,7 +299,11 @@ def margin(ds):
                 edges,
                 {"long_name": "the nearest boundary; NaN: none was found"},
             ),
-            "edge_error": ("parameter", errors, {"long_name": "error bound of edge, and of distance"}),
+            "edge_error": (
+                "parameter",
+                errors,
+                {"long_name": "error bound of edge, and of distance"},
+            ),
             "distance": ("parameter", edges - values, {"long_name": "edge less value"}),
             "edge_class": ("parameter", words, {"long_name": "what the boundary is"}),
         },
@@ -276,9 +321,18 @@ def _margin(scene, options, name, here):
         return value, np.nan, np.nan, ""
     nearest = int(abs(found.edge.values - value).argmin())
     names = dict(
-        zip(found.edge_class.attrs["flag_values"], found.edge_class.attrs["flag_meanings"].split(), strict=True)
+        zip(
+            found.edge_class.attrs["flag_values"],
+            found.edge_class.attrs["flag_meanings"].split(),
+            strict=True,
+        )
     )
-    return value, float(found.edge[nearest]), float(found.edge_error[nearest]), names[int(found.edge_class[nearest])]
+    return (
+        value,
+        float(found.edge[nearest]),
+        float(found.edge_error[nearest]),
+        names[int(found.edge_class[nearest])],
+    )
 
 
 def is_quick(ds):
@@ -289,7 +343,9 @@ def is_quick(ds):
 
 
 def _seconds(measure, names):
-    """An estimate of how long boundaries along each of these parameters take; infinite where they are searched for."""
+    """An estimate of how long boundaries along each of these parameters take; infinite where they
+    are searched for.
+    """
     if hasattr(measure, "searched"):
         return np.inf
     return sum(measure.seconds([name]) for name in names) if hasattr(measure, "seconds") else 0.0
@@ -297,5 +353,12 @@ def _seconds(measure, names):
 
 def in_words(found):
     """`k = 0.861772 +- 8e-15 (even_periodic), ...` of what `margin` has found; "" if that is nothing."""
-    rows = zip(*(found[name].values for name in ("parameter", "edge", "edge_error", "edge_class")), strict=True)
-    return ", ".join(f"{name} = {plus_minus(at, bar)} ({kind})" for name, at, bar, kind in rows if np.isfinite(at))
+    rows = zip(
+        *(found[name].values for name in ("parameter", "edge", "edge_error", "edge_class")),
+        strict=True,
+    )
+    return ", ".join(
+        f"{name} = {plus_minus(at, bar)} ({kind})"
+        for name, at, bar, kind in rows
+        if np.isfinite(at)
+    )

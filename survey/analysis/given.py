@@ -6,7 +6,9 @@ from survey.request.checks import check_options
 
 def options_at(ds, scene):
     """{name: value} of all options of the scene, as in the file; raises BadInput for unknown ones."""
-    return check_options(scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords])
+    return check_options(
+        scene, options_of(ds), [p.name for p in scene.PARAMETERS if p.name in ds.coords]
+    )
 
 
 def parameters(ds):

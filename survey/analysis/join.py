@@ -37,7 +37,8 @@ OF_RUN = (
 
 
 def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Dataset:
-    """Join surveys that differ in the values of one axis, or in one fixed parameter, which becomes an axis.
+    """Join surveys that differ in the values of one axis, or in one fixed parameter, which becomes
+    an axis.
 
     An axis of names, such as those of bodies, may have parameters along it, which differ too.
 
@@ -64,8 +65,12 @@ def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Datase
 def _together(datasets):
     """(The joined survey, what of the parts is left out, in words; "" if nothing is.)"""
     given = [_part(part) for part in _as_list(datasets)]
-    tables = dict.fromkeys(OF_PARTS[name] for name in OF_PARTS if any(name in part.attrs for part in given))
-    left_out = f"what {' and '.join(tables)} found belongs to the parts, and is left out" if tables else ""
+    tables = dict.fromkeys(
+        OF_PARTS[name] for name in OF_PARTS if any(name in part.attrs for part in given)
+    )
+    left_out = (
+        f"what {' and '.join(tables)} found belongs to the parts, and is left out" if tables else ""
+    )
     return _concat([of_points(part) for part in given]), left_out
 
 
@@ -85,13 +90,15 @@ def _along(part, axis, beside):
     """The survey with the axis as a dimension, along which the coordinates `beside` are, too."""
     if axis in part.dims:
         return part
-    values = {name: (axis, np.atleast_1d(part[name].values), part[name].attrs) for name in (axis, *beside)}
+    values = {
+        name: (axis, np.atleast_1d(part[name].values), part[name].attrs) for name in (axis, *beside)
+    }
     return part.drop_vars(values).expand_dims(axis).assign_coords(values)
 
 
 def merge(paths, output):
-    """Write the `concat` of the files to the netCDF file `output`; returns the Dataset, and what of the parts is left
-    out, in words. Nothing is replaced.
+    """Write the `concat` of the files to the netCDF file `output`; returns the Dataset, and what of
+    the parts is left out, in words. Nothing is replaced.
     """
     output = check_path(output)
     if output.exists():
@@ -100,14 +107,19 @@ def merge(paths, output):
         joined, left_out = _together(list(paths))
     except BadInput as error:
         raise BadInput(str(error).replace("concat:", "merge:", 1)) from None
-    with disk.refused(output), tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}.") as folder:
+    with (
+        disk.refused(output),
+        tempfile.TemporaryDirectory(dir=output.parent, prefix=f".{output.name}.") as folder,
+    ):
         _write(joined, output, Path(folder))
     return joined, left_out
 
 
 def _as_list(datasets):
     if isinstance(datasets, (str, Path, xr.Dataset)) or not hasattr(datasets, "__iter__"):
-        raise BadInput(f"concat: give a list of surveys, such as [one, other], not {shown(datasets)}")
+        raise BadInput(
+            f"concat: give a list of surveys, such as [one, other], not {shown(datasets)}"
+        )
     return list(datasets)
 
 
@@ -115,7 +127,9 @@ def _part(given):
     if not isinstance(given, xr.Dataset):
         return reading.load(given)
     if "status" not in given or "scene" not in given.attrs:
-        raise BadInput("concat: a dataset was not written by survey: it has no status, or no attribute scene")
+        raise BadInput(
+            "concat: a dataset was not written by survey: it has no status, or no attribute scene"
+        )
     schema.check(given, complete=False)
     return given
 
@@ -128,7 +142,9 @@ def _check_alike(one, other):
     names = [set(ds.data_vars) for ds in (one, other)]
     if names[0] != names[1]:
         only = ", ".join(sorted(names[0] ^ names[1]))
-        raise BadInput(f"concat: only one of the surveys has {only}; leave it out of the other (drop_vars)")
+        raise BadInput(
+            f"concat: only one of the surveys has {only}; leave it out of the other (drop_vars)"
+        )
 
 
 def _axis(parts):
@@ -141,14 +157,24 @@ def _axis(parts):
     different = [name for name in first.coords if any(not part[name].variable.equals(first[name].variable)
                                                       for part in parts[1:])]  # fmt: skip
     named = [name for name in different if first[name].dtype.kind in "UO"]
-    if len(named) == 1 and all(part[name].dims in ((), (named[0],)) for part in parts for name in different):
+    if len(named) == 1 and all(
+        part[name].dims in ((), (named[0],)) for part in parts for name in different
+    ):
         return named[0], [name for name in different if name != named[0]]
     if len(different) != 1:
-        what = f"in {', '.join(map(str, different))}" if different else "in none: they are of the same points"
+        what = (
+            f"in {', '.join(map(str, different))}"
+            if different
+            else "in none: they are of the same points"
+        )
         raise BadInput(f"concat: surveys are joined along one axis, and these differ {what}")
     name = different[0]
-    if first[name].dtype.kind not in "iuf" or any(part[name].dims not in ((), (name,)) for part in parts):
-        raise BadInput(f"concat: {name} is no axis of numbers or names, along which surveys can be joined")
+    if first[name].dtype.kind not in "iuf" or any(
+        part[name].dims not in ((), (name,)) for part in parts
+    ):
+        raise BadInput(
+            f"concat: {name} is no axis of numbers or names, along which surveys can be joined"
+        )
     return name, []
 
 
@@ -161,7 +187,9 @@ def _joined(one, other, axis):
         raise BadInput(f"concat: the surveys have different values at common points, such as {axis} = {value}; "
                        "leave these out of one of them")  # fmt: skip
     rest = np.setdiff1d(np.arange(other.sizes[axis]), there)
-    joined = xr.concat([one, other.isel({axis: rest})], axis, combine_attrs="override", join="exact")
+    joined = xr.concat(
+        [one, other.isel({axis: rest})], axis, combine_attrs="override", join="exact"
+    )
     joined = joined.transpose(*one.status.dims, ...)
     return joined.sortby(axis) if joined[axis].dtype.kind in "iuf" else joined
 
@@ -173,10 +201,14 @@ def _described(joined, parts, axis):
         values = list(dict.fromkeys(str(part.attrs.get(key)) for part in parts))
         if key in SUMMED:
             attributes[key] = float(sum(part.attrs.get(key, 0.0) for part in parts))
-        elif len(values) > 1 and key.startswith(("version_", "commit", "dirty", "kernel_hash", "cpu", "source")):
+        elif len(values) > 1 and key.startswith(
+            ("version_", "commit", "dirty", "kernel_hash", "cpu", "source")
+        ):
             attributes[key] = " | ".join(values)
     attributes["workflow"] = _workflow(attributes.get("workflow", ""), joined[axis])
-    attributes["history"] = f"{now()}: {command()}: {counted(len(parts), 'survey')} joined along {axis}"
+    attributes["history"] = (
+        f"{now()}: {command()}: {counted(len(parts), 'survey')} joined along {axis}"
+    )
     joined = joined.assign_attrs(attributes)
     total = tally(joined)
     for arrays in reading.pieces(joined):
@@ -194,15 +226,23 @@ def _workflow(text, coordinate):
         return text
     data = {key: table for key, table in data.items() if key not in ("boundaries", "refine")}
     numbers = coordinate.dtype.kind in "iuf"
-    data["axes"] |= {coordinate.name: unchanged(coordinate.values) if numbers else coordinate.values.tolist()}
+    data["axes"] |= {
+        coordinate.name: unchanged(coordinate.values) if numbers else coordinate.values.tolist()
+    }
     return tomli_w.dumps(data)
 
 
 def _write(joined, output, folder):
     """Write a survey's dataset as a run does, a row of tiles at a time."""
     point = joined.status.dims
-    masked = {name: {FILL: np.int32(fill_of(v))} for name, v in joined.data_vars.items() if fill_of(v) is not None}
-    variables = {name: (v.dims, v.attrs | masked.get(name, {})) for name, v in joined.data_vars.items()}
+    masked = {
+        name: {FILL: np.int32(fill_of(v))}
+        for name, v in joined.data_vars.items()
+        if fill_of(v) is not None
+    }
+    variables = {
+        name: (v.dims, v.attrs | masked.get(name, {})) for name, v in joined.data_vars.items()
+    }
     coordinates = {name: (c.dims, c.values.astype("U") if c.dtype.kind == "O" else c.values, c.attrs)
                    for name, c in joined.coords.items()}  # fmt: skip
     layout = {name: (np.dtype("int32") if name in masked else v.dtype, None, v.shape[len(point) :])
@@ -210,7 +250,9 @@ def _write(joined, output, folder):
     tile = halved(joined.status.shape, TILE_POINTS)
     file = MapFile(output, folder, coordinates, variables, layout, joined.status.shape, tile)
     try:
-        rows = max(1, reading.PIECE // max(1, joined.status[0].size)) // tile[0] * tile[0] or tile[0]
+        rows = (
+            max(1, reading.PIECE // max(1, joined.status[0].size)) // tile[0] * tile[0] or tile[0]
+        )
         for first in range(0, joined.sizes[point[0]], rows):
             cut = slice(first, min(first + rows, joined.sizes[point[0]]))
             where = (cut, *(slice(0, joined.sizes[dim]) for dim in point[1:]))

@@ -11,7 +11,15 @@ from survey import modules, status
 from survey.analysis import edge
 from survey.analysis.given import parameters
 from survey.errors import BadInput, Damaged, Untrusted
-from survey.file.labels import UNDECIDED, as_stored, error_bars, fill_of, flag_codes, options_of, words_of
+from survey.file.labels import (
+    UNDECIDED,
+    as_stored,
+    error_bars,
+    fill_of,
+    flag_codes,
+    options_of,
+    words_of,
+)
 from survey.request import user_scene
 from survey.wording import plain
 
@@ -30,7 +38,9 @@ def nearest(ds, coords):
     indices = nearest_indices(ds, coords)
     missing = [dim for dim in ds.status.dims if dim not in indices and ds.sizes[dim] > 1]
     if missing:
-        raise BadInput(f"{missing[0]} is missing: a point needs a number for each of {', '.join(ds.status.dims)}")
+        raise BadInput(
+            f"{missing[0]} is missing: a point needs a number for each of {', '.join(ds.status.dims)}"
+        )
     indices |= {dim: 0 for dim in ds.status.dims if dim not in indices}
     return of_points(ds).isel(indices)
 
@@ -59,11 +69,14 @@ def section(ds, coords):
     from survey.show.boundaries import in_plane  # loads matplotlib
 
     curves = in_plane(ds, ds.status.isel(indices))
-    return part.assign({name: v for name, v in curves.data_vars.items() if name.startswith("curve_")})
+    return part.assign(
+        {name: v for name, v in curves.data_vars.items() if name.startswith("curve_")}
+    )
 
 
 def nearest_indices(ds, coords):
-    """{dimension: index of the nearest value} for numbers by axis; raises BadInput for an unknown axis or one outside.
+    """{dimension: index of the nearest value} for numbers by axis; raises BadInput for an unknown
+    axis or one outside.
 
     A number may lie beyond an end by up to half a step.
     """
@@ -79,10 +92,15 @@ def nearest_indices(ds, coords):
         if not np.isfinite(values).all():
             raise Damaged(f"the axis {name} contains values that are not finite")
         if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
-            raise BadInput(f"{name} = {value!r}: give one number, from {values.min():g} to {values.max():g}")
+            raise BadInput(
+                f"{name} = {value!r}: give one number, from {values.min():g} to {values.max():g}"
+            )
         i = int(np.abs(values - float(value)).argmin())
         step = np.abs(np.diff(values)).max(initial=0)
-        if abs(values[i] - value) > 0.5 * step * (1 + 1e-9) and not values.min() <= value <= values.max():
+        if (
+            abs(values[i] - value) > 0.5 * step * (1 + 1e-9)
+            and not values.min() <= value <= values.max()
+        ):
             raise BadInput(f"{name} = {value:g} lies outside the map: give a number from {values.min():g} to "
                            f"{values.max():g}")  # fmt: skip
         indices[name] = i
@@ -90,15 +108,23 @@ def nearest_indices(ds, coords):
 
 
 def _place(ds, name, value):
-    """The index of a label, or of a number counted from 0, along a dimension whose coordinate is not numeric."""
+    """The index of a label, or of a number counted from 0, along a dimension whose coordinate is
+    not numeric.
+    """
     labels = [str(label) for label in ds[name].values] if name in ds.coords else []
     if str(value) in labels:
         return labels.index(str(value))
-    if isinstance(value, (int, np.integer)) and not isinstance(value, bool) and 0 <= value < ds.sizes[name]:
+    if (
+        isinstance(value, (int, np.integer))
+        and not isinstance(value, bool)
+        and 0 <= value < ds.sizes[name]
+    ):
         return int(value)
     if labels:
         raise BadInput(f"{name}: {modules.unknown('label', str(value), labels)}")
-    raise BadInput(f"{name} = {value!r}: it has no coordinate; give a number from 0 to {ds.sizes[name] - 1}")
+    raise BadInput(
+        f"{name} = {value!r}: it has no coordinate; give a number from 0 to {ds.sizes[name] - 1}"
+    )
 
 
 def plane(ds, at):
@@ -146,7 +172,8 @@ def meaning(variable):
 class Point:
     """Everything known about one point; print it, or show it in a notebook.
 
-    `dataset` is the point as in the file: every output, its error bar `X_error`, `status`, and `verdict`.
+    `dataset` is the point as in the file: every output, its error bar `X_error`, `status`, and
+    `verdict`.
     """
 
     dataset: xr.Dataset
@@ -191,18 +218,27 @@ class Point:
     def python(self):
         """The Python that solves this point again."""
         ds = self.dataset
-        given = {n: x for n, x in self.parameters.items() if "domain: " in str(ds[n].attrs.get("comment"))}
+        given = {
+            n: x
+            for n, x in self.parameters.items()
+            if "domain: " in str(ds[n].attrs.get("comment"))
+        }
         given |= options_of(ds)
         given |= {"method": ds.attrs["method"]} if ds.attrs.get("method", "auto") != "auto" else {}
         given |= {"rtol": float(ds.attrs["rtol"])} if "rtol" in ds.attrs else {}
-        words = "".join(f", {name}={value!r}" for name, value in given.items() if name.isidentifier())
-        made = "scene_hash" in ds.attrs and not str(ds.attrs["scene"]).endswith(".py")  # by survey.hill and its kin
+        words = "".join(
+            f", {name}={value!r}" for name, value in given.items() if name.isidentifier()
+        )
+        # by survey.hill and its kin
+        made = "scene_hash" in ds.attrs and not str(ds.attrs["scene"]).endswith(".py")
         scene = "scene" if made else repr(ds.attrs["scene"])
         return f"import survey\n\npoint = survey.evaluate({scene}{words}).survey.point()\nprint(point)\n"
 
     @property
     def margin(self):
-        """The nearest boundary in each parameter, in words; "" where none is known, or finding it takes seconds."""
+        """The nearest boundary in each parameter, in words; "" where none is known, or finding it
+        takes seconds.
+        """
         try:
             found = edge.margin(self.dataset) if edge.is_quick(self.dataset) else None
         except BadInput:
@@ -214,11 +250,16 @@ class Point:
         width = max((len(f"{name} = {value}") for name, value, about in rows if about), default=0)
         lines = (f"{name} = {value}".ljust(width) + f"  {about}" if about else f"{name}: {value}"
                  for name, value, about in rows)  # fmt: skip
-        return "\n".join([plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])), *lines])
+        return "\n".join(
+            [plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])), *lines]
+        )
 
     def _repr_html_(self):
         rows = "".join(
-            "<tr>" + _cell(name) + (_cell(value) + _cell(about) if about else _cell(value, 2)) + "</tr>"
+            "<tr>"
+            + _cell(name)
+            + (_cell(value) + _cell(about) if about else _cell(value, 2))
+            + "</tr>"
             for name, value, about in self._rows()
         )
         title = html.escape(plain(self.dataset.attrs.get("title", self.dataset.attrs["scene"])))
@@ -235,7 +276,10 @@ class Point:
             if self.margin:
                 yield "nearest boundaries", self.margin, ""
         settings = [f"{key} = {value}" for key, value in options_of(ds).items()]
-        settings += [f"method {ds.attrs.get('method', 'auto')}", f"rtol {ds.attrs.get('rtol', float('nan')):g}"]
+        settings += [
+            f"method {ds.attrs.get('method', 'auto')}",
+            f"rtol {ds.attrs.get('rtol', float('nan')):g}",
+        ]
         yield "solved with", ", ".join(settings), ""
         for name, value in self.parameters.items():
             yield name, f"{value!r}", _about(ds[name])
@@ -265,13 +309,19 @@ def has_verdict(ds):
 
 def sentence(ds):
     """What the status says of the point."""
-    sentences = dict(part.split(": ", 1) for part in ds.status.attrs.get("comment", "").split("; ") if ": " in part)
+    sentences = dict(
+        part.split(": ", 1)
+        for part in ds.status.attrs.get("comment", "").split("; ")
+        if ": " in part
+    )
     word = meaning(ds.status)
     return f"{word}: {sentences[word]}" if word in sentences else word
 
 
 def _outputs(ds, name, variable, has_bar):
-    """Yield the rows of an output: one, or one for each position along its own dimensions that has a value."""
+    """Yield the rows of an output: one, or one for each position along its own dimensions that has
+    a value.
+    """
     about = _about(variable)
     if not variable.ndim:
         yield name, reading(ds, name, has_bar), about
@@ -280,7 +330,11 @@ def _outputs(ds, name, variable, has_bar):
         where = dict(zip(variable.dims, index, strict=True))
         value = reading(ds.isel(where), name, has_bar)
         if value not in ("does not apply", "none"):
-            yield f"{name}[{', '.join(str(ds[dim].values[i]) for dim, i in where.items())}]", value, about
+            yield (
+                f"{name}[{', '.join(str(ds[dim].values[i]) for dim, i in where.items())}]",
+                value,
+                about,
+            )
 
 
 def reading(ds, name, has_bar):
@@ -293,11 +347,19 @@ def reading(ds, name, has_bar):
         return "does not apply"
     if not has_bar:
         number = as_stored(variable)[()]
-        return "does not apply" if number == fill_of(variable) else words_of(variable).get(number, str(number))
+        return (
+            "does not apply"
+            if number == fill_of(variable)
+            else words_of(variable).get(number, str(number))
+        )
     bar = float(ds[f"{name}_error"])
     if not 0 <= bar < np.inf:
         return f"{value!r}, its error bar is {bar}"
-    known = 2 if bar == 0 or value == 0 else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
+    known = (
+        2
+        if bar == 0 or value == 0
+        else np.floor(np.log10(abs(value))) - np.floor(np.log10(bar)) + 2
+    )
     return f"{value:#.{int(np.clip(known, 2, 17))}g} +- {bar:.2g}" if bar else f"{value!r} +- 0"
 
 

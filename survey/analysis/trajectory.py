@@ -13,13 +13,19 @@ SHOWN = 4  # parameters in a title; if there are more, those that are 0 are left
 
 
 def solve(point, time=None):
-    """The motion at `point` (a dataset of one point), a Dataset whose attribute `panels` says how it is drawn."""
-    if time is not None and not (np.asarray(time).dtype.kind in "iuf" and np.ndim(time) == 0 and 0 < time < np.inf):
+    """The motion at `point` (a dataset of one point), a Dataset whose attribute `panels` says how
+    it is drawn.
+    """
+    if time is not None and not (
+        np.asarray(time).dtype.kind in "iuf" and np.ndim(time) == 0 and 0 < time < np.inf
+    ):
         raise BadInput(f"time = {time!r}: give a positive number, the duration of the motion")
     name, scene = user_scene.find(user_scene.of_dataset(point))
     make = getattr(scene, "trajectory", None)
     if make is None:
-        raise BadInput(f"the scene {name} has no trajectory; its file would have to define that function")
+        raise BadInput(
+            f"the scene {name} has no trajectory; its file would have to define that function"
+        )
     options, symbols = options_at(point, scene), {p.name: p.symbol for p in scene.PARAMETERS}
     given = {key: value for key, value in parameters(point).items() if key in symbols}
     # solved again: a motion is computed from parameters, never from other values in a file
@@ -28,9 +34,17 @@ def solve(point, time=None):
     if found is None:
         asked = " and ".join(f"{key} = {value}" for key, value in options.items())
         raise BadInput(f"the scene {name} draws no trajectory{asked and ' with ' + asked}")
-    about = {"title": point.attrs.get("title", ""), "scene": name, "options": point.attrs.get("options", "")}
+    about = {
+        "title": point.attrs.get("title", ""),
+        "scene": name,
+        "options": point.attrs.get("options", ""),
+    }
     about |= {"parameters": ", ".join(f"{key}={value!r}" for key, value in given.items())}
-    shown = [f"${symbols[key]} = {value:.6g}$" for key, value in given.items() if value or len(given) <= SHOWN]
+    shown = [
+        f"${symbols[key]} = {value:.6g}$"
+        for key, value in given.items()
+        if value or len(given) <= SHOWN
+    ]
     about |= {"where": ", ".join(shown)}
     about |= {"panels": "; ".join(" ".join(panel) for panel in found.panels)}
     return xr.Dataset(dict(found.data), attrs=about)

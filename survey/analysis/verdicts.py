@@ -18,7 +18,9 @@ def names(ds):
     for name, where in kinds.items():
         words[where] = name
     about = {"long_name": "verdict, or status where there is no answer", "units": "1"}
-    return xr.DataArray(words.astype(str), ds.status.coords, ds.status.dims, name="verdict_name", attrs=about)
+    return xr.DataArray(
+        words.astype(str), ds.status.coords, ds.status.dims, name="verdict_name", attrs=about
+    )
 
 
 def where(ds, name):
@@ -26,13 +28,19 @@ def where(ds, name):
     kinds = _kinds(ds)
     codes = flag_codes(ds.status.attrs)
     if not isinstance(name, str):
-        raise BadInput(f"where: give the name of one verdict or status, not {shown(name)}; join several by | and &")
+        raise BadInput(
+            f"where: give the name of one verdict or status, not {shown(name)}; join several by | and &"
+        )
     if name in kinds:
         found = kinds[name]
     elif name in codes:
         found = ds.status.values == codes[name]
     else:
-        raise BadInput(modules.unknown("verdict or status", name, [*kinds, *(n for n in codes if n not in kinds)]))
+        raise BadInput(
+            modules.unknown(
+                "verdict or status", name, [*kinds, *(n for n in codes if n not in kinds)]
+            )
+        )
     about = {"long_name": name.replace("_", " "), "units": "1"}
     return xr.DataArray(found, ds.status.coords, ds.status.dims, name=name, attrs=about)
 
@@ -45,17 +53,25 @@ def _kinds(ds):
     if "verdict" in ds:
         verdict = ds.verdict.transpose(*dims).values
         open_ = (verdict == UNDECIDED) & (ds.status.values != status.OK)
-        kinds = {name: (verdict == code) & ~open_ for name, code in flag_codes(ds.verdict.attrs).items()}
+        kinds = {
+            name: (verdict == code) & ~open_ for name, code in flag_codes(ds.verdict.attrs).items()
+        }
     for code in np.unique(ds.status.values[open_]):
         kinds[statuses[int(code)]] = open_ & (ds.status.values == code)
     return kinds
 
 
 def combined(ds, given):
-    """The survey with a variable "combined" of flags, from an array of booleans at its points; raises BadInput."""
+    """The survey with a variable "combined" of flags, from an array of booleans at its points;
+    raises BadInput.
+    """
     if not isinstance(given, xr.DataArray) and np.shape(given) == ds.status.shape:
         given = xr.DataArray(np.asarray(given), ds.status.coords, ds.status.dims)
-    if not isinstance(given, xr.DataArray) or given.dtype != bool or set(given.dims) != set(ds.status.dims):
+    if (
+        not isinstance(given, xr.DataArray)
+        or given.dtype != bool
+        or set(given.dims) != set(ds.status.dims)
+    ):
         raise BadInput(
             "map: an array to be drawn holds booleans at the points of the survey, such as "
             "a.survey.where('stable') & b.survey.where('stable')"
@@ -68,6 +84,9 @@ def combined(ds, given):
         ) from None
     about = {"long_name": str(given.name or "combined verdict").replace("_", " "), "units": "1"}
     codes = xr.DataArray(
-        given.values.astype(np.int8), given.coords, given.dims, attrs=about | flag_attributes(COMBINED)
+        given.values.astype(np.int8),
+        given.coords,
+        given.dims,
+        attrs=about | flag_attributes(COMBINED),
     )
     return ds.assign(combined=codes, status=xr.zeros_like(ds.status).assign_attrs(ds.status.attrs))

@@ -23,7 +23,10 @@ def sweep(ds, ranges, num=None, output=None):
     for name in num if isinstance(num, dict) else ():
         if name not in ranges:
             raise BadInput(f"num: {modules.unknown('axis with a range', name, list(ranges))}")
-    if any(c.ndim and c.dims[0] in ds.coords and ds[c.dims[0]].dtype.kind in "UO" for c in ds.coords.values()):
+    if any(
+        c.ndim and c.dims[0] in ds.coords and ds[c.dims[0]].dtype.kind in "UO"
+        for c in ds.coords.values()
+    ):
         _warn(ds, ranges)
         return _of_names(ds, ranges, num, output)
     data = _workflow(ds, ranges, num)
@@ -32,7 +35,9 @@ def sweep(ds, ranges, num=None, output=None):
     if output is not None:
         return api.run(data, output=output)
     found = solve.compute(checked.grid, checked.scene, checked.request)
-    finer = count(describe(checked.grid, checked.scene, checked.name, checked.request, found), found)
+    finer = count(
+        describe(checked.grid, checked.scene, checked.name, checked.request, found), found
+    )
     for further in edges_and_cells.find(checked, lambda name, make: make()):
         finer = finer.assign(further.variables).assign_attrs(further.attrs)
     return finer.assign_attrs(title=checked.title, workflow=checked.text)
@@ -41,13 +46,19 @@ def sweep(ds, ranges, num=None, output=None):
 def _of_names(ds, ranges, num, output):
     """The finer map of a survey with an axis of names, along which parameters lie: no workflow has such."""
     if output is not None:
-        raise BadInput("zoom: no workflow has an axis of names: leave output out, and save the answer by to_netcdf")
+        raise BadInput(
+            "zoom: no workflow has an axis of names: leave output out, and save the answer by to_netcdf"
+        )
     name = user_scene.of_dataset(ds)
     scene = user_scene.find(name)[1]
     given = {key: ds[key] for key in _parameters(ds) & set(ds.coords) - ranges.keys()}
     given |= {key: coordinates(**_finer(ds[key], ends, num)) for key, ends in ranges.items()}
     outputs = {o.name for o in scene.OUTPUTS} & set(ds.data_vars)
-    solver = {"method": str(ds.attrs["method"]), "rtol": float(ds.attrs["rtol"]), "variables": sorted(outputs)}
+    solver = {
+        "method": str(ds.attrs["method"]),
+        "rtol": float(ds.attrs["rtol"]),
+        "variables": sorted(outputs),
+    }
     found = api.evaluate(name, **given, **options_at(ds, scene), **solver)
     return found.transpose(*ds.status.dims, ...)
 
@@ -56,12 +67,20 @@ def _ranges(ds, ranges):
     """{axis: (low, high)}; raises BadInput for an unknown axis or an invalid range."""
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
     if not ranges:
-        raise BadInput(f"zoom: give a range for at least one axis, such as {axes[0] if axes else 'k'}=(0.1, 0.2)")
+        raise BadInput(
+            f"zoom: give a range for at least one axis, such as {axes[0] if axes else 'k'}=(0.1, 0.2)"
+        )
     for name, ends in ranges.items():
         if name not in axes:
             raise BadInput(unknown_axis(ds, name, axes))
-        if np.shape(ends) != (2,) or not all(map(is_number, ends)) or not -np.inf < ends[0] < ends[1] < np.inf:
-            raise BadInput(f"{name} = {shown(ends)}: give two numbers, the lower one first, such as {name}=(0.1, 0.2)")
+        if (
+            np.shape(ends) != (2,)
+            or not all(map(is_number, ends))
+            or not -np.inf < ends[0] < ends[1] < np.inf
+        ):
+            raise BadInput(
+                f"{name} = {shown(ends)}: give two numbers, the lower one first, such as {name}=(0.1, 0.2)"
+            )
     return {name: (float(low), float(high)) for name, (low, high) in ranges.items()}
 
 
@@ -71,7 +90,9 @@ def _warn(ds, ranges):
     for name, (low, high) in ranges.items():
         least, most = float(ds[name].min()), float(ds[name].max())
         if low < least or high > most:
-            beyond.append(f"{name} = ({low:g}, {high:g}) extends beyond the map's {least:g} to {most:g}")
+            beyond.append(
+                f"{name} = ({low:g}, {high:g}) extends beyond the map's {least:g} to {most:g}"
+            )
     if beyond:
         warnings.warn(f"zoom: {'; '.join(beyond)}; it is solved there too", stacklevel=4)
 
@@ -90,13 +111,20 @@ def _workflow(ds, ranges, num):
 
 
 def workflow_of(ds, ranges=None, num=None):
-    """The workflow of the points alone, as a mapping, from the attributes: the same points, or with new axes."""
+    """The workflow of the points alone, as a mapping, from the attributes: the same points, or with
+    new axes.
+    """
     title = str(ds.attrs.get("title", ""))
-    data = {"title": f"{title}, a part".lstrip(", ") if ranges else title, "scene": user_scene.of_dataset(ds)}
+    data = {
+        "title": f"{title}, a part".lstrip(", ") if ranges else title,
+        "scene": user_scene.of_dataset(ds),
+    }
     scene = user_scene.find(data["scene"])[1]
     data |= {"options": options_at(ds, scene), "axes": _axes(ds, ranges or {}, num)}
     solver = {"method": ds.attrs.get("method"), "rtol": ds.attrs.get("rtol")}
-    data["solver"] = {key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None}
+    data["solver"] = {
+        key: str(v) if key == "method" else float(v) for key, v in solver.items() if v is not None
+    }
     known = {o.name for o in scene.OUTPUTS}
     return data | {"output": {"variables": [name for name in ds.data_vars if name in known]}}
 
@@ -107,7 +135,9 @@ def _further(ds):
         stored = tomllib.loads(ds.attrs.get("workflow", ""))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise Damaged(f"the attribute workflow is not TOML ({error})") from None
-    return {key: stored[key] for key in ("boundaries", "refine") if isinstance(stored.get(key), dict)}
+    return {
+        key: stored[key] for key in ("boundaries", "refine") if isinstance(stored.get(key), dict)
+    }
 
 
 def _axes(ds, ranges, num):
@@ -132,7 +162,12 @@ def _axes(ds, ranges, num):
 def _finer(coord, ends, num):
     """The range of a new axis, spaced as the old one."""
     spacing = "log" if logarithmic(coord.values) else "linear"
-    return {"start": ends[0], "stop": ends[1], "num": _number(num, coord.name, coord.size), "spacing": spacing}
+    return {
+        "start": ends[0],
+        "stop": ends[1],
+        "num": _number(num, coord.name, coord.size),
+        "spacing": spacing,
+    }
 
 
 def _parameters(ds):
@@ -152,5 +187,7 @@ def _number(num, name, size):
     """The number of values of the axis: as many as it has, one number for all axes, or one by name."""
     number = num.get(name, size) if isinstance(num, dict) else size if num is None else num
     if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 2:
-        raise BadInput(f"num = {number!r}: give an integer of at least 2, or one for each axis: {{{name!r}: 200}}")
+        raise BadInput(
+            f"num = {number!r}: give an integer of at least 2, or one for each axis: {{{name!r}: 200}}"
+        )
     return int(number)

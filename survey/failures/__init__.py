@@ -1,12 +1,13 @@
-"""Where methods fail: the true error of each, and its error bar, over the planes on which it should break.
+"""Where methods fail: the true error of each, and its error bar, over the planes on which it should
+break.
 
 Everything specific to a scene is in the file of its name in `planes/`:
 
     ABOUT            the scene's planes and what `auto` does on them, in a few sentences of Markdown
     planes(share)    [Plane, ...]; a share below 1 makes them coarser
 
-A user's own file needs none: its plane is spanned by its first two parameters, or by a workflow's axes
-(`planes/own_file.py`).
+A user's own file needs none: its plane is spanned by its first two parameters, or by a workflow's
+axes (`planes/own_file.py`).
 """
 
 import json
@@ -44,7 +45,9 @@ class Record:
 
 
 def write(scene, directory, share=1.0, say=lambda line: None):
-    """Hold every method against the truth; failures_SCENE.json, .md and .png in `directory`; returns the paths."""
+    """Hold every method against the truth; failures_SCENE.json, .md and .png in `directory`;
+    returns the paths.
+    """
     from survey.failures import page, picture
 
     directory = Path(directory)
@@ -52,20 +55,35 @@ def write(scene, directory, share=1.0, say=lambda line: None):
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(f"-o {str(directory)!r}: cannot make this folder ({error.strerror})") from None
+        raise BadInput(
+            f"-o {str(directory)!r}: cannot make this folder ({error.strerror})"
+        ) from None
     results = measure(planes, say)
-    records = [record(plane, method, found) for plane, of in zip(planes, results, strict=True) for method, found in of]
+    records = [
+        record(plane, method, found)
+        for plane, of in zip(planes, results, strict=True)
+        for method, found in of
+    ]
     paths = [directory / f"failures_{name}.{kind}" for kind in ("json", "md", "png")]
-    written = {"rtol": RTOL, "planes": [_finite(asdict(r)) for r in records], "machine": provenance()}
+    written = {
+        "rtol": RTOL,
+        "planes": [_finite(asdict(r)) for r in records],
+        "machine": provenance(),
+    }
     paths[0].write_text(json.dumps(written, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    paths[1].write_text(page.text(scene, name, about, planes, results, records, share), encoding="utf-8")
+    paths[1].write_text(
+        page.text(scene, name, about, planes, results, records, share), encoding="utf-8"
+    )
     picture.draw(planes, results, paths[2])
     return paths
 
 
 def _finite(row):
     """The row with None for what is not known or not finite, as JSON has no NaN."""
-    return {key: None if isinstance(value, float) and not np.isfinite(value) else value for key, value in row.items()}
+    return {
+        key: None if isinstance(value, float) and not np.isfinite(value) else value
+        for key, value in row.items()
+    }
 
 
 def _planes(scene, share):
@@ -76,7 +94,9 @@ def _planes(scene, share):
         return Path(scene).stem, own_file.ABOUT, own_file.planes(scene, share)
     module = modules.load(folder, scene, "failure chart")
     if module is own_file:
-        raise BadInput("own_file: name your own file, such as my_equation.py, or a workflow that names it")
+        raise BadInput(
+            "own_file: name your own file, such as my_equation.py, or a workflow that names it"
+        )
     return scene, module.ABOUT, module.planes(share)
 
 
@@ -95,7 +115,9 @@ def measure(planes, say=lambda line: None):
 def record(plane, method, found):
     """What the picture shows, in numbers."""
     if found is None:
-        return Record(plane.name, method, plane.size, plane.size, 0, 0, 0, 0, np.nan, np.nan, np.nan, np.nan)
+        return Record(
+            plane.name, method, plane.size, plane.size, 0, 0, 0, 0, np.nan, np.nan, np.nan, np.nan
+        )
     known = found.error[found.answered & np.isfinite(found.error)]
     met = found.error[found.answered & ~found.missed & np.isfinite(found.error)]
     return Record(

@@ -19,7 +19,8 @@ from survey.truth import distance
 class Comparison:
     """Arrays of the picture's shape (y, x)."""
 
-    error: np.ndarray  # the largest of the outputs' true errors over 1 + |value|; NaN where none is known
+    # the largest of the outputs' true errors over 1 + |value|; NaN where none is known
+    error: np.ndarray
     ratio: np.ndarray  # the largest true error over its bar, less the truth's own doubt
     answered: np.ndarray
     missed: np.ndarray  # answered, but a bar exceeds rtol (1 + |value|)
@@ -36,21 +37,35 @@ def compared(plane, method, rtol):
 
 def asked(plane, method, rtol):
     """What `survey.evaluate` answers, {variable: array (points, ...)}; None where it refuses all of it."""
-    solve = partial(evaluate, plane.scene, method="auto" if method == MAP else method, rtol=rtol, **plane.options)
+    solve = partial(
+        evaluate,
+        plane.scene,
+        method="auto" if method == MAP else method,
+        rtol=rtol,
+        **plane.options,
+    )
     if method != MAP and not plane.shared:
         ds = _points(solve, plane.flat(), plane.size)
-        return None if ds is None else {name: ds[name].transpose("point", ...).values for name in ds.data_vars}
+        return (
+            None
+            if ds is None
+            else {name: ds[name].transpose("point", ...).values for name in ds.data_vars}
+        )
     try:
         ds = solve(**{name: _axis(plane, values) for name, values in plane.given.items()})
     except BadInput:
         return None
-    sizes = {dim: size for dim, size in zip(("y", "x"), plane.shape, strict=True) if dim not in ds.dims}
+    sizes = {
+        dim: size for dim, size in zip(("y", "x"), plane.shape, strict=True) if dim not in ds.dims
+    }
     ds = ds.expand_dims(sizes).stack(point=("y", "x")).transpose("point", ...)
     return {name: ds[name].values for name in ds.data_vars}
 
 
 def _points(solve, given, size):
-    """The answers of points one by one: a call that is refused (as for a spike) is halved until one point is."""
+    """The answers of points one by one: a call that is refused (as for a spike) is halved until one
+    point is.
+    """
     try:
         ds = solve(**{name: xr.DataArray(values, dims="point") for name, values in given.items()})
         return ds.reset_coords(drop=True)
@@ -99,8 +114,20 @@ def judged(plane, answer, rtol):
             error = np.fmax(error, _most(relative))
     lie |= ratio > 1.0
     missed = answered & _missed(plane, answer, rtol)
-    undecided = answered & (answer["verdict"] == -1) if "verdict" in answer else np.zeros(answered.shape, bool)
-    shown = (np.where(answered, error, np.nan), ratio, answered, missed, undecided, answered & ~checked, lie & answered)
+    undecided = (
+        answered & (answer["verdict"] == -1)
+        if "verdict" in answer
+        else np.zeros(answered.shape, bool)
+    )
+    shown = (
+        np.where(answered, error, np.nan),
+        ratio,
+        answered,
+        missed,
+        undecided,
+        answered & ~checked,
+        lie & answered,
+    )
     return Comparison(*(values.reshape(plane.shape) for values in shown))
 
 
@@ -110,7 +137,9 @@ def _answered(answer):
     for name in answer:
         if f"{name}_error" in answer:
             some |= _any(np.isfinite(answer[name]))
-    return (answer["status"] == status.OK) | (some & ~np.isin(answer["status"], list(status.UNANSWERED)))
+    return (answer["status"] == status.OK) | (
+        some & ~np.isin(answer["status"], list(status.UNANSWERED))
+    )
 
 
 def _missed(plane, answer, rtol):
@@ -118,7 +147,11 @@ def _missed(plane, answer, rtol):
     _, module = user_scene.find(plane.scene)
     missed = np.zeros(answer["status"].shape, bool)
     for output in module.OUTPUTS:
-        if output.name in answer and f"{output.name}_error" in answer and exists(output, _options(module, plane)):
+        if (
+            output.name in answer
+            and f"{output.name}_error" in answer
+            and exists(output, _options(module, plane))
+        ):
             bar = answer[f"{output.name}_error"]
             with np.errstate(invalid="ignore"):
                 missed |= _any(bar > rtol * (1.0 + np.abs(answer[output.name])))
@@ -126,7 +159,9 @@ def _missed(plane, answer, rtol):
 
 
 def _options(module, plane):
-    return {option.name: option.default for option in module.OPTIONS if not option.only_with} | dict(plane.options)
+    return {
+        option.name: option.default for option in module.OPTIONS if not option.only_with
+    } | dict(plane.options)
 
 
 def _any(mask):

@@ -49,7 +49,10 @@ def text(scene, name, about, planes, results, records, share):
 def _table(plane, results, records):
     own = [r for r in records if r.name == plane.name]
     return TABLE.format(
-        title=plane.name, source=plane.source, rows="\n".join(_row(r) for r in own), auto=_auto(dict(results))
+        title=plane.name,
+        source=plane.source,
+        rows="\n".join(_row(r) for r in own),
+        auto=_auto(dict(results)),
     )
 
 
@@ -67,7 +70,11 @@ def _row(r):
 def _auto(results):
     """What `auto` does beside the others, in a sentence."""
     auto = results["auto"]
-    met = {method: found.answered & ~found.missed for method, found in results.items() if found is not None}
+    met = {
+        method: found.answered & ~found.missed
+        for method, found in results.items()
+        if found is not None
+    }
     rest = [of for method, of in met.items() if method not in ("auto", MAP)]
     some = np.any(rest, axis=0) if rest else np.zeros_like(met["auto"])
     lost, gained = int((some & ~met["auto"]).sum()), int((met["auto"] & ~some).sum())

@@ -16,7 +16,9 @@ def draw(planes, results, path):
     methods = list(dict.fromkeys(method for of in results for method, _ in of))
     methods.sort(key=lambda method: method.startswith("auto"))
     size = (WIDE * len(methods) + 2.6, HIGH * len(planes) + 1.2)
-    figure, axes = plt.subplots(len(planes), len(methods), figsize=size, squeeze=False, layout="constrained")
+    figure, axes = plt.subplots(
+        len(planes), len(methods), figsize=size, squeeze=False, layout="constrained"
+    )
     norm, shown = BoundaryNorm(np.arange(-17, -3), 256, extend="both"), None
     for ax, method in zip(axes[0], methods, strict=True):
         ax.set_title(method, fontsize=9)
@@ -25,16 +27,25 @@ def draw(planes, results, path):
         for i, (ax, method) in enumerate(zip(line, methods, strict=True)):
             shown = _panel(ax, found, method, norm) or shown
             ax.set_xticks(list(plane.x.ticks), list(plane.x.ticks.values()), fontsize=6)
-            ax.set_yticks(list(plane.y.ticks), [] if i else list(plane.y.ticks.values()), fontsize=6)
+            ax.set_yticks(
+                list(plane.y.ticks), [] if i else list(plane.y.ticks.values()), fontsize=6
+            )
             ax.set(xlim=(-0.5, plane.x.size - 0.5), ylim=(-0.5, plane.y.size - 0.5))
         line[0].set_ylabel(f"{plane.title}\n\n{plane.y.label}", fontsize=7)
         line[len(methods) // 2].set_xlabel(plane.x.label, fontsize=7)
     if shown is not None:
         label = r"true error over $1 + |\mathrm{value}|$, $\log_{10}$"
-        figure.colorbar(shown, ax=axes, label=label, location="right", aspect=40, fraction=0.03, pad=0.01)
+        figure.colorbar(
+            shown, ax=axes, label=label, location="right", aspect=40, fraction=0.03, pad=0.01
+        )
     handles = [
         Patch(facecolor=GREY, label="no answer"),
-        Patch(facecolor="white", edgecolor="black", hatch="////", label=f"its error bar misses rtol = {RTOL:g}"),
+        Patch(
+            facecolor="white",
+            edgecolor="black",
+            hatch="////",
+            label=f"its error bar misses rtol = {RTOL:g}",
+        ),
         Patch(facecolor="black", label="a lie: beyond its error bar"),
     ]
     if any(j is not None and j.unchecked.any() for of in results for _, j in of):
@@ -49,11 +60,18 @@ def _panel(ax, found, method, norm):
     ax.set_facecolor(GREY)
     j = found.get(method)
     if j is None or not j.answered.any():
-        words = "not asked" if method not in found else "refused as\na whole" if j is None else "no answer"
+        words = (
+            "not asked"
+            if method not in found
+            else "refused as\na whole"
+            if j is None
+            else "no answer"
+        )
         ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", fontsize=7)
         return None
     look = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
-    error = np.where(j.answered & np.isnan(j.error) & ~j.unchecked, 1e-17, j.error)  # flags alone, which are right
+    # flags alone, which are right
+    error = np.where(j.answered & np.isnan(j.error) & ~j.unchecked, 1e-17, j.error)
     shown = ax.imshow(np.log10(np.maximum(error, 1e-30)), norm=norm, cmap="viridis", **look)
     if j.unchecked.any():
         ax.imshow(np.where(j.unchecked, 1.0, np.nan), cmap=ListedColormap(["white"]), **look)

@@ -26,8 +26,9 @@ class Axis:
 class Plane:
     """Points of a scene and what is known of them.
 
-    `given` holds numbers, or arrays that broadcast to (y, x). `truth` is one of `survey.truth`. `shared`: dimensions
-    along which a parameter does not vary are not spread out, so that one solution serves all times or angles.
+    `given` holds numbers, or arrays that broadcast to (y, x). `truth` is one of `survey.truth`.
+    `shared`: dimensions along which a parameter does not vary are not spread out, so that one
+    solution serves all times or angles.
     """
 
     title: str
@@ -58,12 +59,17 @@ class Plane:
         _, module = user_scene.find(self.scene)
         options = check_options(module, self.options, self.given)
         named = [method for method in methods_of(module, options) if method not in self.slow]
-        product = not self.shared and all(min(np.shape(v)) == 1 for v in self.given.values() if np.ndim(v) == 2)
+        product = not self.shared and all(
+            min(np.shape(v)) == 1 for v in self.given.values() if np.ndim(v) == 2
+        )
         return [*named, "auto", *([MAP] if product else [])]
 
     def flat(self):
         """The parameters of all points, one after the other."""
-        return {name: np.broadcast_to(np.asarray(v, float), self.shape).ravel() for name, v in self.given.items()}
+        return {
+            name: np.broadcast_to(np.asarray(v, float), self.shape).ravel()
+            for name, v in self.given.items()
+        }
 
 
 def few(share, number, least=4):
@@ -93,7 +99,9 @@ def two_sided(label, exponents):
     size = len(exponents)
     marks = round(0.5 * (exponents[0] + exponents[-1])), math.floor(exponents[-1])
     at = np.interp(marks, exponents, np.arange(size))
-    ticks = {size - 1 - i: f"$-10^{{{k}}}$" for i, k in zip(at, marks, strict=True)} | {size - 0.5: "0"}
+    ticks = {size - 1 - i: f"$-10^{{{k}}}$" for i, k in zip(at, marks, strict=True)} | {
+        size - 0.5: "0"
+    }
     ticks |= {size + i: f"$10^{{{k}}}$" for i, k in zip(at, marks, strict=True)}
     return Axis(label, 2 * size, ticks), offsets
 

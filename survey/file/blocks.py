@@ -22,18 +22,29 @@ FORMAT = 3
 
 
 class Blocks:
-    """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as soon as it is finished.
+    """The finished blocks of a run in `OUT.nc.blocks/`: one writer, each block durable as soon as
+    it is finished.
 
-    Each block is labelled with its survey; the manifest, which is created first and removed last, informs users.
-    Use as a context manager; raises BadInput if another run holds the output, or if the existing blocks belong to
-    another survey (unless `fresh`), Damaged if their survey is unknown. For users, the folder also keeps `about`, the
-    text of the `workflow`, and `resume_command`. If the output is complete and of the same workflow, `published` holds
-    its attributes, and all that remains is to `remove` what a run may have left. A complete output of another one is
-    refused, unless `fresh`, or this run `replaces` it, or its blocks show that it was asked to.
+    Each block is labelled with its survey; the manifest, which is created first and removed last,
+    informs users. Use as a context manager; raises BadInput if another run holds the output, or if
+    the existing blocks belong to another survey (unless `fresh`), Damaged if their survey is
+    unknown. For users, the folder also keeps `about`, the text of the `workflow`, and
+    `resume_command`. If the output is complete and of the same workflow, `published` holds its
+    attributes, and all that remains is to `remove` what a run may have left. A complete output of
+    another one is refused, unless `fresh`, or this run `replaces` it, or its blocks show that it
+    was asked to.
     """
 
     def __init__(
-        self, path, fingerprint, fresh=False, about=None, workflow="", resume_command=None, text=None, replaces=False
+        self,
+        path,
+        fingerprint,
+        fresh=False,
+        about=None,
+        workflow="",
+        resume_command=None,
+        text=None,
+        replaces=False,
     ):
         self.folder = unfinished.folder_of(path)
         self.path = Path(path)
@@ -58,12 +69,18 @@ class Blocks:
         return self
 
     def __exit__(self, *_):
-        with contextlib.suppress(OSError):  # the error that ended the run is reported, and the next run takes the lock
+        # the error that ended the run is reported, and the next run takes the lock
+        with contextlib.suppress(OSError):
             self.lock.release()
 
     def __getstate__(self):
         # workers anywhere save blocks; only the parent process holds the lock
-        return self.__dict__ | {"lock": None, "workflow": "", "text": None, "folder": self.folder.absolute()}
+        return self.__dict__ | {
+            "lock": None,
+            "workflow": "",
+            "text": None,
+            "folder": self.folder.absolute(),
+        }
 
     def done(self):
         """Numbers of the blocks that are finished."""
@@ -76,10 +93,14 @@ class Blocks:
     def save(self, number, arrays):
         """Keep the arrays of block `number`; once this returns, they survive a power cut."""
         with refused(self.path):
-            write_atomically(self._file(number), lambda file: pack(arrays, file, self._label(number)))
+            write_atomically(
+                self._file(number), lambda file: pack(arrays, file, self._label(number))
+            )
 
     def keep(self, number, arrays):
-        """Save the block if this process can reach the run's folder; else return the bytes for `save_packed`."""
+        """Save the block if this process can reach the run's folder; else return the bytes for
+        `save_packed`.
+        """
         if self._reaches_folder():
             self.save(number, arrays)
             return None
@@ -109,12 +130,16 @@ class Blocks:
                 return self._read(number)
             except (FileNotFoundError, ValueError) as error:
                 self._file(number).unlink(missing_ok=True)
-                raise Damaged(f"{self._file(number)}: this block is damaged ({error}); run the command again") from None
+                raise Damaged(
+                    f"{self._file(number)}: this block is damaged ({error}); run the command again"
+                ) from None
 
     def refuse_lost_lock(self):
         """Raise Stopped if the lock names another run: without shared locks, a suspended run may lose it."""
         if not self.lock.owned():
-            raise Stopped(f"{self.path}: another run has taken its lock while this one was suspended; wait, or use -o")
+            raise Stopped(
+                f"{self.path}: another run has taken its lock while this one was suspended; wait, or use -o"
+            )
 
     def remove(self):
         """Remove the blocks and the lock, once the output is complete."""
@@ -154,7 +179,9 @@ class Blocks:
         try:
             self.lock.acquire()
         except lock.Held as held:
-            raise BadInput(f"{self.path}: another run is writing it ({held}); wait, or use -o") from None
+            raise BadInput(
+                f"{self.path}: another run is writing it ({held}); wait, or use -o"
+            ) from None
 
     def _prepare(self):
         if self.fresh:
@@ -201,9 +228,11 @@ class Blocks:
         return True
 
     def _complete(self, begun):
-        """Is the output complete and of the same workflow? If so, set `published`, and keep one digest beside it.
+        """Is the output complete and of the same workflow? If so, set `published`, and keep one
+        digest beside it.
 
-        Raises BadInput if it is complete and of another workflow, and no run that replaces it has `begun`.
+        Raises BadInput if it is complete and of another workflow, and no run that replaces it has
+        `begun`.
         """
         found = {} if self.text is None else finished.attributes(self.path)
         if not found or finished.lost(found):
@@ -214,7 +243,8 @@ class Blocks:
                 finished.refuse(self.path, found, self.text, code, own)
             return False
         digest = digest_of(self.path)
-        if digest.exists() and digest.read_bytes().count(b"\n") > 1:  # the run ended between file and digest
+        # the run ended between file and digest
+        if digest.exists() and digest.read_bytes().count(b"\n") > 1:
             self.folder.mkdir(exist_ok=True)
             with open(self.path, "rb") as file:
                 line = f"{hashlib.file_digest(file, 'sha256').hexdigest()}  {self.path.name}\n".encode()
@@ -248,10 +278,12 @@ def clear(folder):
 
 
 def pack(arrays, file, label=""):
-    """Write the arrays to a binary file: a line with the label and their names, their bytes padded to multiples of 8,
-    and a checksum."""
+    """Write the arrays to a binary file: a line with the label and their names, their bytes padded
+    to multiples of 8, and a checksum."""
     names = {name: (array.dtype.str, array.shape) for name, array in arrays.items()}
-    parts = [json.dumps([label, names]).encode() + b"\n"] + [np.ascontiguousarray(array) for array in arrays.values()]
+    parts = [json.dumps([label, names]).encode() + b"\n"] + [
+        np.ascontiguousarray(array) for array in arrays.values()
+    ]
     check = 0
     for part in parts:
         for piece in (part, bytes(-memoryview(part).nbytes % 8)):

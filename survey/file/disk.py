@@ -20,23 +20,30 @@ def refused(path, what="writing"):
         raise
     except OSError as error:
         reason = error.strerror or error
-        if isinstance(error.filename, (str, os.PathLike)) and not str(error.filename).startswith(str(path)):
+        if isinstance(error.filename, (str, os.PathLike)) and not str(error.filename).startswith(
+            str(path)
+        ):
             reason = f"{reason}: {error.filename}"
         with contextlib.suppress(OSError):
             reason = f"{reason}; {filesize.decimal(shutil.disk_usage(Path(path).parent).free)} free"
-        raise Stopped(f"{path}: {what} failed ({reason}); fix this and run the command again") from None
+        raise Stopped(
+            f"{path}: {what} failed ({reason}); fix this and run the command again"
+        ) from None
 
 
 def check_folder(path, *endings):
     """Raise BadInput, before anything is computed, where no file can be made at `path`.
 
-    Its folder must exist, and it may be no folder itself; if `endings` are given, it has one of them, so that the name
-    of a file of another kind, a survey's say, is not taken for that of this one.
+    Its folder must exist, and it may be no folder itself; if `endings` are given, it has one of
+    them, so that the name of a file of another kind, a survey's say, is not taken for that of this
+    one.
     """
     path = Path(path)
     folder = path.parent
     if endings and path.is_dir():
-        raise BadInput(f"{shown(str(path), 120)} is a folder; name a file that ends in {' or '.join(endings)}, with -o")
+        raise BadInput(
+            f"{shown(str(path), 120)} is a folder; name a file that ends in {' or '.join(endings)}, with -o"
+        )
     if endings and path.suffix.lower() not in endings:
         example = shown(path.stem + endings[0], 120)
         raise BadInput(
@@ -48,7 +55,8 @@ def check_folder(path, *endings):
 
 
 def write_atomically(path, content, folder=None):
-    """Write bytes, or what `content(file)` writes, so that `path` is absent, old or new at every instant.
+    """Write bytes, or what `content(file)` writes, so that `path` is absent, old or new at every
+    instant.
 
     The incomplete file lies in `folder`, on the same disk; by default beside `path`.
     """

@@ -17,7 +17,8 @@ AGAIN = ("worker_died", "pending")  # points for which a run is repeated
 
 
 def attributes(path):
-    """The global attributes of the complete, intact file at `path`; {} if there is none, or it is damaged.
+    """The global attributes of the complete, intact file at `path`; {} if there is none, or it is
+    damaged.
 
     Raises BadInput if another program has written it.
     """
@@ -29,7 +30,9 @@ def attributes(path):
     except (OSError, RuntimeError):
         return {}
     if "scene" not in found and "complete" not in found:
-        raise BadInput(f"{path}: this netCDF file was not written by survey; write another with -o, or use --fresh")
+        raise BadInput(
+            f"{path}: this netCDF file was not written by survey; write another with -o, or use --fresh"
+        )
     return found if found.get("complete") == 1 else {}
 
 
@@ -37,7 +40,10 @@ def _is_intact(path):
     """Is there a file, which matches its digest, or has none?"""
     digest = digest_of(path)
     with open(path, "rb") as file:
-        return not digest.exists() or hashlib.file_digest(file, "sha256").hexdigest().encode() in digest.read_bytes()
+        return (
+            not digest.exists()
+            or hashlib.file_digest(file, "sha256").hexdigest().encode() in digest.read_bytes()
+        )
 
 
 def lost(found):
@@ -54,7 +60,9 @@ def changes(found, workflow):
 
 
 def refuse(path, found, workflow, code, scene_hash):
-    """Raise BadInput: the file at `path` is of another workflow, or of other code than this (`code`: its versions)."""
+    """Raise BadInput: the file at `path` is of another workflow, or of other code than this
+    (`code`: its versions).
+    """
     causes, differences = [], changes(found, workflow)
     if differences:
         causes.append(f"of another workflow ({unfinished.listed(differences)})")
@@ -63,9 +71,13 @@ def refuse(path, found, workflow, code, scene_hash):
     if not causes:
         versions = {name: found.get(f"version_{name}") for name in ("survey", "numba", "llvmlite")}
         other = [
-            f"{name} {old} -> {code[name]}" for name, old in versions.items() if name in code and code[name] != old
+            f"{name} {old} -> {code[name]}"
+            for name, old in versions.items()
+            if name in code and code[name] != old
         ]
-        causes.append(f"from another version of the code ({', '.join(other) or 'its sources differ'})")
+        causes.append(
+            f"from another version of the code ({', '.join(other) or 'its sources differ'})"
+        )
     points = found.get("points")
     many = f" of {points:,} points" if isinstance(points, (int, np.integer)) else ""
     raise BadInput(

@@ -34,7 +34,9 @@ def _outputs_of(scene, names, options):
 
 
 def layout(scene, request):
-    """What is stored per point, {variable: (dtype, fill, extra shape)}: outputs, their errors, and `status`."""
+    """What is stored per point, {variable: (dtype, fill, extra shape)}: outputs, their errors, and
+    `status`.
+    """
     return _layout(scene, request.variables, tuple(request.options.items()))
 
 
@@ -85,15 +87,23 @@ def describe(grid, scene, name, request, arrays):
 
 @lru_cache(maxsize=64)
 def _of_one_point(scene, name, parameters, variables, options, method, rtol):
-    """(dataset, fills, codes) of a lone point, its values not known yet: to copy one takes a fifth of making it.
+    """(dataset, fills, codes) of a lone point, its values not known yet: to copy one takes a fifth
+    of making it.
 
-    `fills` are the integers of `_masked` by output, and `codes` the `flag_values` of those that have some.
+    `fills` are the integers of `_masked` by output, and `codes` the `flag_values` of those that
+    have some.
     """
     request = Request(dict(options), method, rtol, variables)
     grid = Grid({}, {key: ((), np.zeros(())) for key in parameters})
-    arrays = {key: np.zeros(extra, kind) for key, (kind, _, extra) in layout(scene, request).items()}
+    arrays = {
+        key: np.zeros(extra, kind) for key, (kind, _, extra) in layout(scene, request).items()
+    }
     ds = _dataset(grid, scene, name, request, arrays)
-    flagged = {key: of.attrs["flag_values"] for key, of in ds.variables.items() if "flag_values" in of.attrs}
+    flagged = {
+        key: of.attrs["flag_values"]
+        for key, of in ds.variables.items()
+        if "flag_values" in of.attrs
+    }
     return ds, {key: ds.variables[key].encoding.get(FILL) for key in arrays}, flagged
 
 
@@ -101,8 +111,14 @@ def _dataset(grid, scene, name, request, arrays):
     import xarray as xr
 
     # made here, as xarray takes longer to find out what they are
-    data = {key: _variable(dims, arrays[key], attrs) for key, (dims, attrs) in variables(grid, scene, request).items()}
-    coords = {key: xr.Variable(*of, fastpath=True) for key, of in coordinates(grid, scene, request).items()}
+    data = {
+        key: _variable(dims, arrays[key], attrs)
+        for key, (dims, attrs) in variables(grid, scene, request).items()
+    }
+    coords = {
+        key: xr.Variable(*of, fastpath=True)
+        for key, of in coordinates(grid, scene, request).items()
+    }
     return xr.Dataset(data, coords, attributes(scene, name, request))
 
 
@@ -118,14 +134,19 @@ def _variable(dims, values, attributes):
 
 
 def _masked(values, fill):
-    """Integers where they do not apply masked, as xarray decodes them: floats, NaN there; others unchanged."""
+    """Integers where they do not apply masked, as xarray decodes them: floats, NaN there; others
+    unchanged.
+    """
     return values if fill is None else np.where(values == fill, np.nan, values.astype(float))
 
 
 def coordinates(grid, scene, request):
     """{name: (dimensions, values, attributes)}: the parameters, then the extra dimensions of the outputs."""
     used = {p.name: p for p in scene.PARAMETERS}
-    coords = {key: (dims, values, _parameter_attributes(used[key])) for key, (dims, values) in grid.parameters.items()}
+    coords = {
+        key: (dims, values, _parameter_attributes(used[key]))
+        for key, (dims, values) in grid.parameters.items()
+    }
     extra = dict.fromkeys(dim for output in outputs_of(scene, request) for dim in output.dims)
     return coords | {dim: _index(dim, np.asarray(scene.DIMENSIONS[dim])) for dim in extra}
 
@@ -145,7 +166,10 @@ def variables(grid, scene, request):
         table[output.name] = (dims + output.dims, masked | meaning(output))
         if output.dtype.kind == "f":
             bar = {"long_name": f"error bound of {output.name}", "units": output.units}
-            bar |= {"coverage_content_type": "qualityInformation", "symbol": rf"\delta {output.symbol or output.name}"}
+            bar |= {
+                "coverage_content_type": "qualityInformation",
+                "symbol": rf"\delta {output.symbol or output.name}",
+            }
             table[f"{output.name}_error"] = (dims + output.dims, bar)
     return table | {"status": (dims, _status_attributes(scene))}
 
@@ -170,16 +194,19 @@ def attributes(scene, name, request):
 
 
 class Tally:
-    """Counts, over pieces of a map, by status and verdict and of points whose error bar exceeds the requested accuracy.
+    """Counts, over pieces of a map, by status and verdict and of points whose error bar exceeds the
+    requested accuracy.
 
-    `flags` is {"status": its attributes, "verdict": its attributes (if there is one)}. `unanswered` counts, by
-    status, the points whose verdict is -1 because there is no answer.
+    `flags` is {"status": its attributes, "verdict": its attributes (if there is one)}. `unanswered`
+    counts, by status, the points whose verdict is -1 because there is no answer.
     """
 
     def __init__(self, flags, rtol):
         self.codes = {name: flag_codes(attrs) for name, attrs in flags.items()}
         self.counts = {name: dict.fromkeys(codes, 0) for name, codes in self.codes.items()}
-        self.unanswered = {name: 0 for name, code in self.codes["status"].items() if code != status.OK}
+        self.unanswered = {
+            name: 0 for name, code in self.codes["status"].items() if code != status.OK
+        }
         self.rtol = rtol
         self.points = self.missed = 0
 
@@ -203,13 +230,17 @@ class Tally:
                 self.counts[name][key] += number
                 left -= number
         if "verdict" in self.codes:
-            why = arrays["status"][(arrays["verdict"] == UNDECIDED) & (arrays["status"] != status.OK)]
+            why = arrays["status"][
+                (arrays["verdict"] == UNDECIDED) & (arrays["status"] != status.OK)
+            ]
             for key in self.unanswered if why.size else ():
                 self.unanswered[key] += int(np.count_nonzero(why == self.codes["status"][key]))
 
     @property
     def kinds(self):
-        """{"status", "verdict": {kind: points}}; a point without an answer counts by its status, not as undecided."""
+        """{"status", "verdict": {kind: points}}; a point without an answer counts by its status,
+        not as undecided.
+        """
         kinds = {name: dict(number) for name, number in self.counts.items()}
         if "undecided" in kinds.get("verdict", ()):
             kinds["verdict"]["undecided"] -= sum(self.unanswered.values())
@@ -228,11 +259,15 @@ class Tally:
 
 
 def _counts(table):
-    return {f"{name}_counts": ", ".join(f"{k}: {n}" for k, n in number.items() if n) for name, number in table.items()}
+    return {
+        f"{name}_counts": ", ".join(f"{k}: {n}" for k, n in number.items() if n)
+        for name, number in table.items()
+    }
 
 
 def counts_in(attributes):
-    """{"status", "verdict": {kind: points}} from a file's attributes, as `Tally.attributes` wrote them.
+    """{"status", "verdict": {kind: points}} from a file's attributes, as `Tally.attributes` wrote
+    them.
 
     Raises Damaged where they say anything else."""
     found = {}
@@ -256,14 +291,19 @@ def _exceeds(value, bar, rtol):
 
 def tally(ds):
     """An empty Tally for a survey's dataset."""
-    return Tally({name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"])
+    return Tally(
+        {name: ds[name].attrs for name in ("status", "verdict") if name in ds}, ds.attrs["rtol"]
+    )
 
 
 def count(ds, arrays=None):
-    """Add the counts of `Tally` over the `arrays` of `ds` (see `describe`; its variables) to its attributes."""
+    """Add the counts of `Tally` over the `arrays` of `ds` (see `describe`; its variables) to its
+    attributes.
+    """
     arrays = {name: ds[name].values for name in ds.data_vars} if arrays is None else arrays
     total = Tally(
-        {name: ds.variables[name].attrs for name in ("status", "verdict") if name in arrays}, ds.attrs["rtol"]
+        {name: ds.variables[name].attrs for name in ("status", "verdict") if name in arrays},
+        ds.attrs["rtol"],
     )
     total.add(arrays)
     ds.attrs |= total.attributes
@@ -289,7 +329,9 @@ def undecided_share(ds):
 
 
 def flag_codes(attributes):
-    """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged if they are not valid."""
+    """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged if they are
+    not valid.
+    """
     return schema.flags(attributes)
 
 
@@ -301,7 +343,11 @@ def options_of(ds):
 def error_bars(ds):
     """Names of the float outputs of `ds`, which have an error bar, with one value or more per point."""
     point = set(ds.status.dims)
-    return [name for name in ds.data_vars if f"{name}_error" in ds.data_vars and point <= set(ds[name].dims)]
+    return [
+        name
+        for name in ds.data_vars
+        if f"{name}_error" in ds.data_vars and point <= set(ds[name].dims)
+    ]
 
 
 @cache
@@ -357,7 +403,9 @@ def _cpu():
     """The processor's name."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+        return next(
+            line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")
+        )
     except (OSError, StopIteration):
         return platform.processor() or platform.machine()
 
@@ -395,9 +443,15 @@ def fill_of(variable):
 
 
 def masked(variable):
-    """The DataArray with NaN where an integer output does not apply, also of a file in which it is not masked."""
+    """The DataArray with NaN where an integer output does not apply, also of a file in which it is
+    not masked.
+    """
     fill = fill_of(variable)
-    return variable if fill is None or variable.dtype.kind == "f" else variable.astype(float).where(variable != fill)
+    return (
+        variable
+        if fill is None or variable.dtype.kind == "f"
+        else variable.astype(float).where(variable != fill)
+    )
 
 
 def as_stored(variable):
@@ -417,7 +471,10 @@ def words_of(variable):
 
 def flag_attributes(codes):
     """The attributes of a CF flag variable, from {flag meaning: code}."""
-    return {"flag_values": np.array(list(codes.values()), np.int8), "flag_meanings": " ".join(codes)}
+    return {
+        "flag_values": np.array(list(codes.values()), np.int8),
+        "flag_meanings": " ".join(codes),
+    }
 
 
 def _status_attributes(scene):

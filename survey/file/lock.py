@@ -1,8 +1,9 @@
-"""The lock of an output, `OUT.nc.lock`: a file that names the run writing it, removed when the run ends.
+"""The lock of an output, `OUT.nc.lock`: a file that names the run writing it, removed when the run
+ends.
 
-The system's lock (flock, LockFileEx) shows at once whether a process on this host holds it. Not every network file
-system shares it between hosts, so a run on another host, which the file names, is active as long as the file's
-modification time advances.
+The system's lock (flock, LockFileEx) shows at once whether a process on this host holds it. Not
+every network file system shares it between hosts, so a run on another host, which the file names,
+is active as long as the file's modification time advances.
 """
 
 import contextlib
@@ -23,12 +24,16 @@ class Held(Exception):
     """Another run holds the lock: `holder` is what its file contains."""
 
     def __init__(self, holder):
-        super().__init__(f"host {holder.get('host', 'unknown')}, pid {holder.get('pid', 'unknown')}")
+        super().__init__(
+            f"host {holder.get('host', 'unknown')}, pid {holder.get('pid', 'unknown')}"
+        )
         self.holder = holder
 
 
 class Lock:
-    """The lock of one output; `name`, written to the file, is a mapping with the host, the pid and a unique entry."""
+    """The lock of one output; `name`, written to the file, is a mapping with the host, the pid and
+    a unique entry.
+    """
 
     def __init__(self, path, name):
         self.path, self.name = str(path), name
@@ -37,13 +42,18 @@ class Lock:
     def acquire(self):
         """Acquire the lock; returns the name that an interrupted run has left in it, else {}.
 
-        Raises Held at once if a run on this host holds it, and after BEAT_SECONDS if one on another host does.
+        Raises Held at once if a run on this host holds it, and after BEAT_SECONDS if one on another
+        host does.
         """
         self.descriptor, known = self._opened()
         before = {}
         try:
             before = _name_in(self.descriptor)
-            if before and not (known and before.get("host") == socket.gethostname()) and self._beats(before):
+            if (
+                before
+                and not (known and before.get("host") == socket.gethostname())
+                and self._beats(before)
+            ):
                 raise Held(before)
             content = json.dumps(self.name).encode()
             os.lseek(self.descriptor, 0, os.SEEK_SET)
@@ -77,8 +87,10 @@ class Lock:
         descriptor, self.descriptor = self.descriptor, None
         try:
             if self._is_file(descriptor):
-                os.unlink(self.path)  # while it is held, so that nobody else can hold a lock of that name
-        except PermissionError:  # Windows removes no file that is open: this one, or once another run has it
+                # while it is held, so that nobody else can hold a lock of that name
+                os.unlink(self.path)
+        # Windows removes no file that is open: this one, or once another run has it
+        except PermissionError:
             os.close(descriptor)
             descriptor = None
             os.unlink(self.path)
@@ -139,7 +151,11 @@ def holder(path):
             with contextlib.suppress(BlockingIOError):
                 if _locked(descriptor) and name.get("host") == socket.gethostname():
                     return None
-                return name if name and time.time() - os.fstat(descriptor).st_mtime < GONE_SECONDS else None
+                return (
+                    name
+                    if name and time.time() - os.fstat(descriptor).st_mtime < GONE_SECONDS
+                    else None
+                )
             time.sleep(PEEK_SECONDS / PEEKS)
         return name
     finally:
@@ -147,7 +163,9 @@ def holder(path):
 
 
 def _locked(descriptor):
-    """Lock the file; False where the file system has no locks. Raises BlockingIOError if another process holds it."""
+    """Lock the file; False where the file system has no locks. Raises BlockingIOError if another
+    process holds it.
+    """
     import filelock  # Windows too; closing the file, or the end of its process, unlocks it
 
     try:
@@ -167,7 +185,9 @@ def _beat_of(path):
 
 
 def _name_in(descriptor):
-    """The mapping in the open file; {} if there is none. Its first byte is what Windows locks, unreadable by others."""
+    """The mapping in the open file; {} if there is none. Its first byte is what Windows locks,
+    unreadable by others.
+    """
     try:
         os.lseek(descriptor, 1, os.SEEK_SET)
         name = json.loads(b"{" + os.read(descriptor, 2**16))

@@ -13,7 +13,8 @@ TILE_POINTS = 2**16
 
 
 class MapFile:
-    """The netCDF file of a map, written piece by piece beside the blocks; `publish` moves it into place.
+    """The netCDF file of a map, written piece by piece beside the blocks; `publish` moves it into
+    place.
 
     `coordinates`, `variables` and `layout` are those of `survey.file.labels`; `shape` is the map's.
     """
@@ -40,14 +41,16 @@ class MapFile:
                 self.part.unlink(missing_ok=True)
 
     def write(self, name, values, where=()):
-        """Write values of a variable of the map, all or those at `where` (slices from and to edges of tiles)."""
+        """Write values of a variable of the map, all or those at `where` (slices from and to edges
+        of tiles).
+        """
         from survey.file import tiles
 
         self.file.write(tiles.write, name, values, where)
 
     def publish(self, attributes, further=()):
-        """Add the new variables of the `further` datasets and the attributes, `complete` last; then move the file into
-        place, with its digest beside it (`OUT.nc.sha256`)."""
+        """Add the new variables of the `further` datasets and the attributes, `complete` last; then
+        move the file into place, with its digest beside it (`OUT.nc.sha256`)."""
         for ds in further:
             self._add(ds)
         self.file.describe(attributes | {"complete": np.int8(1)})
@@ -66,15 +69,20 @@ class MapFile:
     def _define_map(self, coordinates, variables, layout, shape, tile):
         for name, (dims, values, attributes) in coordinates.items():
             values = np.asarray(values)
-            if values.dtype.kind == "U":  # CF allows labels of a dimension as arrays of characters only
+            # CF allows labels of a dimension as arrays of characters only
+            if values.dtype.kind == "U":
                 values = np.char.encode(values, "utf-8")
                 values = values.view("S1").reshape(*values.shape, -1)
                 dims, attributes = (*dims, f"{name}_length"), attributes | {"_Encoding": "utf-8"}
             self.file.define(name, dims, values.shape, values.dtype, attributes, values=values)
-        self.auxiliary = {name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims}
+        self.auxiliary = {
+            name: set(dims) for name, (dims, _, _) in coordinates.items() if name not in dims
+        }
         for name, (dims, attributes) in variables.items():
             dtype, _, extra = layout[name]
-            self.file.define(name, dims, shape + extra, dtype, attributes | self._coordinates(dims), tile + extra)
+            self.file.define(
+                name, dims, shape + extra, dtype, attributes | self._coordinates(dims), tile + extra
+            )
 
     def _add(self, ds):
         for name, variable in ds.variables.items():
@@ -82,7 +90,13 @@ class MapFile:
                 tile = halved(variable.shape, TILE_POINTS)
                 attributes = variable.attrs | self._coordinates(variable.dims)
                 self.file.define(
-                    name, variable.dims, variable.shape, variable.dtype, attributes, tile, values=variable.values
+                    name,
+                    variable.dims,
+                    variable.shape,
+                    variable.dtype,
+                    attributes,
+                    tile,
+                    values=variable.values,
                 )
 
     def _coordinates(self, dims):

@@ -1,8 +1,10 @@
-"""netCDF-4 files written with h5py through a file object of our own: HDF5 never meets a system call that fails.
+"""netCDF-4 files written with h5py through a file object of our own: HDF5 never meets a system call
+that fails.
 
-After a failed write, HDF5 retries what it could not write and may crash the process at any later call, even on closing
-the file. So a `Sink` writes for it, records the first error, and serves what is not on the disk from memory.
-Structure: netCDF-4 format, NetCDF User's Guide, Appendix B (dimensions are HDF5's dimension scales).
+After a failed write, HDF5 retries what it could not write and may crash the process at any later
+call, even on closing the file. So a `Sink` writes for it, records the first error, and serves what
+is not on the disk from memory. Structure: netCDF-4 format, NetCDF User's Guide, Appendix B
+(dimensions are HDF5's dimension scales).
 """
 
 import contextlib
@@ -11,7 +13,8 @@ import os
 import h5py
 import numpy as np
 
-VERSIONS = ("earliest", "v108")  # of HDF5 whose readers can read the file, as the netCDF library chooses them
+# of HDF5 whose readers can read the file, as the netCDF library chooses them
+VERSIONS = ("earliest", "v108")
 # compression with checksums: readable everywhere, and every flipped bit is detected
 PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True, "fletcher32": True}
 BARE = "This is a netCDF dimension but not a netCDF variable.{:10d}"
@@ -21,7 +24,8 @@ class Sink:
     """A new file for HDF5 that never fails: `error` is the first OSError; later writes stay in memory."""
 
     def __init__(self, path):
-        flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)  # that one on Windows
+        # that one on Windows
+        flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)
         self.descriptor = os.open(path, flags, 0o666)
         self.at, self.size, self.error, self.unwritten = 0, 0, None, []
 
@@ -96,7 +100,8 @@ class Sink:
 
 
 class File:
-    """A new netCDF-4 file at `path`: `define` its variables, then `close` it. Raises OSError where the disk does.
+    """A new netCDF-4 file at `path`: `define` its variables, then `close` it. Raises OSError where
+    the disk does.
 
     The file is complete only once it is closed. `discard` closes it whatever has happened.
     """
@@ -105,7 +110,11 @@ class File:
         self.sink, self.dimensions, self.variables = Sink(path), {}, {}
         self.file = h5py.File(self.sink, "w", track_order=True, libver=VERSIONS, locking=False)
         try:
-            self.describe({"_NCProperties": f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}"})
+            self.describe(
+                {
+                    "_NCProperties": f"version=2,h5py={h5py.__version__},hdf5={h5py.version.hdf5_version}"
+                }
+            )
         except OSError:
             self.discard()
             raise
@@ -118,9 +127,11 @@ class File:
         return self.file[name]
 
     def define(self, name, dims, shape, dtype, attributes, tile=None, values=None):
-        """Create a variable, compressed in tiles of these lengths (if any), with floats NaN until they are written.
+        """Create a variable, compressed in tiles of these lengths (if any), with floats NaN until
+        they are written.
 
-        Dimensions that the file lacks are created. Integers have the fill value that is among the attributes, if any.
+        Dimensions that the file lacks are created. Integers have the fill value that is among the
+        attributes, if any.
         """
         dtype = np.dtype(dtype)
         text = dtype.kind in "UO"  # strings are not compressed: HDF5 stores them elsewhere
@@ -128,7 +139,9 @@ class File:
         fill = np.nan if dtype.kind == "f" and tile is not None else attributes.get("_FillValue")
         kind = h5py.string_dtype() if text else dtype
         with self._disk_errors():
-            made = self.file.create_dataset(name, shape, kind, fillvalue=fill, track_order=True, **packed)
+            made = self.file.create_dataset(
+                name, shape, kind, fillvalue=fill, track_order=True, **packed
+            )
             if fill is not None:
                 attributes = {"_FillValue": dtype.type(fill)} | attributes
             for key, value in attributes.items():
@@ -170,12 +183,18 @@ class File:
         ids = {dim: number for number, dim in enumerate(self.dimensions)}
         for dim, size in self.dimensions.items():
             bare = dim not in self.variables
-            scale = self.file.create_dataset(dim, (size,), ">f4", track_order=True) if bare else self.file[dim]
+            scale = (
+                self.file.create_dataset(dim, (size,), ">f4", track_order=True)
+                if bare
+                else self.file[dim]
+            )
             scale.make_scale(BARE.format(size) if bare else dim)
             scale.attrs.create("_Netcdf4Dimid", ids[dim], dtype=np.int32)
         for name, dims in self.variables.items():
             if name in ids:  # a scale has no scales
-                self.file[name].attrs.create("_Netcdf4Coordinates", [ids[dim] for dim in dims], dtype=np.int32)
+                self.file[name].attrs.create(
+                    "_Netcdf4Coordinates", [ids[dim] for dim in dims], dtype=np.int32
+                )
                 continue
             for axis, dim in enumerate(dims):
                 self.file[name].dims[axis].attach_scale(self.file[dim])
@@ -193,11 +212,15 @@ class File:
 
 
 def _attach(to, name, value):
-    """Attach an attribute as the netCDF library stores it: ASCII text as characters, numbers in one dimension."""
+    """Attach an attribute as the netCDF library stores it: ASCII text as characters, numbers in one
+    dimension.
+    """
     if isinstance(value, str) and value.isascii():
         value = np.bytes_(value.encode()) if value else h5py.Empty("S1")
         to.attrs.create(name, value)
         return
     values = np.atleast_1d(np.asarray(value))
     text = values.dtype.kind in "UO"
-    to.attrs.create(name, values.astype(object) if text else values, dtype=h5py.string_dtype() if text else None)
+    to.attrs.create(
+        name, values.astype(object) if text else values, dtype=h5py.string_dtype() if text else None
+    )

@@ -1,7 +1,8 @@
-"""A map reduced to the cells of a picture without losing a point: maps of 10^8 points and more, read piece by piece.
+"""A map reduced to the cells of a picture without losing a point: maps of 10^8 points and more,
+read piece by piece.
 
-A cell represents all of its points: for a flag variable by the set of the flags that occur, so that one undecided point
-among thousands is seen; for numbers by the value largest in magnitude.
+A cell represents all of its points: for a flag variable by the set of the flags that occur, so that
+one undecided point among thousands is seen; for numbers by the value largest in magnitude.
 """
 
 from functools import cached_property
@@ -14,7 +15,8 @@ from survey.file.labels import fill_of, flag_codes
 
 NO_ANSWER = ("outside the domain", "failed")
 UNREAD = "not read yet"
-PRECEDENCE = ("undecided", *NO_ANSWER, UNREAD)  # kinds shown in preference to all others, the last above all
+# kinds shown in preference to all others, the last above all
+PRECEDENCE = ("undecided", *NO_ANSWER, UNREAD)
 MASKS = np.uint8, np.uint16, np.uint32
 UNIONS = np.bitwise_or, np.maximum  # of masks, of ranks
 PIECE = 2**22  # points that are read at once, at most
@@ -22,11 +24,13 @@ STRIDE = 8  # rounds in which pieces are read; each round spans the map
 
 
 class Points:
-    """One variable of a survey over two of its axes, and its status `state`: DataArrays, possibly lazy.
+    """One variable of a survey over two of its axes, and its status `state`: DataArrays, possibly
+    lazy.
 
-    `kinds` names what a point may be: the variable's flags, if it has any, the scene's own statuses (`statuses`,
-    {name: code}), then the other reasons why it has no value. Bit i of a mask means that the i-th of them occurs. Of
-    numbers, statuses are told apart only `with_statuses`: they hide the values in their cell.
+    `kinds` names what a point may be: the variable's flags, if it has any, the scene's own statuses
+    (`statuses`, {name: code}), then the other reasons why it has no value. Bit i of a mask means
+    that the i-th of them occurs. Of numbers, statuses are told apart only `with_statuses`: they
+    hide the values in their cell.
     """
 
     def __init__(self, variable, state, statuses, with_statuses=False):
@@ -37,9 +41,13 @@ class Points:
         told = "undecided" in self.flags or (with_statuses and not self.flagged)
         self.statuses = statuses if told else {}
         self.kinds = [*self.flags, *self.statuses, *NO_ANSWER, UNREAD]
-        self.dtype = next((dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits), None)
+        self.dtype = next(
+            (dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits), None
+        )
         if self.dtype is None:
-            raise Damaged(f"{variable.name}: there are {len(self.kinds)} kinds of points, more than a map can show")
+            raise Damaged(
+                f"{variable.name}: there are {len(self.kinds)} kinds of points, more than a map can show"
+            )
         self.bits = {kind: self.dtype(1 << i) for i, kind in enumerate(self.kinds)}
         self._of_code, self._of_status, self._of_open = np.zeros((3, 256), self.dtype)
         for flag, code in self.flags.items():
@@ -54,11 +62,17 @@ class Points:
     def read(self, rows, columns):
         """(mask, rank) of points; the rank, which encodes a value, is None for a flag variable."""
         state, array = self.status[rows, columns].values, self.variable[rows, columns].values
-        mask = self._of_status[state.view(np.uint8)] if state.any() else np.zeros(state.shape, self.dtype)
+        mask = (
+            self._of_status[state.view(np.uint8)]
+            if state.any()
+            else np.zeros(state.shape, self.dtype)
+        )
         if self.flagged:
             flags = self._of_code[array.astype(np.int8, copy=False).view(np.uint8)]
             if self.statuses and state.any():
-                flags = np.where(flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags)
+                flags = np.where(
+                    flags == self._of_open[0], self._of_open[state.view(np.uint8)], flags
+                )
             return np.where(mask == 0, flags, mask) if state.any() else flags, None
         value = array.astype(np.float32)
         if self.statuses and state.any():
@@ -68,14 +82,20 @@ class Points:
         return mask, _ranked(value)
 
     def shown(self, mask):
-        """The kind that each cell shows, as its index in `kinds` (-1: none), and {kind: number of cells with it}.
+        """The kind that each cell shows, as its index in `kinds` (-1: none), and {kind: number of
+        cells with it}.
 
-        A cell shows the rarest kind that it contains, but undecided, outside and failed in preference to all others.
-        The numbers are in the order in which each kind hides those before it.
+        A cell shows the rarest kind that it contains, but undecided, outside and failed in
+        preference to all others. The numbers are in the order in which each kind hides those before
+        it.
         """
         number = {kind: int(np.count_nonzero(mask & bit)) for kind, bit in self.bits.items()}
         order = sorted(
-            number, key=lambda kind: (PRECEDENCE.index(kind) + 1 if kind in PRECEDENCE else 0, -number[kind])
+            number,
+            key=lambda kind: (
+                PRECEDENCE.index(kind) + 1 if kind in PRECEDENCE else 0,
+                -number[kind],
+            ),
         )
         number = {kind: number[kind] for kind in order if number[kind]}
         kind = np.full(mask.shape, -1, np.int8)
@@ -84,28 +104,36 @@ class Points:
         return kind, number
 
     def cells(self, overview):
-        """(values, statuses) of the cells, as if each were one point with the kind or the value that it shows."""
+        """(values, statuses) of the cells, as if each were one point with the kind or the value
+        that it shows.
+        """
         kind, _ = self.shown(overview.mask)
         codes = [*[status.OK] * len(self.flags), *self.statuses.values()]
-        state = np.array([*codes, status.INVALID_PARAMETERS, status.NO_CONVERGENCE, status.OK], np.int8)[kind]
+        state = np.array(
+            [*codes, status.INVALID_PARAMETERS, status.NO_CONVERGENCE, status.OK], np.int8
+        )[kind]
         if not self.flagged:
             return unranked(overview.rank), state
         other = self.flags.get("undecided", min(self.flags.values()))
-        codes = np.array([*self.flags.values(), *[other] * (len(self.kinds) - len(self.flags))], np.int8)
+        codes = np.array(
+            [*self.flags.values(), *[other] * (len(self.kinds) - len(self.flags))], np.int8
+        )
         return codes[kind], state
 
 
 class Overview:
     """All of `points`, reduced by integer factors to at most `cells` (number along each axis).
 
-    It is complete after some calls of `read`; until then the kinds of an incomplete cell include UNREAD. `number`
-    counts the points of each kind that have been read.
+    It is complete after some calls of `read`; until then the kinds of an incomplete cell include
+    UNREAD. `number` counts the points of each kind that have been read.
     """
 
     def __init__(self, points, cells):
         self.points, shape = points, points.shape
         self.factors = tuple(-(-size // most) for size, most in zip(shape, cells, strict=True))
-        self.starts = [np.arange(0, size, factor) for size, factor in zip(shape, self.factors, strict=True)]
+        self.starts = [
+            np.arange(0, size, factor) for size, factor in zip(shape, self.factors, strict=True)
+        ]
         size = tuple(starts.size for starts in self.starts)
         self.mask = np.full(size, points.bits[UNREAD])
         self.rank = None if points.flagged else np.zeros(size, np.uint32)
@@ -128,7 +156,8 @@ class Overview:
             return False
         rows = self._pieces.pop()
         mask, rank = self.points.read(rows, slice(None))
-        groups = np.arange(rows.start, rows.stop) // self.factors[0]  # the first may have begun in earlier rows
+        # the first may have begun in earlier rows
+        groups = np.arange(rows.start, rows.stop) // self.factors[0]
         at = np.flatnonzero(np.diff(groups, prepend=-1))
         here = slice(groups[0], groups[-1] + 1)
         for union, into, part in zip(UNIONS, (self.mask, self.rank), (mask, rank), strict=True):

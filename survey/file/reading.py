@@ -29,10 +29,12 @@ def attributes_of(path):
 
 
 def load(path, chunks="auto"):
-    """The complete dataset in `path`: in memory and the file closed if it takes at most IN_MEMORY bytes, else lazy.
+    """The complete dataset in `path`: in memory and the file closed if it takes at most IN_MEMORY
+    bytes, else lazy.
 
-    Lazy means dask arrays; with `chunks` None, arrays that read what is indexed from the file immediately.
-    Raises BadInput (not a file of survey) or Damaged (incomplete, or its bits have changed).
+    Lazy means dask arrays; with `chunks` None, arrays that read what is indexed from the file
+    immediately. Raises BadInput (not a file of survey) or Damaged (incomplete, or its bits have
+    changed).
     """
     import netCDF4
 
@@ -57,10 +59,14 @@ def load(path, chunks="auto"):
         raise
     except Damaged as error:
         raise Damaged(
-            error if str(error).startswith(str(path)) else f"{path}: {error}; ask its author for an intact copy"
+            error
+            if str(error).startswith(str(path))
+            else f"{path}: {error}; ask its author for an intact copy"
         ) from None
     except PermissionError:
-        raise BadInput(f"{path}: permission denied: make it readable, for example with chmod u+r") from None
+        raise BadInput(
+            f"{path}: permission denied: make it readable, for example with chmod u+r"
+        ) from None
     except Exception as error:  # the libraries that decode an untrusted file may raise anything
         raise Damaged(f"{path}: cannot be read ({error}); run the workflow again") from None
 
@@ -69,7 +75,9 @@ def _opened(path, chunks=None):
     """The checked dataset, lazy."""
     import xarray as xr
 
-    ds = xr.open_dataset(path, engine="netcdf4", chunks=chunks, decode_times=False, decode_timedelta=False)
+    ds = xr.open_dataset(
+        path, engine="netcdf4", chunks=chunks, decode_times=False, decode_timedelta=False
+    )
     try:
         schema.check(ds)
     except BaseException:
@@ -88,7 +96,9 @@ def _refuse_absent(path):
 
 
 def _refuse_changed(path):
-    """Raise Damaged if the file does not match its digest, BadInput if it has none and is not a netCDF file."""
+    """Raise Damaged if the file does not match its digest, BadInput if it has none and is not a
+    netCDF file.
+    """
     digest = digest_of(path)
     with open(path, "rb") as file:
         if digest.exists():
@@ -97,7 +107,9 @@ def _refuse_changed(path):
                     f"{path}: the file's bits differ from the digest in {digest.name}; run the workflow again"
                 )
         elif not file.read(4).startswith(NETCDF):
-            raise BadInput(f"{path}: this is not a netCDF file of survey; name one written by survey run")
+            raise BadInput(
+                f"{path}: this is not a netCDF file of survey; name one written by survey run"
+            )
 
 
 def _head(path):
@@ -112,7 +124,9 @@ def _refuse_foreign(path, file):
     """Raise BadInput if survey did not write the open netCDF file, Damaged if it is not complete."""
     names = file.ncattrs()
     if "status" not in file.variables or "scene" not in names:
-        raise BadInput(f"{path}: this netCDF file was not written by survey; name one written by survey run")
+        raise BadInput(
+            f"{path}: this netCDF file was not written by survey; name one written by survey run"
+        )
     if "complete" not in names or not np.array_equal(np.ravel(file.getncattr("complete")), [1]):
         raise Damaged(f"{path}: the file is incomplete; run the workflow again")
 
@@ -130,7 +144,8 @@ def undigested(path):
 
 
 def check(path, ds=None):
-    """Sentences on what is wrong with the file (none if it is sound): digest, checksums, counts, status.
+    """Sentences on what is wrong with the file (none if it is sound): digest, checksums, counts,
+    status.
 
     `ds` is the dataset of `load`, if it is already open. Raises what `load` raises.
     """
@@ -142,7 +157,10 @@ def check(path, ds=None):
         wrong |= dict.fromkeys(_unsound(path, arrays))
     for key, right in recount.attributes.items():
         stored = ds.attrs.get(key)
-        if not any(np.array_equal(stored, value) for value in (right, recount.old_attributes.get(key, right))):
+        if not any(
+            np.array_equal(stored, value)
+            for value in (right, recount.old_attributes.get(key, right))
+        ):
             complaints.append(f"{path}: {key} is {stored!r}, but the data give {right!r}")
     for name, number in recount.counts.items():
         if sum(number.values()) != recount.points:

@@ -1,7 +1,7 @@
 """The structure of a survey's dataset, checked when one is opened, since the file may be untrusted.
 
-Only attributes, types, dimensions and coordinates are read here; edges, curves, surfaces and cells are checked where
-they are used.
+Only attributes, types, dimensions and coordinates are read here; edges, curves, surfaces and cells
+are checked where they are used.
 """
 
 import math
@@ -12,7 +12,8 @@ import numpy as np
 
 from survey.errors import Damaged
 
-# the largest compression ratio of deflate: a file that declares more holds values that were never written
+# the largest compression ratio of deflate: a file that declares more holds values that were never
+# written
 RATIO, SPARE = 1032, 2**20
 CHUNK = 2**28  # bytes: tiles of survey are a hundred times smaller
 AXIS = 10**8  # values: more than a workflow allows
@@ -31,7 +32,8 @@ ENCODINGS = ("utf-8", "ascii")
 def check(ds, complete=True):
     """Raise Damaged, naming the part, where the dataset is not one that survey writes.
 
-    `complete`, as in files: with all attributes and the flags of the status, and finite numbers on each axis.
+    `complete`, as in files: with all attributes and the flags of the status, and finite numbers on
+    each axis.
     """
     _check_attributes(ds.attrs, REQUIRED if complete else ("scene",))
     _check_points(ds)
@@ -43,9 +45,13 @@ def check(ds, complete=True):
 
 
 def check_declared(file, size):
-    """Raise Damaged where an open netCDF4 file of `size` bytes declares more than it can hold, or unknown types."""
+    """Raise Damaged where an open netCDF4 file of `size` bytes declares more than it can hold, or
+    unknown types.
+    """
     if len(file.variables) > VARIABLES:
-        raise Damaged(f"it has {len(file.variables):,} variables; no survey has more than {VARIABLES:,}")
+        raise Damaged(
+            f"it has {len(file.variables):,} variables; no survey has more than {VARIABLES:,}"
+        )
     declared = 0
     for name, variable in file.variables.items():
         kind = np.dtype(object) if variable.dtype is str else variable.datatype
@@ -57,21 +63,29 @@ def check_declared(file, size):
         declared += math.prod(variable.shape) * kind.itemsize
         chunks = variable.chunking()
         if isinstance(chunks, list) and math.prod(chunks) * kind.itemsize > CHUNK:
-            raise Damaged(f"the variable {name} has chunks of {math.prod(chunks) * kind.itemsize:,} bytes")
+            raise Damaged(
+                f"the variable {name} has chunks of {math.prod(chunks) * kind.itemsize:,} bytes"
+            )
     if declared > RATIO * size + SPARE:
-        raise Damaged(f"it declares {declared:,} bytes of values, more than a file of {size:,} bytes can hold")
+        raise Damaged(
+            f"it declares {declared:,} bytes of values, more than a file of {size:,} bytes can hold"
+        )
 
 
 def _check_packing(name, variable):
     attributes = variable.ncattrs()
     for key in PACKING:
         if key in attributes:
-            raise Damaged(f"the variable {name} has the attribute {key}, but surveys store values as they are")
+            raise Damaged(
+                f"the variable {name} has the attribute {key}, but surveys store values as they are"
+            )
     if np.size(variable.getncattr("_FillValue") if "_FillValue" in attributes else 0) != 1:
         raise Damaged(f"the variable {name} must have a single _FillValue")
     encoding = variable.getncattr("_Encoding") if "_Encoding" in attributes else "utf-8"
     if str(encoding).lower().replace("utf8", "utf-8") not in ENCODINGS:
-        raise Damaged(f"{name}._Encoding = {str(encoding)[:60]!r} (allowed: {', '.join(ENCODINGS)})")
+        raise Damaged(
+            f"{name}._Encoding = {str(encoding)[:60]!r} (allowed: {', '.join(ENCODINGS)})"
+        )
 
 
 def _check_attributes(given, required):
@@ -101,7 +115,10 @@ def options(given):
 
 def flags(attributes):
     """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged."""
-    meanings, codes = attributes.get("flag_meanings"), np.atleast_1d(attributes.get("flag_values", ()))
+    meanings, codes = (
+        attributes.get("flag_meanings"),
+        np.atleast_1d(attributes.get("flag_values", ())),
+    )
     if not isinstance(meanings, str) or codes.dtype.kind not in "iu" or codes.ndim != 1:
         meanings, codes = "", np.zeros(0, int)
     return dict(_flags(meanings, tuple(codes.tolist())))
@@ -113,7 +130,9 @@ def _flags(meanings, codes):
     if not names or len(codes) != len(names):
         raise Damaged("flag_meanings and flag_values must pair each meaning with an integer")
     if len(names) > FLAGS or len(set(names)) < len(names) or len(set(codes)) < len(codes):
-        raise Damaged(f"flag_meanings and flag_values have duplicates, or more than {FLAGS} entries")
+        raise Damaged(
+            f"flag_meanings and flag_values have duplicates, or more than {FLAGS} entries"
+        )
     if min(codes) < -128 or max(codes) > 127:
         raise Damaged("flag_values must fit into a byte")
     return dict(zip(names, codes, strict=True))
@@ -179,29 +198,47 @@ def _is_text(axis):
 
 def edges(ds):
     """Raise Damaged unless the edges of tongues are consistent: `edge_*` along the dimension `edge`."""
-    names = ("edge_position", "edge_position_error", "edge_class", *(["edge_index"] if "edge_index" in ds else []))
+    names = (
+        "edge_position",
+        "edge_position_error",
+        "edge_class",
+        *(["edge_index"] if "edge_index" in ds else []),
+    )
     _along(ds, "edge", *names)
     _divided(ds, "edge_count", "edge")
     _coded(ds, "edge_class")
-    if not set(ds.edge_count.dims) <= set(ds.status.dims) or ds.attrs.get("boundaries") not in ds.status.dims:
+    if (
+        not set(ds.edge_count.dims) <= set(ds.status.dims)
+        or ds.attrs.get("boundaries") not in ds.status.dims
+    ):
         raise Damaged("edge_count and the attribute boundaries must refer to axes of the map")
 
 
 def curves(ds):
     """Raise Damaged unless the boundary curves are consistent: `curve_*` along `curve` and `curve_point`."""
-    _along(ds, "curve", "curve_count", "curve_class", *(["curve_index"] if "curve_index" in ds else []))
+    _along(
+        ds, "curve", "curve_count", "curve_class", *(["curve_index"] if "curve_index" in ds else [])
+    )
     _along(ds, "curve_point", *(f"curve_{dim}" for dim in ds.status.dims))
     _divided(ds, "curve_count", "curve_point")
     _coded(ds, "curve_class")
 
 
 def surfaces(ds):
-    """Raise Damaged unless the boundary surfaces are consistent: vertices, triangles and classes, on the three axes."""
+    """Raise Damaged unless the boundary surfaces are consistent: vertices, triangles and classes,
+    on the three axes.
+    """
     axes = ds.status.dims
     if len(axes) != 3 or ds.attrs.get("surfaces") != ", ".join(axes):
         raise Damaged("the attribute surfaces must name the three axes of the survey")
     _along(ds, "surface", "surface_vertices", "surface_triangles", "surface_class")
-    _along(ds, "surface_vertex", "surface_position_error", "surface_axis", *(f"surface_{dim}" for dim in axes))
+    _along(
+        ds,
+        "surface_vertex",
+        "surface_position_error",
+        "surface_axis",
+        *(f"surface_{dim}" for dim in axes),
+    )
     _divided(ds, "surface_vertices", "surface_vertex")
     _divided(ds, "surface_triangles", "surface_triangle")
     _coded(ds, "surface_class")
@@ -231,7 +268,12 @@ def cells(ds):
     """Raise Damaged unless the cells of a refined map and the areas of its verdicts are consistent."""
     if ds.attrs.get("refine") != ", ".join(ds.status.dims) or len(ds.status.dims) != 2:
         raise Damaged("the attribute refine must name the two axes of the map")
-    _along(ds, "cell", "cell_verdict", *(f"cell_{dim}_{end}" for dim in ds.status.dims for end in ("low", "high")))
+    _along(
+        ds,
+        "cell",
+        "cell_verdict",
+        *(f"cell_{dim}_{end}" for dim in ds.status.dims for end in ("low", "high")),
+    )
     for dim in ds.status.dims:
         _on_axis(ds, dim, f"cell_{dim}_low", f"cell_{dim}_high")
     _coded(ds, "cell_verdict")
@@ -259,21 +301,29 @@ def _along(ds, what, *names):
     for name in names:
         variable = ds.variables.get(name)
         if variable is None or variable.dims != (what,) or variable.dtype.kind not in "iuf":
-            raise Damaged(f"{name} must hold a number for each {what}; join surveys by survey.concat, not by xarray")
+            raise Damaged(
+                f"{name} must hold a number for each {what}; join surveys by survey.concat, not by xarray"
+            )
 
 
 def _on_axis(ds, dim, *names):
     """Raise Damaged unless the values of these variables lie on the axis `dim`."""
     first, last = np.sort(ds[dim].values.astype(float)[[0, -1]])
     values = np.concatenate([ds[name].values.astype(float) for name in names])
-    if not ((values - first >= ROUNDED * (first - last)) & (values - last <= ROUNDED * (last - first))).all():
+    if not (
+        (values - first >= ROUNDED * (first - last)) & (values - last <= ROUNDED * (last - first))
+    ).all():
         raise Damaged(f"{' and '.join(names)} must lie on the axis {dim}")
 
 
 def _divided(ds, count, what):
     """Raise Damaged unless the integers `count` partition the dimension `what`."""
     number = ds[count].values if count in ds else np.array([-1])
-    if number.dtype.kind not in "iu" or (number < 0).any() or number.sum(dtype=float) != ds.sizes.get(what, 0):
+    if (
+        number.dtype.kind not in "iu"
+        or (number < 0).any()
+        or number.sum(dtype=float) != ds.sizes.get(what, 0)
+    ):
         raise Damaged(f"{count} must add up to the number of values along {what}")
 
 

@@ -17,9 +17,13 @@ def summary(ds):
         "scene": ds.attrs["scene"],
         "options": ds.attrs.get("options", ""),
         "axes": axes,
-        "fixed": {name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"},
+        "fixed": {
+            name: float(c) for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind == "f"
+        },
         "variables": {
-            name: v.attrs.get("long_name", "") for name, v in ds.data_vars.items() if not str(name).endswith("_error")
+            name: v.attrs.get("long_name", "")
+            for name, v in ds.data_vars.items()
+            if not str(name).endswith("_error")
         },
         **({"areas": areas(ds)} if "area" in ds else {}),
         "counts": counts(ds),
@@ -36,4 +40,7 @@ def areas(ds):
     names = ("area", "area_error", "area_fraction", "area_fraction_error")
     schema.areas(ds)
     rows = zip(flag_codes(ds.area_verdict.attrs), *(ds[name].values for name in names), strict=True)
-    return {name: f"{area:.12g} +- {bar:.2g} ({percent(part, part_bar)})" for name, area, bar, part, part_bar in rows}
+    return {
+        name: f"{area:.12g} +- {bar:.2g} ({percent(part, part_bar)})"
+        for name, area, bar, part, part_bar in rows
+    }

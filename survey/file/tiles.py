@@ -1,6 +1,8 @@
-"""Tiles of a variable packed by the filters of its file, but with ISA-L's deflate, ten times as fast as HDF5's.
+"""Tiles of a variable packed by the filters of its file, but with ISA-L's deflate, ten times as
+fast as HDF5's.
 
-Any reader of HDF5 decodes them: the filters are HDF5's (HDF5 File Format Specification 3.0, IV.A.2.l), in its order.
+Any reader of HDF5 decodes them: the filters are HDF5's (HDF5 File Format Specification 3.0,
+IV.A.2.l), in its order.
 """
 
 import itertools
@@ -12,7 +14,8 @@ COLUMNS = 512  # of the table whose sums give the checksum; they stay far below 
 
 
 def write(variable, values, where):
-    """Write values at `where` (slices that begin and end at edges of tiles; omitted ones are full) of an h5py dataset.
+    """Write values at `where` (slices that begin and end at edges of tiles; omitted ones are full)
+    of an h5py dataset.
 
     Raises ValueError where the values do not fill complete tiles.
     """
@@ -23,13 +26,23 @@ def write(variable, values, where):
     where = (*where, *map(slice, variable.shape[len(where) :]))
     cuts = [range(*cut.indices(size)) for cut, size in zip(where, variable.shape, strict=True)]
     ends = zip(cuts, variable.chunks, variable.shape, strict=True)
-    complete = all(cut.start % tile == 0 and (cut.stop % tile == 0 or cut.stop == size) for cut, tile, size in ends)
+    complete = all(
+        cut.start % tile == 0 and (cut.stop % tile == 0 or cut.stop == size)
+        for cut, tile, size in ends
+    )
     if not complete or values.shape != tuple(map(len, cuts)):
-        raise ValueError(f"{variable.name}: values of shape {values.shape} do not fill complete tiles at {where}")
+        raise ValueError(
+            f"{variable.name}: values of shape {values.shape} do not fill complete tiles at {where}"
+        )
     plist = variable.id.get_create_plist()
-    filters = [(code, parameters) for code, _, parameters, _ in map(plist.get_filter, range(plist.get_nfilters()))]
+    filters = [
+        (code, parameters)
+        for code, _, parameters, _ in map(plist.get_filter, range(plist.get_nfilters()))
+    ]
     for corner in itertools.product(*map(range, [0] * values.ndim, values.shape, variable.chunks)):
-        tile = values[tuple(slice(at, at + size) for at, size in zip(corner, variable.chunks, strict=True))]
+        tile = values[
+            tuple(slice(at, at + size) for at, size in zip(corner, variable.chunks, strict=True))
+        ]
         offset = tuple(cut.start + at for cut, at in zip(cuts, corner, strict=True))
         variable.id.write_direct_chunk(offset, packed(_padded(tile, variable), filters))
 
@@ -72,7 +85,8 @@ def fletcher32(content):
     words = np.frombuffer(content + bytes(len(content) % 2), "<u2").astype(np.uint16, copy=False)
     count, length = len(words), len(words) // COLUMNS * COLUMNS
     table, rest = words[:length].reshape(-1, COLUMNS), words[length:]
-    # word i occurs count - i times in the sum of sums; i follows from its row and column, so their sums suffice
+    # word i occurs count - i times in the sum of sums; i follows from its row and column, so their
+    # sums suffice
     rows, columns = table.sum(axis=1, dtype=np.uint64), table.sum(axis=0, dtype=np.uint64)
     total = int(rows.sum()) + int(rest.sum(dtype=np.uint64))
     before = COLUMNS * _weighted(rows) + _weighted(columns) + _weighted(rest, length)

@@ -1,4 +1,6 @@
-"""What an unfinished run has left in `OUT.nc.blocks/`, for users: how much is done, and what has changed since."""
+"""What an unfinished run has left in `OUT.nc.blocks/`, for users: how much is done, and what has
+changed since.
+"""
 
 import datetime
 import json
@@ -23,31 +25,45 @@ def folder_of(path):
 
 
 def finished(path):
-    """(finished blocks, all blocks) of the unfinished run that was writing `path`; (0, 0) if there is none."""
+    """(finished blocks, all blocks) of the unfinished run that was writing `path`; (0, 0) if there
+    is none.
+    """
     folder = folder_of(path)
     known = table(folder / "manifest.json")
     return (len(_blocks(folder)), known["blocks"]) if "blocks" in known else (0, 0)
 
 
 def summary(path):
-    """Plain data on the unfinished run that was writing `path`: what is done, who is writing it, how to resume it.
+    """Plain data on the unfinished run that was writing `path`: what is done, who is writing it,
+    how to resume it.
 
     {} if there is none.
     """
     folder = folder_of(path)
-    known, holder, files = table(folder / "manifest.json"), table(folder / "holder.json"), _blocks(folder)
+    known, holder, files = (
+        table(folder / "manifest.json"),
+        table(folder / "holder.json"),
+        _blocks(folder),
+    )
     if "blocks" not in known:
         return {}
     active = lock.holder(f"{path}.lock")
-    last = max(_stat(file, "st_mtime") for file in [*files, *folder.glob("*.extra"), folder / "manifest.json"])
+    last = max(
+        _stat(file, "st_mtime")
+        for file in [*files, *folder.glob("*.extra"), folder / "manifest.json"]
+    )
     return {
         "folder": str(folder),
         "blocks_done": len(files),
         "blocks": known["blocks"],
         "points_done": sum(map(_points, files)),
         "points": known.get("points"),
-        "last_written": datetime.datetime.fromtimestamp(last, datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ"),
-        "at_work": _who(active or holder) if active is not None else f"nobody: it was interrupted ({_who(holder)})",
+        "last_written": datetime.datetime.fromtimestamp(last, datetime.UTC).strftime(
+            "%Y-%m-%dT%H:%M:%SZ"
+        ),
+        "at_work": _who(active or holder)
+        if active is not None
+        else f"nobody: it was interrupted ({_who(holder)})",
         **({"resume": _resume_command(path, holder)} if active is None else {}),
     }
 
@@ -61,14 +77,18 @@ def sentence(left):
     """The `summary` as a sentence."""
     points = _counted(left["points"], "point") if left["points"] else "them"
     done = f"{left['blocks_done']:,} of {_counted(left['blocks'], 'block')} ({left['points_done']:,} of {points})"
-    who = f"resume with: {left['resume']}" if "resume" in left else f"{left['at_work']} is writing it"
+    who = (
+        f"resume with: {left['resume']}" if "resume" in left else f"{left['at_work']} is writing it"
+    )
     return f"{left['folder']} contains an unfinished run: {done}, last written {left['last_written']}; {who}"
 
 
 def drift(path, old, new, changed, workflow):
-    """One line: how the existing blocks, of manifest `old`, differ from a run of manifest `new`, and what to do.
+    """One line: how the existing blocks, of manifest `old`, differ from a run of manifest `new`,
+    and what to do.
 
-    `changed` are the parts of the fingerprint that differ; `workflow` is the text of the new run's workflow.
+    `changed` are the parts of the fingerprint that differ; `workflow` is the text of the new run's
+    workflow.
     """
     folder = folder_of(path)
     done, causes, ways_back = counted(len(_blocks(folder)), "finished block"), [], []
@@ -83,7 +103,9 @@ def drift(path, old, new, changed, workflow):
         changes = [f"{key} {_short(old.get(key))} -> {_short(new[key])}" for key in changed]
     if changes:
         causes.append(f"from another workflow ({listed(changes)})")
-        ways_back.append(f"that workflow (survey run {shlex.quote(str(folder / 'workflow.toml'))} -o {path})")
+        ways_back.append(
+            f"that workflow (survey run {shlex.quote(str(folder / 'workflow.toml'))} -o {path})"
+        )
     return (
         f"{folder} contains {done} {' and '.join(causes)}; go back to {' and '.join(ways_back)}, or write another file "
         f"with -o, or start again with --fresh, which deletes {done}"
@@ -91,15 +113,20 @@ def drift(path, old, new, changed, workflow):
 
 
 def _differences(folder, workflow):
-    """['solver.rtol 1e-10 -> 1e-09', ...]: keys in which the workflow of the blocks and the new one differ."""
+    """['solver.rtol 1e-10 -> 1e-09', ...]: keys in which the workflow of the blocks and the new one
+    differ.
+    """
     try:
-        return differences((folder / "workflow.toml").read_text(encoding="utf-8"), workflow, INDEPENDENT)
+        return differences(
+            (folder / "workflow.toml").read_text(encoding="utf-8"), workflow, INDEPENDENT
+        )
     except (OSError, ValueError):
         return []
 
 
 def differences(old, new, independent):
-    """['solver.rtol 1e-10 -> 1e-09', ...]: keys in which two workflows' texts differ, except `independent` ones.
+    """['solver.rtol 1e-10 -> 1e-09', ...]: keys in which two workflows' texts differ, except
+    `independent` ones.
 
     Raises ValueError if a text is not TOML.
     """
@@ -121,7 +148,8 @@ def _changes(old, new, prefix=""):
     """Yield (key, old value, new value) of what differs; None for a value that is not given."""
     for key in [*new, *(key for key in old if key not in new)]:
         before, now = old.get(key), new.get(key)
-        if not prefix and isinstance(before or now, dict):  # a table that is not given is an empty one
+        # a table that is not given is an empty one
+        if not prefix and isinstance(before or now, dict):
             before, now = before or {}, now or {}
         if isinstance(before, dict) and isinstance(now, dict):
             yield from _changes(before, now, f"{prefix}{key}.")
@@ -132,7 +160,12 @@ def _changes(old, new, prefix=""):
 def _code(old, new):
     """What differs in the code of two manifests."""
     before, now = (manifest.get("code", {}) for manifest in (old, new))
-    return ", ".join(f"{key} {before.get(key)} -> {now[key]}" for key in now if before.get(key) != now[key]) or "format"
+    return (
+        ", ".join(
+            f"{key} {before.get(key)} -> {now[key]}" for key in now if before.get(key) != now[key]
+        )
+        or "format"
+    )
 
 
 def _short(value):
@@ -141,7 +174,9 @@ def _short(value):
 
 
 def _resume_command(path, holder):
-    """The command that resumes: the one that started the run, or else one with the workflow that the folder keeps."""
+    """The command that resumes: the one that started the run, or else one with the workflow that
+    the folder keeps.
+    """
     words, folder = _words(holder.get("resume_command")), holder.get("folder")
     if words[:2] != ["survey", "run"]:  # another program: the folder may be untrusted
         return f"survey run {shlex.quote(str(folder_of(path) / 'workflow.toml'))} -o {shlex.quote(str(path))}"

@@ -1,11 +1,13 @@
 """The decorators of kernels, their flags, and a kernel cache that cannot go stale.
 
-nogil: dask's threads run kernels side by side. error_model="numpy": a division by zero gives inf, which is checked,
-and loops vectorise. No fastmath and no contraction: compiled code and plain Python (NUMBA_DISABLE_JIT=1) give the
-same bits, and NaN checks stay. No signatures: importing compiles nothing.
+nogil: dask's threads run kernels side by side. error_model="numpy": a division by zero gives inf,
+which is checked, and loops vectorise. No fastmath and no contraction: compiled code and plain
+Python (NUMBA_DISABLE_JIT=1) give the same bits, and NaN checks stay. No signatures: importing
+compiles nothing.
 
-numba's own cache returns stale results when an imported module changes; here its directory is named by a hash of
-every source that is compiled, of the versions and of the CPU, so that any edit starts an empty one.
+numba's own cache returns stale results when an imported module changes; here its directory is named
+by a hash of every source that is compiled, of the versions and of the CPU, so that any edit starts
+an empty one.
 """
 
 import gc
@@ -24,7 +26,8 @@ from numba.core import event, imputils
 from numba.extending import intrinsic, overload
 
 COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
-# What decides no number of the output: all other sources do, those that are yet to be written included.
+# What decides no number of the output: all other sources do, those that are yet to be written
+# included.
 APART = ("__main__.py", "accessor.py", "analysis", "cli.py", "precision", "show", "viewer")
 
 
@@ -44,18 +47,29 @@ def _sources(path):
     """The Python files in the folder `path` and below, or `path` itself where it is a file."""
     if not os.path.isdir(path):
         return [path]
-    return [os.path.join(folder, file) for folder, _, files in os.walk(path) for file in files if file.endswith(".py")]
+    return [
+        os.path.join(folder, file)
+        for folder, _, files in os.walk(path)
+        for file in files
+        if file.endswith(".py")
+    ]
 
 
 def deciding():
     """The names of the modules and packages of survey that decide numbers of the output."""
-    names = (path.name for path in Path(__file__).parents[1].iterdir() if path.suffix == ".py" or path.is_dir())
+    names = (
+        path.name
+        for path in Path(__file__).parents[1].iterdir()
+        if path.suffix == ".py" or path.is_dir()
+    )
     return [name for name in names if name not in APART and not name.startswith("__pycache__")]
 
 
 @cache
 def deciding_hash():
-    """Hash (16 hex digits) of all that decides numbers of the output, read once: only runs that keep files need it."""
+    """Hash (16 hex digits) of all that decides numbers of the output, read once: only runs that
+    keep files need it.
+    """
     return source_hash(*deciding())
 
 
@@ -69,9 +83,14 @@ KERNEL_HASH = kernel_hash()
 
 
 def _cache_directory():
-    """A writable directory for compiled kernels, or None (a read-only home compiles again in each process)."""
+    """A writable directory for compiled kernels, or None (a read-only home compiles again in each
+    process).
+    """
     try:
-        path = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey")) / KERNEL_HASH
+        path = (
+            Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey"))
+            / KERNEL_HASH
+        )
         path.mkdir(parents=True, exist_ok=True)
     except (OSError, RuntimeError):  # platformdirs raises RuntimeError for a user who has no home
         return None
@@ -81,7 +100,8 @@ def _cache_directory():
 class _Compiling(event.TimingListener):
     """Measures the time spent in compiling, and has the garbage collector run seldom meanwhile.
 
-    What a compiler builds lives until it is done; looking through it again and again took 6 to 16 % of its time.
+    What a compiler builds lives until it is done; looking through it again and again took 6 to 16 %
+    of its time.
     """
 
     SELDOM = (10_000, 20, 20)
@@ -115,7 +135,8 @@ def is_first(work):
     return True
 
 
-# At a first use, waits for the process that compiles further kernels for this one (see `sweep.compile_ahead`).
+# At a first use, waits for the process that compiles further kernels for this one (see
+# `sweep.compile_ahead`).
 other_compiler = None
 waited = 0.0
 
@@ -139,7 +160,9 @@ _FLAGS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def kernel(function):
-    """Compile `function` on its first call and keep the result on disk; call it with contiguous float64 arrays."""
+    """Compile `function` on its first call and keep the result on disk; call it with contiguous
+    float64 arrays.
+    """
     if _DIRECTORY is None:
         return numba.njit(**_FLAGS)(function)
     previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_DIRECTORY)
@@ -165,10 +188,11 @@ def splice(function):
 
 
 def for_constants(special):
-    """Make kernels call the kernel `special` in place of the decorated function on a read-only array as first argument.
+    """Make kernels call the kernel `special` in place of the decorated function on a read-only
+    array as first argument.
 
-    Then they compile nothing that the decorated function alone needs. It must be right for any array: without the JIT
-    it is the one that runs.
+    Then they compile nothing that the decorated function alone needs. It must be right for any
+    array: without the JIT it is the one that runs.
     """
 
     special = getattr(special, "py_func", special)
@@ -185,7 +209,9 @@ def for_constants(special):
 
 
 def constant(array):
-    """The array, which is not written to from here on: kernels take it for a read-only one, see `for_constants`."""
+    """The array, which is not written to from here on: kernels take it for a read-only one, see
+    `for_constants`.
+    """
     return array
 
 

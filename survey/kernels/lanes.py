@@ -1,8 +1,10 @@
-"""Many points in lock step: the propagators of a linear second-order equation composed over the half period.
+"""Many points in lock step: the propagators of a linear second-order equation composed over the
+half period.
 
-A row shares everything that does not depend on the lane variable p: its equation is y'' + z y = 0 with
-z(t) = c0(t) + p c1(t) + p^2 c2, c2 a number. Lanes are innermost in memory, so that LLVM turns the loop over them
-into vector code; a lane's operations do not depend on its neighbours, nor its bits on the number of lanes.
+A row shares everything that does not depend on the lane variable p: its equation is y'' + z y = 0
+with z(t) = c0(t) + p c1(t) + p^2 c2, c2 a number. Lanes are innermost in memory, so that LLVM turns
+the loop over them into vector code; a lane's operations do not depend on its neighbours, nor its
+bits on the number of lanes.
 
 Beside the two columns of the fundamental matrix goes, for each, the 2x2 matrix S of its error ellipse:
 S <- P S P^T + diag(d^2) with d = D |column| the step's local error bound. To first order the error after n steps
@@ -11,8 +13,8 @@ is a sum of n propagated local errors, each of two components: 2 n terms, the sq
 errors are small: with M their sum, relative to the step's own matrix, the bounds are multiplied by exp(M), else a step
 so long that the method damps would damp its errors too.
 
-S is kept in units of 1 / SCALE^2, and LEAST is added to it in every step: no bar underflows, nor falls below what the
-step itself loses where z is so small that its products underflow.
+S is kept in units of 1 / SCALE^2, and LEAST is added to it in every step: no bar underflows, nor
+falls below what the step itself loses where z is so small that its products underflow.
 """
 
 import numpy as np
@@ -20,8 +22,8 @@ import numpy as np
 from survey.kernels.jit import splice
 from survey.kernels.unroll import changes_sign, unroll
 
-# The columns of a point's results: both solutions and their derivatives at the end, their error bounds, and the
-# numbers of zeros of y1 and of y2 on the way.
+# The columns of a point's results: both solutions and their derivatives at the end, their error
+# bounds, and the numbers of zeros of y1 and of y2 on the way.
 Y1, DY1, Y2, DY2, Y1_BAR, DY1_BAR, Y2_BAR, DY2_BAR, Y1_ZEROS, Y2_ZEROS = range(10)
 RESULTS = 10
 TILE = 64
@@ -35,12 +37,14 @@ LEAST = 2.3e-308
 
 @splice
 def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
-    """Compose `step` over all rows; row r owns the points order[starts[r] : ends[r]] of `p` and of `out`.
+    """Compose `step` over all rows; row r owns the points order[starts[r] : ends[r]] of `p` and of
+    `out`.
 
     `h` (rows, steps) holds the lengths of the steps.
 
-    `row(samples, h, coefficients)` reduces samples (2, nodes, L) of L steps of lengths h (L) to coefficients
-    (2 width, L); `step(coefficients, c2, p, h)` gives P11, P12, P21, P22 and the bounds D11 = D22, D12, D21.
+    `row(samples, h, coefficients)` reduces samples (2, nodes, L) of L steps of lengths h (L) to
+    coefficients (2 width, L); `step(coefficients, c2, p, h)` gives P11, P12, P21, P22 and the
+    bounds D11 = D22, D12, D21.
     """
     steps, nodes = samples.shape[1], samples.shape[3]
     state, lanes = np.empty((STATE, TILE)), np.empty(TILE)
@@ -71,7 +75,9 @@ def chain(row, step, width, samples, c2, h, p, order, starts, ends, out):
 
 @splice
 def scatter(row, step, width, samples, c2, h, p, order, starts, out):
-    """As `chain` where each row owns one point, order[starts[r]]: lanes are rows. The same operations, so bits."""
+    """As `chain` where each row owns one point, order[starts[r]]: lanes are rows. The same
+    operations, so bits.
+    """
     steps, nodes = samples.shape[1], samples.shape[3]
     # in one array, so that LLVM sees that they do not overlap
     work = np.empty((STATE + 2 + 2 * width, TILE))
@@ -116,7 +122,9 @@ def _start(state, count):
 
 @unroll
 def _advance(matrix, h, state, i):
-    """One step of lane i. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of y1, y2, M."""
+    """One step of lane i. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of
+    y1, y2, M.
+    """
     for at, ellipse, zeros in ((0, 4, 10), (2, 7, 11)):
         before = state[at, i]
         ends = column(matrix, before, state[at + 1, i], *(state[ellipse + k, i] for k in range(3)))
@@ -141,8 +149,12 @@ def column(matrix, y, v, s, t, w):
     error_v = SCALE * (lower * abs(y) + diagonal * abs(v))
     left, right = a * s + b * t, a * t + b * w
     low, high = c * s + d * t, c * t + d * w
-    # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose its positive sign
-    round_y, round_v = ROUNDING * (a * (a * s) + b * (b * w)), ROUNDING * (c * (c * s) + d * (d * w))
+    # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose
+    # its positive sign
+    round_y, round_v = (
+        ROUNDING * (a * (a * s) + b * (b * w)),
+        ROUNDING * (c * (c * s) + d * (d * w)),
+    )
     s = left * a + right * b + (error_y * error_y + LEAST + round_y)
     t = left * c + right * d
     w = low * c + high * d + (error_v * error_v + LEAST + round_v)

@@ -1,9 +1,11 @@
-"""Straight code from a Python function with loops: `unroll` runs it on symbols while a kernel is compiled.
+"""Straight code from a Python function with loops: `unroll` runs it on symbols while a kernel is
+compiled.
 
-LLVM makes no vector code of a loop over coefficients, and numba takes a second to type a page of sums written out. A
-function of floats that is made of + - * /, abs, `largest`, Python's loops and lists is therefore written as such, and
-run once for each kernel that calls it; every operation writes one instruction, in the order in which Python does it, so
-compiled and plain code give the same bits.
+LLVM makes no vector code of a loop over coefficients, and numba takes a second to type a page of
+sums written out. A function of floats that is made of + - * /, abs, `largest`, Python's loops and
+lists is therefore written as such, and run once for each kernel that calls it; every operation
+writes one instruction, in the order in which Python does it, so compiled and plain code give the
+same bits.
 """
 
 import inspect
@@ -71,7 +73,9 @@ class _Unknown:
     def __iter__(self):
         raise TypeError("an array has no length before a kernel runs")
 
-    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = _same
+    __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
+        _same
+    )
     __neg__ = __abs__ = __getitem__ = __setitem__ = _same
 
 
@@ -100,7 +104,12 @@ def _value(x):
 
 def largest(a, b):
     """max(a, b) of numbers or symbols."""
-    return _chosen(lambda: max(a, b), lambda builder, x, y: builder.select(builder.fcmp_ordered(">", y, x), y, x), a, b)
+    return _chosen(
+        lambda: max(a, b),
+        lambda builder, x, y: builder.select(builder.fcmp_ordered(">", y, x), y, x),
+        a,
+        b,
+    )
 
 
 def summed(terms):
@@ -130,7 +139,8 @@ def _chosen(plain, emit, a, b):
 
 
 def unroll(function):
-    """Make `function` of floats, integers, arrays and tuples of floats callable by kernels (see above).
+    """Make `function` of floats, integers, arrays and tuples of floats callable by kernels (see
+    above).
 
     It returns a float, a tuple of floats, or nothing, and may call other such functions.
     """
@@ -151,7 +161,9 @@ def unroll(function):
     @lower_builtin(function, types.VarArg(types.Any))
     def emit(context, builder, signature, values):
         kinds = signature.args
-        results = function(*(_symbol(context, builder, *pair) for pair in zip(kinds, values, strict=True)))
+        results = function(
+            *(_symbol(context, builder, *pair) for pair in zip(kinds, values, strict=True))
+        )
         if results is None:
             return context.get_dummy_value()
         if not isinstance(results, tuple):

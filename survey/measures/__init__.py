@@ -1,8 +1,8 @@
 """The measures: one family a folder, one question a file, shared by the scenes that ask it.
 
-The same question has the same name in every family, so that it is found by its folder: QUESTIONS lists those that the
-layers above ask by name. METHODS in a folder's `__init__` lists what methods offer its families. Both are checked when
-a module is loaded.
+The same question has the same name in every family, so that it is found by its folder: QUESTIONS
+lists those that the layers above ask by name. METHODS in a folder's `__init__` lists what methods
+offer its families. Both are checked when a module is loaded.
 """
 
 import sys
@@ -12,10 +12,11 @@ from pkgutil import iter_modules
 from survey import contract, methods, modules
 from survey.contract import Function, Value
 
-# {question: what `measures/FAMILY/QUESTION.py` must offer}; a family that has no such file does not answer it.
+# {question: what `measures/FAMILY/QUESTION.py` must offer}; a family that has no such file does not
+# answer it.
 QUESTIONS = {
-    # The curves that [boundaries] draws on a map: `closed` where they are known without a search, `searched` where
-    # the scene's outputs at any points of the map tell, else `trace`.
+    # The curves that [boundaries] draws on a map: `closed` where they are known without a search,
+    # `searched` where the scene's outputs at any points of the map tell, else `trace`.
     "curves": {
         "closed": Function(
             "the Curves on the map of two `axes`, a Square, where `fixed` holds the other parameters "
@@ -23,14 +24,17 @@ QUESTIONS = {
             ("square", "axes", "fixed", "options"),
         ),
         "searched": Function(
-            "the same from the outputs of the `scene`", ("scene", "square", "axes", "fixed", "options")
+            "the same from the outputs of the `scene`",
+            ("scene", "square", "axes", "fixed", "options"),
         ),
         "serves": Function("are curves known of the scene? They are if it is missing", ("scene",)),
         "refusal": Function(
             "why there are no curves on a map of these axes, in words; None if there are; `options` may be missing",
             ("axes", "scene", "options"),
         ),
-        "seconds": Function("estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)),
+        "seconds": Function(
+            "estimated seconds of `closed` on one thread; a tenth of a second if missing", ("axes",)
+        ),
         "CLASSES": Value("{name: code} of the curves' classes", dict),
         "TITLE": Value("what a class is, one line", str),
         "ALONG": Value("survey.scene.Output of what is known at each point of a curve", tuple),
@@ -38,7 +42,9 @@ QUESTIONS = {
             "the Curves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",
             ("solve", "square", "seeds", "each"),
         ),
-        "Seeds": Value("x, kind, index, low, high: edges to begin from, see `measures.hill.curves`", type),
+        "Seeds": Value(
+            "x, kind, index, low, high: edges to begin from, see `measures.hill.curves`", type
+        ),
     },
     # The surfaces that [boundaries] draws in a box of three parameters, see `measures.isosurfaces`.
     "surfaces": {
@@ -62,7 +68,11 @@ QUESTIONS = {
             needed=True,
         ),
         "joined": Function("the Edges of all parts of the same rows", ("parts",), needed=True),
-        "Edges": Value("row, position, error, kind, index, complete: see `measures.hill.edges`", type, needed=True),
+        "Edges": Value(
+            "row, position, error, kind, index, complete: see `measures.hill.edges`",
+            type,
+            needed=True,
+        ),
         "CLASSES": Value("{name: code} of the edges' kinds", dict, needed=True),
     },
     # Where the curves of `trace` turn back.
@@ -81,14 +91,26 @@ QUESTIONS = {
             ("scene", "point"),
         ),
         "serves": Function("are cells known of the scene? They are if it is missing", ("scene",)),
-        "keywords": Function("what `find` is told besides of this scene, {name: value}", ("scene",)),
-        "Side": Value("low, high, depth, log: a side of a rectangle and how often it may be halved", type, needed=True),
+        "keywords": Function(
+            "what `find` is told besides of this scene, {name: value}", ("scene",)
+        ),
+        "Side": Value(
+            "low, high, depth, log: a side of a rectangle and how often it may be halved",
+            type,
+            needed=True,
+        ),
         "accuracy": Function(
-            "the rtol that `find` needs of OUTPUTS where sides are halved `depth` times", ("depth",), needed=True
+            "the rtol that `find` needs of OUTPUTS where sides are halved `depth` times",
+            ("depth",),
+            needed=True,
         ),
         "OUTPUTS": Value("the scene's outputs that `find` asks for", tuple, needed=True),
-        "VERDICTS": Value("{name: code} of the cells' verdicts, -1 undecided among them", dict, needed=True),
-        "POINTS": Value("the points that are solved along each side of a block", object, needed=True),
+        "VERDICTS": Value(
+            "{name: code} of the cells' verdicts, -1 undecided among them", dict, needed=True
+        ),
+        "POINTS": Value(
+            "the points that are solved along each side of a block", object, needed=True
+        ),
         "MOST": Value("the largest number of cells", int, needed=True),
     },
 }
@@ -107,7 +129,8 @@ def method(name):
 
 @cache
 def question(family, name):
-    """The module that answers the question `name` (of QUESTIONS) for this family; None if it has none.
+    """The module that answers the question `name` (of QUESTIONS) for this family; None if it has
+    none.
 
     Raises BadInput if the module does not keep to QUESTIONS.
     """
@@ -131,7 +154,9 @@ def cells(scene):
 
 def _serving(scene, name):
     found = (question(scene.FAMILY, name) for name in (name, f"trace_{name}"))
-    return next((one for one in found if one and (not hasattr(one, "serves") or one.serves(scene))), None)
+    return next(
+        (one for one in found if one and (not hasattr(one, "serves") or one.serves(scene))), None
+    )
 
 
 @cache
@@ -148,13 +173,19 @@ def check(module):
         where.append(f"survey/measures/{folder.__name__.rpartition('.')[2]}/__init__.py")
     contract.check(module, table, " and ".join(where), _of_another_family)
     for name in ("COST", "ABOUT"):
-        if unknown := [family for family in getattr(module, name, ()) if family not in module.SERVES]:
-            contract.refuse(module, f"{name} has {unknown[0]!r}, which SERVES does not name", where[0])
+        if unknown := [
+            family for family in getattr(module, name, ()) if family not in module.SERVES
+        ]:
+            contract.refuse(
+                module, f"{name} has {unknown[0]!r}, which SERVES does not name", where[0]
+            )
 
 
 def _of_another_family(name):
     """What to do about a method's public name that a family knows which the method does not serve."""
-    families = [family for folder in _folders() for family, table in folder.METHODS.items() if name in table]
+    families = [
+        family for folder in _folders() for family, table in folder.METHODS.items() if name in table
+    ]
     words = " or ".join(map(repr, families))
     return f"; it is a name of the family {words}, which SERVES must then name" if families else ""
 
@@ -173,5 +204,10 @@ def _folder(family):
 def _folders():
     """The packages that have METHODS, loaded one after the other."""
     here = sys.modules[__name__]
-    names = (module.name for module in iter_modules(here.__path__) if module.ispkg)  # others import much
-    return (folder for folder in (modules.load(here, name, "family") for name in names) if hasattr(folder, "METHODS"))
+    # others import much
+    names = (module.name for module in iter_modules(here.__path__) if module.ispkg)
+    return (
+        folder
+        for folder in (modules.load(here, name, "family") for name in names)
+        if hasattr(folder, "METHODS")
+    )

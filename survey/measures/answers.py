@@ -1,9 +1,11 @@
-"""The answers of points as their results come in, and the ladder that points climb which miss the asked accuracy.
+"""The answers of points as their results come in, and the ladder that points climb which miss the
+asked accuracy.
 
-A rung of a ladder is an amount of work: a number of steps, or for an adaptive method the tolerance of one step. A
-point begins on the rung that its method asks for; where its error bounds miss the accuracy, or leave the verdict open,
-it is solved again on a higher one, as long as that halves its bounds. So the work on a point depends on that point,
-the method and rtol, never on its neighbours, and its bits are the same in any block.
+A rung of a ladder is an amount of work: a number of steps, or for an adaptive method the tolerance
+of one step. A point begins on the rung that its method asks for; where its error bounds miss the
+accuracy, or leave the verdict open, it is solved again on a higher one, as long as that halves its
+bounds. So the work on a point depends on that point, the method and rtol, never on its neighbours,
+and its bits are the same in any block.
 """
 
 from dataclasses import dataclass
@@ -16,7 +18,8 @@ UNDECIDED = -1
 
 
 class Answers:
-    """Of N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and who has `missed` what was asked.
+    """Of N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and who has `missed` what
+    was asked.
 
     `kept` are the rows of `floats` that hold anything (all of them by default).
     """
@@ -29,7 +32,9 @@ class Answers:
         self.status, self.missed = np.zeros(size, np.int8), np.zeros(size, np.bool_)
 
     def replace(self, points, other, those=slice(None)):
-        """The answers of `points` become those of `other`: of all its points, or of `those`, in that order."""
+        """The answers of `points` become those of `other`: of all its points, or of `those`, in
+        that order.
+        """
         for row in self.kept:
             self.floats[row, points] = other.floats[row, those]
         for name in (*self.codes, "status", "missed"):
@@ -38,10 +43,11 @@ class Answers:
 
 @dataclass(frozen=True)
 class Ladder:
-    """`rungs`, ascending in work; a point of rung i climbs to rung `above[i]` (beyond the last: it stays as it is).
+    """`rungs`, ascending in work; a point of rung i climbs to rung `above[i]` (beyond the last: it
+    stays as it is).
 
-    `bounds` are the columns of the results that hold error bounds, None if results tell it by their property `bound`;
-    a point climbs at most `most` times.
+    `bounds` are the columns of the results that hold error bounds, None if results tell it by their
+    property `bound`; a point climbs at most `most` times.
     """
 
     rungs: np.ndarray
@@ -55,10 +61,11 @@ class Ladder:
         return len(self.rungs) - 1
 
     def climb(self, rung, results, answers, solve, assess):
-        """Solve the points that missed what was asked again, on higher rungs; the better results are kept.
+        """Solve the points that missed what was asked again, on higher rungs; the better results
+        are kept.
 
-        `rung` (N), `results` (N, columns) and `answers` are changed. `solve(points, rung)` gives the results of points
-        on their rungs, `assess(points, results)` their Answers.
+        `rung` (N), `results` (N, columns) and `answers` are changed. `solve(points, rung)` gives
+        the results of points on their rungs, `assess(points, results)` their Answers.
         """
         left = np.flatnonzero(answers.missed & (rung <= self.top))
         for _ in range(self.most):
@@ -72,7 +79,8 @@ class Ladder:
             results[left[better]] = new[better]
             assessed = assess(left, results[left])
             answers.replace(left, assessed)
-            # truncation falls by far more than 2 from rung to rung: where the bound does not halve, rounding rules
+            # truncation falls by far more than 2 from rung to rung: where the bound does not halve,
+            # rounding rules
             useful = (new_bound < 0.5 * bound) | (assessed.status == status.OVERFLOW)
             left = left[assessed.missed & useful]
 

@@ -1,7 +1,8 @@
-"""Closed forms with error bars: arrays of numbers, each with a bound of its error, through + - * /, roots and means.
+"""Closed forms with error bars: arrays of numbers, each with a bound of its error, through + - * /,
+roots and means.
 
-The bounds hold for what the inputs may be off and for every rounding; they are infinite, or NaN, where a denominator
-or the argument of a root may vanish or be negative.
+The bounds hold for what the inputs may be off and for every rounding; they are infinite, or NaN,
+where a denominator or the argument of a root may vanish or be negative.
 """
 
 from dataclasses import dataclass
@@ -41,7 +42,9 @@ class Bounded:
     def __truediv__(self, other):
         other = of(other)
         value, least = self.value / other.value, abs(other.value) - other.bar
-        return _rounded(value, np.where(least > 0.0, (self.bar + abs(value) * other.bar) / least, np.inf))
+        return _rounded(
+            value, np.where(least > 0.0, (self.bar + abs(value) * other.bar) / least, np.inf)
+        )
 
     def __radd__(self, other):
         return self + other
@@ -59,7 +62,11 @@ class Bounded:
         """The square root; NaN where the number is negative, and 0 where it may be."""
         least = self.value - self.bar
         root = np.sqrt(np.where(abs(self.value) <= self.bar, 0.0, self.value))
-        off = np.where(least > 0.0, self.bar / (np.sqrt(np.maximum(least, 0.0)) + root), np.sqrt(self.value + self.bar))
+        off = np.where(
+            least > 0.0,
+            self.bar / (np.sqrt(np.maximum(least, 0.0)) + root),
+            np.sqrt(self.value + self.bar),
+        )
         return _rounded(root, off)
 
     def sign(self):
@@ -73,11 +80,15 @@ def of(number):
 
 
 def mean(a, b):
-    """The arithmetic-geometric mean of positive Bounded (DLMF 19.8(i)), homogeneous and increasing in both."""
+    """The arithmetic-geometric mean of positive Bounded (DLMF 19.8(i)), homogeneous and increasing
+    in both.
+    """
     low, high = ([np.maximum(x.value + side * x.bar, 0.0) for x in (a, b)] for side in (-1.0, 1.0))
     ends = [_mean(*pair) for pair in (low, high)]
     middle = _mean(a.value, b.value)
-    return _rounded(middle, np.maximum(ends[1] - middle, middle - ends[0]) + 2 * MEANS * ROUNDOFF_UP * middle)
+    return _rounded(
+        middle, np.maximum(ends[1] - middle, middle - ends[0]) + 2 * MEANS * ROUNDOFF_UP * middle
+    )
 
 
 def _mean(a, b):

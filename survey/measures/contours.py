@@ -1,7 +1,8 @@
-"""Zero curves on a map of a function that can be evaluated anywhere, each point bracketed by certain signs.
+"""Zero curves on a map of a function that can be evaluated anywhere, each point bracketed by
+certain signs.
 
-They are searched for on a lattice of lines, by marching squares. A closed curve narrower than the distance between two
-lines may be missed. Positions are those of `survey.measures.square`.
+They are searched for on a lattice of lines, by marching squares. A closed curve narrower than the
+distance between two lines may be missed. Positions are those of `survey.measures.square`.
 """
 
 import contourpy
@@ -25,20 +26,25 @@ def lattice(number, across=None):
 
 
 def filled(values):
-    """The values on a lattice, those that are not finite replaced by the nearest ones that are; 0 if none is."""
+    """The values on a lattice, those that are not finite replaced by the nearest ones that are; 0
+    if none is.
+    """
     unknown = ~np.isfinite(values)
     if unknown.all():
         return np.zeros(values.shape)
-    return values[tuple(distance_transform_edt(unknown, return_distances=False, return_indices=True))]
+    return values[
+        tuple(distance_transform_edt(unknown, return_distances=False, return_indices=True))
+    ]
 
 
 def lines(function, square, number, values=None, halvings=HALVINGS):
-    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from border to border or round.
+    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from border to border or
+    round.
 
     Where only a border of the `square` is asked for, the points there, each alone.
 
-    function(positions (m, 2)) -> (values, error bounds), NaN where there is none; `values`: those on the `lattice`,
-    where they are known.
+    function(positions (m, 2)) -> (values, error bounds), NaN where there is none; `values`: those
+    on the `lattice`, where they are known.
     """
     x = lattice(number, square.across)
     values = function(x)[0] if values is None else values
@@ -48,7 +54,9 @@ def lines(function, square, number, values=None, halvings=HALVINGS):
     found = contourpy.contour_generator(second, first, np.ma.masked_invalid(values)).lines(0.0)
     drawn = []
     for line in found:
-        x, error, sure = _closed_in(function, np.asarray(line)[:, ::-1], square.grain, number, halvings)
+        x, error, sure = _closed_in(
+            function, np.asarray(line)[:, ::-1], square.grain, number, halvings
+        )
         drawn += [(x[part], error[part]) for part in runs(sure)]
     return drawn
 
@@ -56,7 +64,9 @@ def lines(function, square, number, values=None, halvings=HALVINGS):
 def _crossings(function, square, x, values, halvings):
     """The points on the line through positions x (number, 2) at which the sign of the function changes."""
     with np.errstate(invalid="ignore"):
-        changes = np.isfinite(values[1:] + values[:-1]) & ((values[1:] > 0.0) != (values[:-1] > 0.0))
+        changes = np.isfinite(values[1:] + values[:-1]) & (
+            (values[1:] > 0.0) != (values[:-1] > 0.0)
+        )
     if not changes.any():
         return []
     start = 0.5 * (x[1:] + x[:-1])[changes]
@@ -65,7 +75,9 @@ def _crossings(function, square, x, values, halvings):
 
 
 def _closed_in(function, x, grain, number, halvings):
-    """(positions, errors, are signs certain?) of a curve through positions x, each between two crossings of lines."""
+    """(positions, errors, are signs certain?) of a curve through positions x, each between two
+    crossings of lines.
+    """
     step, rows = (number - 1) * x, np.arange(len(x))
     along = np.argmax(abs(step - np.rint(step)), axis=1)
     x[rows, 1 - along] = np.rint(step)[rows, 1 - along] / (number - 1)

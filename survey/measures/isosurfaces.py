@@ -1,15 +1,17 @@
-"""Surfaces in a box of three parameters on which functions are 0, as triangles whose corners are bracketed.
+"""Surfaces in a box of three parameters on which functions are 0, as triangles whose corners are
+bracketed.
 
-The signs of a function on LINES lines each way show where a surface passes: cubes whose corners differ are cut by
-polygons with corners on the cubes' edges (marching cubes; on a face with alternating signs negative corners are kept
-apart, from both sides, so that neighbours fit). Each corner is then moved along its edge to the zero of the function,
-and bracketed there by signs that are certain. A surface that lies between two lines everywhere, or two that lie closer
-than them, may be missed. Triangles of which a corner cannot be made certain are left out.
+The signs of a function on LINES lines each way show where a surface passes: cubes whose corners
+differ are cut by polygons with corners on the cubes' edges (marching cubes; on a face with
+alternating signs negative corners are kept apart, from both sides, so that neighbours fit). Each
+corner is then moved along its edge to the zero of the function, and bracketed there by signs that
+are certain. A surface that lies between two lines everywhere, or two that lie closer than them, may
+be missed. Triangles of which a corner cannot be made certain are left out.
 
 Positions are those of `survey.measures.square`, in three dimensions.
 
-Source: W. E. Lorensen, H. E. Cline, Marching cubes, Computer Graphics 21 (1987) 163; signs on faces: G. M. Nielson,
-B. Hamann, The asymptotic decider, IEEE Visualization (1991) 83.
+Source: W. E. Lorensen, H. E. Cline, Marching cubes, Computer Graphics 21 (1987) 163; signs on
+faces: G. M. Nielson, B. Hamann, The asymptotic decider, IEEE Visualization (1991) 83.
 """
 
 from dataclasses import dataclass
@@ -37,9 +39,9 @@ CORNERS = np.array(list(product((0, 1), repeat=3)))
 class Surfaces:
     """Pieces one after another: class `kind`, and so many `vertices` and `triangles` each.
 
-    Per vertex its position `x` (m, 3), its `error` (m) along the axis `axis` (m), and `along`: {name: (values,
-    errors)}; `corners` (t, 3) of the triangles are numbers of vertices. `left_out`: triangles that are not there since
-    a corner is not certain.
+    Per vertex its position `x` (m, 3), its `error` (m) along the axis `axis` (m), and `along`:
+    {name: (values, errors)}; `corners` (t, 3) of the triangles are numbers of vertices. `left_out`:
+    triangles that are not there since a corner is not certain.
     """
 
     kind: np.ndarray
@@ -54,7 +56,8 @@ class Surfaces:
 
 
 def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
-    """The Surfaces of all classes of `functions` (see QUESTIONS of `survey.measures`); `names`: of what is `along`.
+    """The Surfaces of all classes of `functions` (see QUESTIONS of `survey.measures`); `names`: of
+    what is `along`.
 
     `grain`: the rounding of positions. `each`, `once`: see `survey.sweep.boundaries.find`.
     """
@@ -71,7 +74,9 @@ def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
     planes = each(lattice, range(LINES), "planes of the surfaces' lattice")
     parts, left_out = [], 0
     for kind in map(int, planes[0]):
-        values = _told(np.stack([plane[str(kind)] for plane in planes]).reshape(LINES, LINES, LINES))
+        values = _told(
+            np.stack([plane[str(kind)] for plane in planes]).reshape(LINES, LINES, LINES)
+        )
         cut, corners = marched(values)
 
         def sharp(first, kind=kind, values=values, cut=cut):
@@ -96,9 +101,11 @@ def _signed(values, bars):
 
 
 def _told(values):
-    """The values with a sign, or NaN, where it is not certain (0): that of all certain neighbours, or else positive.
+    """The values with a sign, or NaN, where it is not certain (0): that of all certain neighbours,
+    or else positive.
 
-    So a function that touches 0 without a change of its sign has no surface there, nor on the box's border.
+    So a function that touches 0 without a change of its sign has no surface there, nor on the box's
+    border.
     """
     near = np.ones((3, 3, 3))
     below, above = (binary_dilation(own, near) for own in (values < 0.0, values > 0.0))
@@ -109,7 +116,8 @@ def _told(values):
 
 @cache
 def polygons(code):
-    """The triangles (m, 3) by which a cube is cut whose corner k of CORNERS is negative where `code` has the bit k.
+    """The triangles (m, 3) by which a cube is cut whose corner k of CORNERS is negative where
+    `code` has the bit k.
 
     Corners of triangles are numbers 8 axis + k: the edge from the corner k along the axis.
     """
@@ -144,10 +152,11 @@ def _edge(one, other):
 
 
 def marched(values):
-    """(edges (m, 4), corners (t, 3)) of the surface values = 0 on a lattice, not negative counted as positive.
+    """(edges (m, 4), corners (t, 3)) of the surface values = 0 on a lattice, not negative counted
+    as positive.
 
-    An edge is the place of its lower end on the lattice and its axis; corners of triangles are numbers of edges. Cubes
-    with a value that is not a number are not cut.
+    An edge is the place of its lower end on the lattice and its axis; corners of triangles are
+    numbers of edges. Cubes with a value that is not a number are not cut.
     """
     size = np.array(values.shape)
     known, negative = np.isfinite(values), values < 0.0
@@ -169,7 +178,9 @@ def marched(values):
 
 
 def _sharpened(functions, kind, values, cut, grain):
-    """{position, its error (infinite where it is not certain), axis, does it pass?, and what is along} of the edges."""
+    """{position, its error (infinite where it is not certain), axis, does it pass?, and what is
+    along} of the edges.
+    """
     nodes, axis, rows = cut[:, :3], cut[:, 3], np.arange(len(cut))
     step = 1.0 / (LINES - 1)
     x = nodes * step
@@ -197,10 +208,15 @@ def _sharpened(functions, kind, values, cut, grain):
                 a, b = np.where(same, t, a), np.where(same, b, t)
             t, width = 0.5 * (a + b), b - a
         t, width, sure = close_in(
-            lambda who, t, left=left: at(left, who, t), t, width, np.full(left.size, grain), 0.5 * step
+            lambda who, t, left=left: at(left, who, t),
+            t,
+            width,
+            np.full(left.size, grain),
+            0.5 * step,
         )
         sure &= (width < SURE) & (abs(t - np.clip(t, low[left], high[left])) <= BEYOND * step)
-        sure &= (t - width >= 0.0) & (t + width <= 1.0)  # one at the border itself would be there or not by chance
+        # one at the border itself would be there or not by chance
+        sure &= (t - width >= 0.0) & (t + width <= 1.0)
         x[left[sure], axis[left[sure]]], error[left[sure]] = t[sure], width[sure] + grain
     passes, along = functions.passing(x, kind)
     known = {f"along-{name}-{i}": both[i] for name, both in along.items() for i in (0, 1)}
@@ -247,7 +263,13 @@ def _pieces(kind, found, corners):
     for number in own[np.argsort(-sizes, kind="stable")]:
         of_piece = corners[piece[corners[:, 0]] == number]
         used, renumbered = np.unique(of_piece, return_inverse=True)
-        parts.append((kind, {name: values[used] for name, values in found.items()}, renumbered.reshape(-1, 3)))
+        parts.append(
+            (
+                kind,
+                {name: values[used] for name, values in found.items()},
+                renumbered.reshape(-1, 3),
+            )
+        )
     return parts
 
 
@@ -266,9 +288,14 @@ def _joined(parts, names, left_out):
         x=all_of("x", np.zeros((0, 3))),
         error=all_of("error", np.zeros(0)),
         axis=all_of("axis", np.zeros(0, int)),
-        along={name: tuple(all_of(f"along-{name}-{i}", np.zeros(0)) for i in (0, 1)) for name in names},
+        along={
+            name: tuple(all_of(f"along-{name}-{i}", np.zeros(0)) for i in (0, 1)) for name in names
+        },
         corners=np.concatenate(
-            [np.zeros((0, 3), int), *(c + first for (_, _, c), first in zip(parts, firsts, strict=True))]
+            [
+                np.zeros((0, 3), int),
+                *(c + first for (_, _, c), first in zip(parts, firsts, strict=True)),
+            ]
         ),
         left_out=left_out,
     )

@@ -1,11 +1,13 @@
-"""Motions of linear equations Y' = A(t) Y between their known multipliers: for pictures, with an error bar each.
+"""Motions of linear equations Y' = A(t) Y between their known multipliers: for pictures, with an
+error bar each.
 
 Gauss collocation with three nodes, order 6; each step is taken at once and in two halves, whose difference estimates
 the local error d. It is carried to the end by the linearised flow: beside each column of Y goes the matrix V of its
 error ellipse, as in `survey.kernels.lanes`: V <- P V P' + diag(d^2), |error_i| <= sqrt(m n V_ii) after n steps of m
 equations.
 
-Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.7, table 7.4.
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.7, table
+7.4.
 """
 
 import numpy as np
@@ -28,7 +30,8 @@ NODES = np.concatenate([0.5 * GAUSS, 0.5 + 0.5 * GAUSS, GAUSS])
 
 
 def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
-    """t, Y at the ends of all steps of `periods` periods, and its bounds (steps * periods + 1, n, n); Y = 1 at t = 0.
+    """t, Y at the ends of all steps of `periods` periods, and its bounds (steps * periods + 1, n,
+    n); Y = 1 at t = 0.
 
     `matrices` (steps, 9, n, n) holds A at the NODES of each step of one period, `lengths` (steps) how long they are.
     `scale` (n) holds the sizes of Y's components, `terms` (steps, n, n) what the rounding of A is relative to (or |A|).
@@ -36,18 +39,25 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
     h, n = lengths[:, None, None], matrices.shape[-1]
     if len(lengths) * periods * n * n > MOST:
         most = max(1, int(MOST / (len(lengths) * n * n))) * float(lengths.sum())
-        raise BadInput(f"time: a motion of {periods:,} periods is too long to be drawn; give at most {most:.3g}")
+        raise BadInput(
+            f"time: a motion of {periods:,} periods is too long to be drawn; give at most {most:.3g}"
+        )
     terms = abs(matrices).max(axis=1) if terms is None else terms
     halves = [_step(matrices[:, 3 * i : 3 * i + 3], 0.5 * h) for i in range(2)]
     steps, units = halves[1] @ halves[0], np.divide.outer(scale * np.ones(n), scale * np.ones(n))
     off = abs(steps - _step(matrices[:, 6:], h)) / units
     # an entry's difference may vanish by symmetry: the largest stands for all
-    local = SAFETY * off.max(axis=(1, 2), keepdims=True) * units + EPS * (4 * np.eye(n) + 12 * h * terms)
+    local = SAFETY * off.max(axis=(1, 2), keepdims=True) * units + EPS * (
+        4 * np.eye(n) + 12 * h * terms
+    )
     y, bars = _chain(steps, local, units, periods)
     ends = np.cumsum(lengths.astype(np.longdouble))
-    t = np.concatenate([[0.0], (ends + ends[-1] * np.arange(periods)[:, None]).ravel()]).astype(float)
+    t = np.concatenate([[0.0], (ends + ends[-1] * np.arange(periods)[:, None]).ravel()]).astype(
+        float
+    )
     with np.errstate(all="ignore"):
-        return t, y, bars + 4 * EPS * t[:, None, None] * (terms.max(axis=0) @ abs(y))  # t is rounded
+        # t is rounded
+        return t, y, bars + 4 * EPS * t[:, None, None] * (terms.max(axis=0) @ abs(y))
 
 
 def _step(a, h):
@@ -60,7 +70,9 @@ def _step(a, h):
 
 
 def _chain(steps, local, units, periods):
-    """Products of the steps from the first on, period after period, and their error bounds, from the `local` ones."""
+    """Products of the steps from the first on, period after period, and their error bounds, from
+    the `local` ones.
+    """
     number, n = len(steps) * periods, steps.shape[-1]
     y, squares = np.empty((2, number + 1, n, n))
     y[0], squares[0], ellipses = np.eye(n), 0.0, np.zeros((n, n, n))  # an ellipse for each column
@@ -71,10 +83,12 @@ def _chain(steps, local, units, periods):
             ellipses = p @ ellipses @ p.T
             ellipses[:, diagonal, diagonal] += (local[i % len(steps)] @ abs(y[i])).T ** 2
             y[i + 1], squares[i + 1] = p @ y[i], ellipses[:, diagonal, diagonal].T
-        # Cauchy and Schwarz: n components of each step's error add up, and V sums the squares of all
+        # Cauchy and Schwarz: n components of each step's error add up, and V sums the squares of
+        # all
         count = n * np.arange(number + 1)[:, None, None]
         relative = np.tile((local / units).sum(axis=(1, 2)), periods)
-        doubt = np.exp(np.concatenate([[0.0], np.cumsum(relative)]))[:, None, None]  # of the first order
+        # of the first order
+        doubt = np.exp(np.concatenate([[0.0], np.cumsum(relative)]))[:, None, None]
         return y, doubt * np.sqrt(count * squares)
 
 
@@ -88,7 +102,9 @@ def of_trace(trace, bar):
     first = 0.5 * trace + root
     first = first if abs(first) >= 1 else 0.5 * trace - root
     off = 0.5 * bar + min(np.sqrt(d), d / abs(root) if root else np.inf) + 4 * EPS * abs(first)
-    return np.array([first, 1 / first]), np.array([off, off / (abs(first) * max(abs(first) - off, 0.5))])
+    return np.array([first, 1 / first]), np.array(
+        [off, off / (abs(first) * max(abs(first) - off, 0.5))]
+    )
 
 
 def mirrored(nodes):

@@ -1,4 +1,6 @@
-"""A block as rows and lanes: what depends on some axes alone is computed once for each position along those."""
+"""A block as rows and lanes: what depends on some axes alone is computed once for each position
+along those.
+"""
 
 from math import prod
 
@@ -6,11 +8,15 @@ import numpy as np
 
 
 class Rows:
-    """Axes along which any of `shared` is long make the rows, the others the lanes; `shape` is the block's."""
+    """Axes along which any of `shared` is long make the rows, the others the lanes; `shape` is the
+    block's.
+    """
 
     def __init__(self, shared, *others):
         self.shape = np.broadcast_shapes(*(np.shape(a) for a in (*shared, *others)))
-        of_rows = [axis for axis in range(len(self.shape)) if any(self._size(a, axis) > 1 for a in shared)]
+        of_rows = [
+            axis for axis in range(len(self.shape)) if any(self._size(a, axis) > 1 for a in shared)
+        ]
         of_lanes = [axis for axis in range(len(self.shape)) if axis not in of_rows]
         self.order, self.lane_axes = of_rows + of_lanes, len(of_lanes)
         self.rows = prod(self.shape[axis] for axis in of_rows)
@@ -19,7 +25,9 @@ class Rows:
         self.back_order = sorted(range(len(self.order)), key=self.order.__getitem__)
 
     def _size(self, array, axis):
-        """Length of `array` along an axis of the block (arrays with fewer dimensions broadcast from the right)."""
+        """Length of `array` along an axis of the block (arrays with fewer dimensions broadcast from
+        the right).
+        """
         axis -= len(self.shape) - np.ndim(array)
         return np.shape(array)[axis] if axis >= 0 else 1
 
@@ -40,7 +48,9 @@ class Rows:
         return self._full(array)[(..., *[0] * self.lane_axes)]
 
     def per_point(self, array):
-        """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels would compile again."""
+        """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels
+        would compile again.
+        """
         return np.array(self._broadcast(array), order="C")
 
     def _broadcast(self, array):
@@ -52,5 +62,9 @@ class Rows:
 
     def back(self, array):
         """(rows, lanes), or (rows, 1), in the block's shape."""
-        full = np.broadcast_to(array, (self.rows, self.lanes)) if array.shape != (self.rows, self.lanes) else array
+        full = (
+            np.broadcast_to(array, (self.rows, self.lanes))
+            if array.shape != (self.rows, self.lanes)
+            else array
+        )
         return np.ascontiguousarray(full.reshape(self.sorted_shape).transpose(self.back_order))

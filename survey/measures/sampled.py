@@ -1,4 +1,6 @@
-"""Curves on a map: what measures hand to [boundaries]; parametrised curves, sampled closely enough to be drawn."""
+"""Curves on a map: what measures hand to [boundaries]; parametrised curves, sampled closely enough
+to be drawn.
+"""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -14,10 +16,10 @@ ROUNDS = 60
 class Curves:
     """Curves one after another: `count` points each, of class `kind`.
 
-    Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`: {name of
-    ALONG: (values, errors)}. `unexplained`: segments of lines across the map along which a curve is missing, by what is
-    known at their ends; None where nothing is counted. `complete`: is it shown that there are no others? None where
-    this is not known.
+    Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`:
+    {name of ALONG: (values, errors)}. `unexplained`: segments of lines across the map along which a
+    curve is missing, by what is known at their ends; None where nothing is counted. `complete`: is
+    it shown that there are no others? None where this is not known.
     """
 
     count: np.ndarray
@@ -30,7 +32,9 @@ class Curves:
 
 
 def sampled(position, low, high, first=FIRST):
-    """Numbers t from low to high, spaced so that chords on the map are short and near the curve position(t) (m, 2)."""
+    """Numbers t from low to high, spaced so that chords on the map are short and near the curve
+    position(t) (m, 2).
+    """
     if low == high:
         return np.array([low])
     t = np.linspace(low, high, first)
@@ -42,7 +46,9 @@ def sampled(position, low, high, first=FIRST):
         with np.errstate(all="ignore"):
             off = abs(chord[:, 0] * half[:, 1] - chord[:, 1] * half[:, 0]) / np.hypot(*chord.T)
         away = np.maximum(np.maximum(-x, x - 1.0), 0.0).max(axis=1)
-        split = (np.minimum(away[1:], away[:-1]) <= path) & ((path > LONGEST) | ~(off <= FLAT) & (path > FLAT))
+        split = (np.minimum(away[1:], away[:-1]) <= path) & (
+            (path > LONGEST) | ~(off <= FLAT) & (path > FLAT)
+        )
         split &= (middle > t[:-1]) & (middle < t[1:])
         if not split.any():
             break
@@ -69,7 +75,9 @@ def inside(x):
 
 
 def runs(position, low, high, tests=(), first=FIRST):
-    """Arrays of t, one for each run of the curve position(t) on the map, parted where one of the `tests` changes."""
+    """Arrays of t, one for each run of the curve position(t) on the map, parted where one of the
+    `tests` changes.
+    """
     t = sampled(position, low, high, first)
     cuts = [changes(lambda s: inside(position(s)), t), *(changes(test, t) for test in tests)]
     t = np.unique(np.concatenate([t, *cuts]))
@@ -78,15 +86,25 @@ def runs(position, low, high, tests=(), first=FIRST):
         return [t] if inside(position(t)).all() else []
     found = [t[(t >= a) & (t <= b)] for a, b in pairwise(cuts)]
     middles = [own[own.size // 2] if own.size > 2 else 0.5 * (own[0] + own[-1]) for own in found]
-    return [own for own, middle in zip(found, middles, strict=True) if inside(position(np.array([middle])))[0]]
+    return [
+        own
+        for own, middle in zip(found, middles, strict=True)
+        if inside(position(np.array([middle])))[0]
+    ]
 
 
 def joined(found, names):
-    """The Curves of [(kind, parameters (m, 2), errors (m), {name: (values, errors)})]; `names`: those of ALONG."""
+    """The Curves of [(kind, parameters (m, 2), errors (m), {name: (values, errors)})]; `names`:
+    those of ALONG.
+    """
 
     def of(name, parameters, known, which):
         given = known.get(name)
-        return np.full(len(parameters), np.nan) if given is None else np.broadcast_to(given[which], len(parameters))
+        return (
+            np.full(len(parameters), np.nan)
+            if given is None
+            else np.broadcast_to(given[which], len(parameters))
+        )
 
     def all_of(arrays):
         return np.concatenate([np.zeros(0), *arrays])
@@ -94,10 +112,15 @@ def joined(found, names):
     return Curves(
         count=np.array([len(parameters) for _, parameters, _, _ in found], int),
         kind=np.array([kind for kind, _, _, _ in found], int),
-        parameters=np.concatenate([np.zeros((0, 2)), *(parameters for _, parameters, _, _ in found)]),
+        parameters=np.concatenate(
+            [np.zeros((0, 2)), *(parameters for _, parameters, _, _ in found)]
+        ),
         error=all_of(error for _, _, error, _ in found),
         along={
-            name: tuple(all_of(of(name, parameters, known, i) for _, parameters, _, known in found) for i in (0, 1))
+            name: tuple(
+                all_of(of(name, parameters, known, i) for _, parameters, _, known in found)
+                for i in (0, 1)
+            )
             for name in names
         },
     )

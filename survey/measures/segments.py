@@ -1,10 +1,11 @@
 """Do the curves on a map explain how an integer changes along the lines of a lattice?
 
-Between two points of a line at which the integer is known it changes by what the curves say that the segment meets. A
-segment whose curves do not add up to the change, with any signs, has lost one. A curve that it meets next to its ends
-may belong to the segment beside it, and two that it meets next to one another may be one that is drawn twice: these may
-count or not. Curves that end inside the map, as between the edges of a narrow tongue, or that cancel between two points
-of the lattice, do not show.
+Between two points of a line at which the integer is known it changes by what the curves say that
+the segment meets. A segment whose curves do not add up to the change, with any signs, has lost one.
+A curve that it meets next to its ends may belong to the segment beside it, and two that it meets
+next to one another may be one that is drawn twice: these may count or not. Curves that end inside
+the map, as between the edges of a narrow tongue, or that cancel between two points of the lattice,
+do not show.
 """
 
 from itertools import pairwise
@@ -16,29 +17,35 @@ NEAR = 1e-3  # of the map: what chords of curves may be off
 
 
 def segments(values, curves, weights_of, border=1, optional=()):
-    """{(axis, number of the line across it, first, last point): do the curves explain the change of `values`?}, of
-    integers (n, n) at the lattice's points, or UNKNOWN; each of the curves [(kind, positions (m, 2))] counts for 1, or
-    for `weights_of` its kind; those of the kinds `optional` may count or not. The `border` is as many lines wide, which
-    are left out.
+    """{(axis, number of the line across it, first, last point): do the curves explain the change of
+    `values`?}, of integers (n, n) at the lattice's points, or UNKNOWN; each of the curves [(kind,
+    positions (m, 2))] counts for 1, or for `weights_of` its kind; those of the kinds `optional` may
+    count or not. The `border` is as many lines wide, which are left out.
     """
     found = {}
     for axis in (0, 1):
         lines = values if axis == 1 else values.T  # along the axis, by the place on the other one
         ticks = np.linspace(0.0, 1.0, len(lines))
         for number in range(border, len(lines) - border):
-            line, (places, weights, free) = lines[number], _met(curves, axis, ticks[number], weights_of, optional)
+            line, (places, weights, free) = (
+                lines[number],
+                _met(curves, axis, ticks[number], weights_of, optional),
+            )
             for first, last in pairwise(np.flatnonzero(line != UNKNOWN)):
                 low, high = ticks[first], ticks[last]
                 inside = (places > low - NEAR) & (places < high + NEAR)
                 sure = (places > low + NEAR) & (places < high - NEAR) & ~free
                 change = line[last] - line[first]
-                found[axis, number, first, last] = _explained(change, weights[inside & sure], weights[inside & ~sure])
+                found[axis, number, first, last] = _explained(
+                    change, weights[inside & sure], weights[inside & ~sure]
+                )
     return found
 
 
 def _met(curves, axis, tick, weights_of, optional):
-    """Where the line along the axis, at `tick` of the other one, meets curves: positions, weights (1 but for
-    `weights_of` {kind: weight}), and which of them need not count: `optional`, or perhaps drawn twice.
+    """Where the line along the axis, at `tick` of the other one, meets curves: positions, weights
+    (1 but for `weights_of` {kind: weight}), and which of them need not count: `optional`, or
+    perhaps drawn twice.
     """
     places, weights, kinds = [np.zeros(0)], [np.zeros(0, int)], [np.zeros(0, int)]
     for kind, x in curves:

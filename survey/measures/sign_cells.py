@@ -1,7 +1,9 @@
-"""Cells decided by the signs of a few functions: stable where all are positive, unstable where one is negative.
+"""Cells decided by the signs of a few functions: stable where all are positive, unstable where one
+is negative.
 
-On a block each function is its tensor Chebyshev series to within a bound, as in `survey.measures.hill.cells`, whose
-series and cells these are; the cells of a block are halved on the series alone, all of one size together.
+On a block each function is its tensor Chebyshev series to within a bound, as in
+`survey.measures.hill.cells`, whose series and cells these are; the cells of a block are halved on
+the series alone, all of one size together.
 """
 
 import numpy as np
@@ -15,7 +17,8 @@ from survey.measures.hill import cells
 def find(solve, x, y, each, report, values):
     """The `hill.cells.Cells` of the rectangle of the Sides x and y.
 
-    `values(out)` makes the functions and their bounds (B, F, n, n) of what `solve` gives; other arguments as there.
+    `values(out)` makes the functions and their bounds (B, F, n, n) of what `solve` gives; other
+    arguments as there.
     """
     return cells.find(solve, x, y, each, report, values, _descend)
 
@@ -27,7 +30,9 @@ def _descend(series, doubts, blocks, depth, halves):
     while len(where):
         verdict = decided(own, slack[of])
         # a block whose own series is too loose is solved again, if it can be halved
-        loose = (verdict == UNDECIDED) & (doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)).any(axis=1)
+        loose = (verdict == UNDECIDED) & (
+            doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)
+        ).any(axis=1)
         whole = (where == blocks[of]).all(axis=1) & loose & (where[:, [0, 2]] < depth).any(axis=1)
         left = np.maximum(depth[0] - where[:, 0], depth[1] - where[:, 2])
         done = ~whole & ((verdict != UNDECIDED) | (left == 0))
@@ -76,7 +81,10 @@ def _halved(own, where, of, along, halves):
         here = along == axis
         for side in (0, 1):
             level, place = where[here, 2 * axis], where[here].copy()
-            place[:, 2 * axis], place[:, 2 * axis + 1] = level + 1, 2 * place[:, 2 * axis + 1] + side
+            place[:, 2 * axis], place[:, 2 * axis + 1] = (
+                level + 1,
+                2 * place[:, 2 * axis + 1] + side,
+            )
             step = halves[axis, level, side][:, None]
             new = step @ own[here] if axis == 0 else own[here] @ step.swapaxes(2, 3)
             parts.append((new, place, of[here]))

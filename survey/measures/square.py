@@ -9,7 +9,8 @@ import numpy as np
 class Square:
     """Ends of both axes (2), ascending, and which of them are logarithmic.
 
-    `across`: the position on the second axis, 0 or 1, of the border that alone is asked for; None: the whole square is.
+    `across`: the position on the second axis, 0 or 1, of the border that alone is asked for; None:
+    the whole square is.
     """
 
     low: np.ndarray

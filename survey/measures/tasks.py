@@ -1,7 +1,8 @@
-"""How the tasks of a measure are run: `each(task, items, what)`, wherever a measure takes an `each`.
+"""How the tasks of a measure are run: `each(task, items, what)`, wherever a measure takes an
+`each`.
 
-It returns [task(item) for item in items]; tasks may run in any order, and on threads. `what` names the items for
-reports of progress, such as "parts of the edges".
+It returns [task(item) for item in items]; tasks may run in any order, and on threads. `what` names
+the items for reports of progress, such as "parts of the edges".
 """
 
 

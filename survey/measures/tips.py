@@ -1,9 +1,10 @@
-"""Curves followed on from where a lattice loses them: into the tips of tongues, or up to the next piece.
+"""Curves followed on from where a lattice loses them: into the tips of tongues, or up to the next
+piece.
 
-Inside a narrow tongue the function is a shallow valley, a parabola across whose zeros are the tongue's two edges. Of
-the parabola through three values the zero with the curve's own slope is taken, so that one edge is not mistaken for the
-other, and it is bracketed by certain signs, as all points are. All ends take their steps together, each of its own
-length.
+Inside a narrow tongue the function is a shallow valley, a parabola across whose zeros are the
+tongue's two edges. Of the parabola through three values the zero with the curve's own slope is
+taken, so that one edge is not mistaken for the other, and it is bracketed by certain signs, as all
+points are. All ends take their steps together, each of its own length.
 """
 
 import numpy as np
@@ -20,15 +21,23 @@ SAME = 1e-8  # how near one place is found again, besides the brackets
 
 
 class _End:
-    """An end of a piece: its outermost points, the one that is nearest to the end last, and the length of a step."""
+    """An end of a piece: its outermost points, the one that is nearest to the end last, and the
+    length of a step.
+    """
 
     def __init__(self, x, error):
         self.x, self.error, self.own = [*x], [*error], len(x)
-        self.step, self.going, self.side = max(LEAST, min(np.hypot(*(x[-1] - x[-2])), 0.25 * LONGEST)), True, 0.0
+        self.step, self.going, self.side = (
+            max(LEAST, min(np.hypot(*(x[-1] - x[-2])), 0.25 * LONGEST)),
+            True,
+            0.0,
+        )
 
     @property
     def ahead(self):
-        back = next(p for p in self.x[-2::-1] if np.hypot(*(self.x[-1] - p)) > 0.1 * LEAST or p is self.x[0])
+        back = next(
+            p for p in self.x[-2::-1] if np.hypot(*(self.x[-1] - p)) > 0.1 * LEAST or p is self.x[0]
+        )
         run = self.x[-1] - back
         return run / max(np.hypot(*run), 1e-300)
 
@@ -38,7 +47,8 @@ class _End:
 
 
 def followed(function, pieces, grain):
-    """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends inside the map.
+    """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends inside
+    the map.
 
     Those that meet end to end are one.
     """
@@ -52,14 +62,23 @@ def followed(function, pieces, grain):
         end.going = False
     _sides(function, [end for end in ends if end.going])
     for _ in range(MOST):
-        going = [end for k, end in enumerate(ends) if end.going and not any(_faces(end, one) for one in ends[:k])]
+        going = [
+            end
+            for k, end in enumerate(ends)
+            if end.going and not any(_faces(end, one) for one in ends[:k])
+        ]
         if not going:
             break
         _steps(function, going, ends, grain)
     longer = []
     for i, (x, error) in enumerate(pieces):
         (first, first_error), (last, last_error) = (end.new for end in ends[2 * i : 2 * i + 2])
-        longer.append((np.concatenate([first[::-1], x, last]), np.concatenate([first_error[::-1], error, last_error])))
+        longer.append(
+            (
+                np.concatenate([first[::-1], x, last]),
+                np.concatenate([first_error[::-1], error, last_error]),
+            )
+        )
     return _merged(longer)
 
 
@@ -83,7 +102,10 @@ def _merged(pieces):
         return passed
 
     for end in [*np.flatnonzero(partner < 0), *range(len(ends))]:  # what closes has no first piece
-        parts = [tuple(one[::-1] if back else one for one in pieces[number]) for number, back in chain(end)]
+        parts = [
+            tuple(one[::-1] if back else one for one in pieces[number])
+            for number, back in chain(end)
+        ]
         if parts:
             whole = [parts[0], *((x[1:], error[1:]) for x, error in parts[1:])]
             done.append(tuple(np.concatenate(one) for one in zip(*whole, strict=True)))
@@ -91,14 +113,18 @@ def _merged(pieces):
 
 
 def _sides(function, ends):
-    """Note the sign of the function to the left of each end, on its way out; ends where it is open go nowhere."""
+    """Note the sign of the function to the left of each end, on its way out; ends where it is open
+    go nowhere.
+    """
     if not ends:
         return
     width = np.array([max(10.0 * end.error[-1], 1e-9) for end in ends])
     left = np.array([[-end.ahead[1], end.ahead[0]] for end in ends])
     tips = np.array([end.x[-1] for end in ends])
     for _ in range(4):  # as far from the end as its sign needs
-        values, bars = function(np.concatenate([tips + width[:, None] * left, tips - width[:, None] * left]))
+        values, bars = function(
+            np.concatenate([tips + width[:, None] * left, tips - width[:, None] * left])
+        )
         sign = np.where(abs(values) > bars, np.sign(values), 0.0).reshape(2, -1)
         for k, end in enumerate(ends):
             if end.side == 0.0 and sign[0, k] * sign[1, k] < 0.0:
@@ -145,7 +171,12 @@ def _steps(function, going, ends, grain):
         place[axis[k]] = t[k]
         other = met[k]
         bend = off[k] if other is None else 0.0  # a goal that is met is where the curve goes
-        if sure[k] != 1.0 or not inside[k] or bend > 8.0 * FLAT + 0.1 * LEAST or off[k] > 0.5 * length[k]:
+        if (
+            sure[k] != 1.0
+            or not inside[k]
+            or bend > 8.0 * FLAT + 0.1 * LEAST
+            or off[k] > 0.5 * length[k]
+        ):
             end.step *= 0.5
             end.going = end.step >= LEAST
             continue
@@ -160,15 +191,25 @@ def _steps(function, going, ends, grain):
 
 
 def _meets(end, other, reach):
-    """Is the tip of the other end, which comes from there, straight ahead of this one and not farther than `reach`?"""
+    """Is the tip of the other end, which comes from there, straight ahead of this one and not
+    farther than `reach`?
+    """
     run, ahead = other.x[-1] - end.x[-1], end.ahead
     along = run @ ahead
-    return 0.0 < along <= reach and np.hypot(*(run - along * ahead)) <= 0.2 * along and ahead @ other.ahead < 0.0
+    return (
+        0.0 < along <= reach
+        and np.hypot(*(run - along * ahead)) <= 0.2 * along
+        and ahead @ other.ahead < 0.0
+    )
 
 
 def _faces(end, other):
     """Would both pass each other in their next steps? Then one of them waits."""
-    return other.going and _meets(end, other, 1.3 * (end.step + other.step)) and not _meets(end, other, 1.3 * end.step)
+    return (
+        other.going
+        and _meets(end, other, 1.3 * (end.step + other.step))
+        and not _meets(end, other, 1.3 * end.step)
+    )
 
 
 def _goal(end, ends):
@@ -179,7 +220,9 @@ def _goal(end, ends):
             return other.x[-1], other
     goal = tip + end.step * ahead
     with np.errstate(all="ignore"):
-        room = np.where(ahead > 0.0, (1.0 - tip) / ahead, np.where(ahead < 0.0, -tip / ahead, np.inf))
+        room = np.where(
+            ahead > 0.0, (1.0 - tip) / ahead, np.where(ahead < 0.0, -tip / ahead, np.inf)
+        )
     nearest = int(np.argmin(room))
     if room[nearest] < end.step:
         goal = tip + room[nearest] * ahead
@@ -188,7 +231,9 @@ def _goal(end, ends):
 
 
 def _zeros(at, t, reach, slope):
-    """(zeros near t (n) at which functions have slopes of the signs `slope`, or NaN; within what they are known)."""
+    """(zeros near t (n) at which functions have slopes of the signs `slope`, or NaN; within what
+    they are known).
+    """
     rows = np.arange(t.size)
     for _ in range(FITS):
         f, _bars = at(rows, t[:, None] + reach[:, None] * np.array([-1.0, 0.0, 1.0]))

@@ -1,10 +1,11 @@
-"""Curves on a map on which something that moves with the parameters is exceptional: followed point by point.
+"""Curves on a map on which something that moves with the parameters is exceptional: followed point
+by point.
 
-A system gives, at a position of the map and a place x, two numbers (a, b) and their error bounds: b = 0 says where the
-thing is (an extremum, an equilibrium), a = 0 that the position lies on the curve. The curve is followed in the space of
-(x, position), where it has no cusps, by steps along its tangent and Newton's method. Each of its points is bracketed,
-across the curve, by positions at which a has certain and opposite signs where b = 0. Positions are those of
-`survey.measures.square`.
+A system gives, at a position of the map and a place x, two numbers (a, b) and their error bounds: b
+= 0 says where the thing is (an extremum, an equilibrium), a = 0 that the position lies on the
+curve. The curve is followed in the space of (x, position), where it has no cusps, by steps along
+its tangent and Newton's method. Each of its points is bracketed, across the curve, by positions at
+which a has certain and opposite signs where b = 0. Positions are those of `survey.measures.square`.
 """
 
 from collections.abc import Callable
@@ -28,7 +29,9 @@ TINY = 1e-300
 
 @dataclass(frozen=True)
 class Track:
-    """Points of a curve: positions (m, 2) with their errors, places x with theirs; which of them are certain."""
+    """Points of a curve: positions (m, 2) with their errors, places x with theirs; which of them
+    are certain.
+    """
 
     x: np.ndarray
     error: np.ndarray
@@ -47,8 +50,13 @@ class Track:
         low, chord = self.x[:-1], np.diff(self.x, axis=0)
         share = ((u[1:] - low) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), TINY)
         off = abs(low + np.clip(share, 0.0, 1.0)[:, None] * chord - u[1:]).max(axis=1)
-        least, most = np.minimum(self.place[:-1], self.place[1:]), np.maximum(self.place[:-1], self.place[1:])
-        return bool(((off < SAME) & ((u[0] - least + APART) % turn < most - least + 2.0 * APART)).any())
+        least, most = (
+            np.minimum(self.place[:-1], self.place[1:]),
+            np.maximum(self.place[:-1], self.place[1:]),
+        )
+        return bool(
+            ((off < SAME) & ((u[0] - least + APART) % turn < most - least + 2.0 * APART)).any()
+        )
 
     def within(self, other, turn):
         """Does nearly all of this curve lie on the other?"""
@@ -63,8 +71,13 @@ def part_of(track, part):
 
 def with_points(track, places, others):
     """The Track with a point of each of the `others` put in before its point of the number in `places`."""
-    pairs = [(name, np.concatenate([getattr(other, name) for other in others])) for name in Track.__dataclass_fields__]
-    return Track(*(np.insert(getattr(track, name), places, values, axis=0) for name, values in pairs))
+    pairs = [
+        (name, np.concatenate([getattr(other, name) for other in others]))
+        for name in Track.__dataclass_fields__
+    ]
+    return Track(
+        *(np.insert(getattr(track, name), places, values, axis=0) for name, values in pairs)
+    )
 
 
 @dataclass(frozen=True)
@@ -79,7 +92,9 @@ class Follower:
 
     def _slopes(self, u):
         """The derivatives of a and b by x and by the position (2, 3)."""
-        ends = [[self._at(u + side * STEP * axis)[:2] for side in (1.0, -1.0)] for axis in np.eye(3)]
+        ends = [
+            [self._at(u + side * STEP * axis)[:2] for side in (1.0, -1.0)] for axis in np.eye(3)
+        ]
         return np.array([(high - low) / (2.0 * STEP) for high, low in ends]).T
 
     def landed(self, u):
@@ -142,7 +157,11 @@ class Follower:
                 return rows + ([end] if end else []), False
             rows.append(self._row(*new, None))
             moved = np.linalg.norm(new[0] - u)
-            if len(rows) > 3 and np.linalg.norm(new[0] - first) < moved and abs(ahead @ _tangent(found[1])) > 0.9:
+            if (
+                len(rows) > 3
+                and np.linalg.norm(new[0] - first) < moved
+                and abs(ahead @ _tangent(found[1])) > 0.9
+            ):
                 return [*rows, self._row(*found, None)], True
             u, tangent, step = new[0], ahead, 1.5 * step
             if len(rows) > SLOW and np.hypot(*(u[1:] - rows[-SLOW][0])) < SLOW * LEAST:
@@ -158,13 +177,18 @@ class Follower:
         return self.on_border(u + share[axis] * (beyond - u), axis, float(high[axis] > 1.0))
 
     def on_border(self, at, axis, end):
-        """The row of the point next to `at` where the position on the axis is `end`; None if it is not found."""
+        """The row of the point next to `at` where the position on the axis is `end`; None if it is
+        not found.
+        """
         at = at.copy()
         for _ in range(8):
             at[1 + axis] = end
             values, slopes = self._at(at), self._slopes(at)
             part = slopes[:, [0, 2 - axis]]
-            if not (np.isfinite(values).all() and np.isfinite(part).all()) or np.linalg.det(part) == 0.0:
+            if (
+                not (np.isfinite(values).all() and np.isfinite(part).all())
+                or np.linalg.det(part) == 0.0
+            ):
                 return None
             step = np.linalg.solve(part, -values[:2])
             at[[0, 2 - axis]] += step
@@ -175,7 +199,9 @@ class Follower:
         return None
 
     def _row(self, u, slopes, axis):
-        """(position, its error, place, its error, is it certain?), bracketed across the curve or along the `axis`."""
+        """(position, its error, place, its error, is it certain?), bracketed across the curve or
+        along the `axis`.
+        """
         (a_x, *a_y), (b_x, *b_y) = slopes
         a_y, b_y, x = np.array(a_y), np.array(b_y), u[1:].copy()
         lost = x, np.nan, u[0], np.nan, False
@@ -242,9 +268,10 @@ def from_lattice(number, things, function_of, square):
 
     Where only a border of the `square` is asked for: of their points there, Tracks of one point.
 
-    things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower takes, and by how
-    much places differ that are the same (an infinite number if none are). A curve is begun where, from one node to the
-    next, a changes its sign on things of one label and side that are near.
+    things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower
+    takes, and by how much places differ that are the same (an infinite number if none are). A curve
+    is begun where, from one node to the next, a changes its sign on things of one label and side
+    that are near.
     """
     if square.across is not None:
         x = contours.lattice((number - 1) * DENSER + 1, square.across)
@@ -262,7 +289,9 @@ def from_lattice(number, things, function_of, square):
     found.sort(key=lambda one: -len(one[1].x))
     alone = []
     for label, track in found:
-        if not any(own == label and track.within(longer, function_of(label)[1]) for own, longer in alone):
+        if not any(
+            own == label and track.within(longer, function_of(label)[1]) for own, longer in alone
+        ):
             alone.append((label, track))
     return alone
 

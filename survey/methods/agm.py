@@ -1,6 +1,8 @@
-"""Closed forms of nutations by the arithmetic-geometric mean, the advances of pi split off: no steps, a few means.
+"""Closed forms of nutations by the arithmetic-geometric mean, the advances of pi split off: no
+steps, a few means.
 
-Domain: every motion between turning points; near separatrices and poles too. Bars are a few roundings.
+Domain: every motion between turning points; near separatrices and poles too. Bars are a few
+roundings.
 
 Source: DLMF 19.8(i), 19.22(ii); formulas (S5), (S10)-(S14), (S22) of `scenes/brun.md`.
 """
@@ -21,7 +23,8 @@ SERVES = ("nutation",)
 _CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
 _FINE = 2.0**-94
 _CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
-_SLANT = 0.25  # where the line through the roots of Q is lower at the pole, relative, pi is not split off
+# where the line through the roots of Q is lower at the pole, relative, pi is not split off
+_SLANT = 0.25
 
 
 @kernel
@@ -60,8 +63,15 @@ def _fine_part(gap, near, far, root_near, root_far, incline, bend, x, y):
 
 @kernel
 def _fine_parts(row):
-    """The sum of the parts of both poles and their difference, where one of these is next to nothing (fast spin)."""
-    k, total, near, far = nu.pair(row, nu.K), nu.pair(row, nu.SUM), nu.pair(row, nu.Q_HIGH), nu.pair(row, nu.Q_LOW)
+    """The sum of the parts of both poles and their difference, where one of these is next to
+    nothing (fast spin).
+    """
+    k, total, near, far = (
+        nu.pair(row, nu.K),
+        nu.pair(row, nu.SUM),
+        nu.pair(row, nu.Q_HIGH),
+        nu.pair(row, nu.Q_LOW),
+    )
     high, low = dd.sqrt(near), dd.sqrt(far)
     g = dd.mul(high, low)
     above, n = dd.add(nu.pair(row, nu.MIDDLE), g), nu.pair(row, nu.BEND)
@@ -96,12 +106,23 @@ def _rates(row, to_plus, to_minus):
 
 @inline
 def _blurred(row, roots, up, down, period, x, y):
-    """Errors of precession and spin (S23) due to those of Q at the turning points and of s + g; advances up, down."""
-    share, low, high, above = _shares(x, y), row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
+    """Errors of precession and spin (S23) due to those of Q at the turning points and of s + g;
+    advances up, down.
+    """
+    share, low, high, above = (
+        _shares(x, y),
+        row[nu.NOISE_LOW],
+        row[nu.NOISE_HIGH],
+        row[nu.NOISE_ABOVE],
+    )
     full, rest, time = abs(up) + abs(down), min(x, y) / max(x, y), 0.5 * period
     if x < y:  # the motion is slow where Q is least
-        to_plus = (row[nu.LOW_PLUS] * roots[1] + row[nu.HIGH_PLUS] * roots[0]) / (roots[0] + roots[1])
-        to_minus = (row[nu.LOW_MINUS] * roots[1] + row[nu.HIGH_MINUS] * roots[0]) / (roots[0] + roots[1])
+        to_plus = (row[nu.LOW_PLUS] * roots[1] + row[nu.HIGH_PLUS] * roots[0]) / (
+            roots[0] + roots[1]
+        )
+        to_minus = (row[nu.LOW_MINUS] * roots[1] + row[nu.HIGH_MINUS] * roots[0]) / (
+            roots[0] + roots[1]
+        )
         psi, phi = _rates(row, to_plus, to_minus)
         generic, part = (low + high + rest * above) * full, share[0] * above * time
         return generic + part * psi, generic + part * phi
@@ -111,7 +132,9 @@ def _blurred(row, roots, up, down, period, x, y):
     generic, part = (above + rest * (low + high)) * full, share[1] * time
     psi, phi = _rates(row, row[nu.LOW_PLUS], row[nu.LOW_MINUS])
     other_psi, other_phi = _rates(row, row[nu.HIGH_PLUS], row[nu.HIGH_MINUS])
-    return generic + part * (low * psi + high * other_psi), generic + part * (low * phi + high * other_phi)
+    return generic + part * (low * psi + high * other_psi), generic + part * (
+        low * phi + high * other_phi
+    )
 
 
 @inline
@@ -127,7 +150,9 @@ def _periods_of(row, out):
     bend = 0.5 * k * row[nu.BEND] / above
     plus = row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS]  # for the pole u = 1
     minus = row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS]
-    turns_up, up, size_up = _advance(*plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y)
+    turns_up, up, size_up = _advance(
+        *plus, width, root_high, root_low, incline, row[nu.Q_PLUS], bend, period, x, y
+    )
     turns_down, down, size_down = _advance(
         *minus, width, root_low, root_high, -incline, row[nu.Q_MINUS], bend, period, x, y
     )
@@ -139,18 +164,31 @@ def _periods_of(row, out):
     ) * period
     total, difference, size = down + up, down - up, size_up + size_down
     roots = root_low, root_high
-    blur_psi, blur_phi = _blurred(row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y)
+    blur_psi, blur_phi = _blurred(
+        row, roots, pi * turns_up + up, pi * turns_down + down, period, x, y
+    )
     ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
     error, rounding = (24.0 * ROUNDOFF + ends) * size, 2.0 * ROUNDOFF
-    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)  # without multiples of pi
+    # without multiples of pi
+    bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)
     if bare < _CANCELLED * size and turns_up * turns_down != 0.0:
         total, difference = _fine_parts(row)
         error, rounding = (_FINE + ends) * size, 12.0 * ROUNDOFF
-    out[rc.PRECESSION], out[rc.SPIN] = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
+    out[rc.PRECESSION], out[rc.SPIN] = (
+        pi * (turns_down + turns_up) + total,
+        pi * (turns_down - turns_up) + difference,
+    )
     turned = 2.0 * ROUNDOFF * pi
-    turned_psi, turned_phi = turned * abs(turns_down + turns_up), turned * abs(turns_down - turns_up)
-    out[rc.PRECESSION_BAR] = error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned_psi
-    out[rc.SPIN_BAR] = error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned_phi
+    turned_psi, turned_phi = (
+        turned * abs(turns_down + turns_up),
+        turned * abs(turns_down - turns_up),
+    )
+    out[rc.PRECESSION_BAR] = (
+        error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned_psi
+    )
+    out[rc.SPIN_BAR] = (
+        error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned_phi
+    )
     up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
     rest = 0.5 * (0.5 * above - series)
     out[rc.ACTION] = (period * (row[nu.LEVEL] + rest) - up - down) / (2.0 * pi)

@@ -1,8 +1,10 @@
 """Closed forms of nutations by Carlson's R_F, R_J and duplication: a few dozen square roots.
 
-Domain: every motion between turning points. Precessions that nearly cancel keep an absolute accuracy only.
+Domain: every motion between turning points. Precessions that nearly cancel keep an absolute
+accuracy only.
 
-Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S14), (S22) of `scenes/brun.md`.
+Source: B. C. Carlson, Numer. Algorithms 10 (1995) 13-26; formulas (S5), (S6), (S14), (S22) of
+`scenes/brun.md`.
 """
 
 from math import cos, hypot, pi, sin, sqrt
@@ -31,7 +33,9 @@ def _advance(gap, near, far, width, q, time, s, g, spread):
 
 @inline
 def _second_kind(first, y, z, g):
-    """R_G(0, X, Y), g^2 = X Y, from `first` = R_F and the means of sqrt X, sqrt Y, squared (DLMF 19.22.2, 19.21.10)."""
+    """R_G(0, X, Y), g^2 = X Y, from `first` = R_F and the means of sqrt X, sqrt Y, squared (DLMF
+    19.22.2, 19.21.10).
+    """
     y, z = max(y, z), min(y, z)
     return (z - 0.5 * g) * first + z * (y - z) / 3.0 * rj(0.0, 0.5 * (y + z), sqrt(y) * sqrt(z), z)
 
@@ -44,14 +48,20 @@ def _periods_of(row, out):
     g = sqrt(low) * sqrt(high)
     s, spread, above = row[nu.MIDDLE], nu.spread(row), nu.above(row, g)
     time = rf_complete(above, g)
-    up = _advance(row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread)
-    down = _advance(row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread)
+    up = _advance(
+        row[nu.MINUS], row[nu.HIGH_PLUS], row[nu.LOW_PLUS], width, low, time, s, g, spread
+    )
+    down = _advance(
+        row[nu.PLUS], row[nu.LOW_MINUS], row[nu.HIGH_MINUS], width, high, time, s, g, spread
+    )
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + row[nu.NOISE_ABOVE]
     out[rc.PERIOD], out[rc.PRECESSION], out[rc.SPIN] = 4.0 * time, up + down, down - up
     out[rc.PERIOD_BAR] = (32.0 * ROUNDOFF + noise) * out[rc.PERIOD]
     # here, unlike in agm, the distances from poles enter the advances through these alone
     noise += 0.5 * row[nu.NOISE_ENDS]
-    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * (abs(up) + abs(down))
+    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = (48.0 * ROUNDOFF + 4.0 * noise) * (
+        abs(up) + abs(down)
+    )
     square = _second_kind(time, 0.5 * above, g, g)
     parts = out[rc.PERIOD] * row[nu.LEVEL], 4.0 * square, row[nu.MINUS] * up, row[nu.PLUS] * down
     out[rc.ACTION] = (parts[0] + parts[1] - parts[2] - parts[3]) / (2.0 * pi)
@@ -71,9 +81,11 @@ def nutation_periods(rows, kinds, tolerance, out):
 
 @inline
 def _cosine(z, kc, quarter, pairs, last):
-    """As `agm._cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave, lets it be monotone.
+    """As `agm._cosine`: F(chi) = z by Newton's method, from the side where F, convex or concave,
+    lets it be monotone.
 
-    chi and pi/2 - chi, each with all its digits: next to a separatrix c = cos chi is as small as k'.
+    chi and pi/2 - chi, each with all its digits: next to a separatrix c = cos chi is as small as
+    k'.
     """
     over = z > quarter
     z = 2.0 * quarter - z if over else z

@@ -1,8 +1,9 @@
-"""Gauss-Chebyshev quadrature of nutations between their turning points, u = middle + half width cos x.
+"""Gauss-Chebyshev quadrature of nutations between their turning points, u = middle + half width cos
+x.
 
-The nearest singularities (the other roots of P, the poles) determine how many nodes are needed. Domain: away from
-separatrices and near passages of poles, where it needs many nodes; `no_convergence` beyond MOST, and in time beyond
-LONGEST. The independent check.
+The nearest singularities (the other roots of P, the poles) determine how many nodes are needed.
+Domain: away from separatrices and near passages of poles, where it needs many nodes;
+`no_convergence` beyond MOST, and in time beyond LONGEST. The independent check.
 
 Source: DLMF 3.5(v); integrals (S3), (S4), (S15) of `scenes/brun.md`.
 """
@@ -27,7 +28,9 @@ _FULL = 38.0  # the first neglected coefficient is exp(-FULL)
 
 @inline
 def _rate(row):
-    """Logarithm of the sum of the half axes of the ellipse about [ul, uh], scaled to [-1, 1], without singularities."""
+    """Logarithm of the sum of the half axes of the ellipse about [ul, uh], scaled to [-1, 1],
+    without singularities.
+    """
     width, total, k, bend = row[nu.WIDTH], row[nu.SUM], row[nu.K], row[nu.BEND]
     if width <= 0.0:
         return inf
@@ -39,7 +42,11 @@ def _rate(row):
     if k * bend < 0.0:  # real roots of Q: their distances from the ends, each from their product
         spread = sqrt(-bend / k)
         high, low = 2.0 * row[nu.HIGH] + total, 2.0 * row[nu.LOW] + total
-        near = min(row[nu.Q_HIGH] / (abs(high) + spread), row[nu.Q_LOW] / (abs(low) + spread)) * 2.0 / abs(k)
+        near = (
+            min(row[nu.Q_HIGH] / (abs(high) + spread), row[nu.Q_LOW] / (abs(low) + spread))
+            * 2.0
+            / abs(k)
+        )
         gap = 2.0 * near / width
         return min(least, log1p(gap + sqrt(gap * (2.0 + gap))))
     y = sqrt(bend / k) / width
@@ -57,10 +64,13 @@ def _gathered(total, term):
 
 @inline
 def _sums(row, n, out):
-    """T/A, the halves of the advances, the action, and the rounding of Q relative to it, by n nodes in x = 0..pi."""
+    """T/A, the halves of the advances, the action, and the rounding of Q relative to it, by n nodes
+    in x = 0..pi.
+    """
     low, high, bow = row[nu.Q_LOW], row[nu.Q_HIGH], row[nu.K] * row[nu.WIDTH] ** 2
     minus, plus = row[nu.MINUS], row[nu.PLUS]
-    time = up = down = action = (0.0, 0.0)  # sums and their roundings: of thousands of nodes near poles
+    # sums and their roundings: of thousands of nodes near poles
+    time = up = down = action = (0.0, 0.0)
     rough = 0.0
     for i in range(n):
         c = sin((n - i - 0.5) * (0.5 * pi / n))  # cos x/2, with all its digits where it is small
@@ -92,7 +102,9 @@ def _periods_of(row, n, speed, coarse, fine, out):
     noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * fine[4]
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
     for i in range(4):
-        coarse[i] = 10.0 * (abs(fine[i] - coarse[i]) * seen + abs(fine[i]) * missed) + noise * abs(fine[i])
+        coarse[i] = 10.0 * (abs(fine[i] - coarse[i]) * seen + abs(fine[i]) * missed) + noise * abs(
+            fine[i]
+        )
     coarse[1] += row[nu.NOISE_ENDS] * abs(fine[1])
     coarse[2] += row[nu.NOISE_ENDS] * abs(fine[2])
     coarse[3] += 2.5 * row[nu.NOISE_WIDTH] * fine[3]
@@ -177,7 +189,11 @@ def _motion(row, start, n, noise, times, waves, out):
     x = 2.0 * atan2(sqrt(start[rc.DONE]), sqrt(start[rc.LEFT]))
     _integrals(waves, n, x, here)
     _integrands(row, x, value)
-    start_delay = start[rc.START_BAR] * value[0] / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
+    start_delay = (
+        start[rc.START_BAR]
+        * value[0]
+        / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
+    )
     first_up, first_down = value[1] / value[0], value[2] / value[0]
     side = start[rc.DIRECTION]
     first, base_up, base_down = side * here[0], side * here[1], side * here[2]
@@ -202,7 +218,9 @@ def _motion(row, start, n, noise, times, waves, out):
         out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = value[3], up + down, down - up
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH])
         out[j, rc.U_BAR] = speed * delay + bend * delay * delay + rounding + 8.0 * ROUNDOFF * wide
-        out[j, rc.PSI_BAR] = out[j, rc.PHI_BAR] = moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
+        out[j, rc.PSI_BAR] = out[j, rc.PHI_BAR] = (
+            moved + 2.0 * noise * (1.0 + abs(turns)) * 2.0 * size
+        )
 
 
 @kernel

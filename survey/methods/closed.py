@@ -1,9 +1,12 @@
-"""Closed forms where they apply: g = 0 (50), w = mu F + n (61), b = 0 (elliptic functions). No steps, cost free of t.
+"""Closed forms where they apply: g = 0 (50), w = mu F + n (61), b = 0 (elliptic functions). No
+steps, cost free of t.
 
-Domain: trajectory and abel; b = 0 and g = 0 exactly, (61) within 64 roundings (which go into the bar); status
-`no_closed_form` elsewhere. Near multiple roots, where digits are lost, `no_convergence`. Uniform rotation is b = g = 0.
+Domain: trajectory and abel; b = 0 and g = 0 exactly, (61) within 64 roundings (which go into the
+bar); status `no_closed_form` elsewhere. Near multiple roots, where digits are lost,
+`no_convergence`. Uniform rotation is b = g = 0.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61)-(68), as corrected in `scenes/gyrostat.md`.
+Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61)-(68), as corrected in
+`scenes/gyrostat.md`.
 """
 
 import math
@@ -27,7 +30,9 @@ _NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `steps.trajectories`; tolerance and limit have no meaning here. Only the forms that apply are compiled."""
+    """See `steps.trajectories`; tolerance and limit have no meaning here. Only the forms that apply
+    are compiled.
+    """
     forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
     _sort(P, starts, times, forms, curves, floats, turnings, status)
     for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
@@ -54,14 +59,27 @@ def _sort(P, starts, times, forms, curves, floats, turnings, status):
 def _elliptics(indices, P, starts, curves, times, floats, turnings):
     """b = 0."""
     T = weierstrass.lanes()
-    _solve(weierstrass.enter, weierstrass.solve, T, indices, P, starts, curves, times, floats, turnings)
+    _solve(
+        weierstrass.enter, weierstrass.solve, T, indices, P, starts, curves, times, floats, turnings
+    )
 
 
 @kernel
 def _trigonometrics(indices, P, starts, curves, times, floats, turnings):
     """g = 0 and (61)."""
     T = trigonometric.lanes()
-    _solve(trigonometric.enter, trigonometric.solve, T, indices, P, starts, curves, times, floats, turnings)
+    _solve(
+        trigonometric.enter,
+        trigonometric.solve,
+        T,
+        indices,
+        P,
+        starts,
+        curves,
+        times,
+        floats,
+        turnings,
+    )
 
 
 @inline
@@ -106,7 +124,13 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
             if kind == closed.NONE or kind == closed.LOST:
                 status[i, j] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
             elif x == 0.0:
-                out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR], out[rc.TIME_BAR], status[i, j] = w0, 0.0, 0.0, 0.0, OK
+                out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR], out[rc.TIME_BAR], status[i, j] = (
+                    w0,
+                    0.0,
+                    0.0,
+                    0.0,
+                    OK,
+                )
             elif kind == closed.TRIGONOMETRIC:
                 status[i, j] = _trigonometric(data, w0, x, out)
             else:
@@ -125,7 +149,9 @@ def _trigonometric(data, w0, x, out):
     F, f = data[closed.F0], data[closed.SLOPE]
     w = w0 - 2.0 * s * (F * s - f * math.cos(0.5 * x))
     moved = closed.deviating(data, t, w)
-    bar = closed.MARGIN * (2.0 * data[closed.NOISE] + moved + 4.0 * ROUNDOFF_UP * (w0 + abs(x) * math.hypot(F, f)))
+    bar = closed.MARGIN * (
+        2.0 * data[closed.NOISE] + moved + 4.0 * ROUNDOFF_UP * (w0 + abs(x) * math.hypot(F, f))
+    )
     return _kept(out, w, t, bar, bar_t)
 
 
@@ -145,7 +171,10 @@ def _elliptic(kind, side, data, phi0, x, out):
         out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR], out[rc.TIME_BAR] = phi0, 0.0, 0.0, 0.0
         return TURNING
     if kind == closed.LIBRATION:
-        edge, right = data[closed.BAR_RIGHT] + 4.0 * ROUNDOFF_UP * (abs(phi0) + abs(x)), data[closed.RIGHT]
+        edge, right = (
+            data[closed.BAR_RIGHT] + 4.0 * ROUNDOFF_UP * (abs(phi0) + abs(x)),
+            data[closed.RIGHT],
+        )
         if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
             if not bar < math.inf:
@@ -168,5 +197,9 @@ def _elliptic(kind, side, data, phi0, x, out):
     w = math.sqrt(square)
     blur = 2.0 * ROUNDOFF_UP * (abs(phi0) + abs(x))
     return _kept(
-        out, w, t, closed.MARGIN * (0.5 * (noise + abs(slope) * blur) / w + 2.0 * ROUNDOFF_UP * w), bar_t + blur / w
+        out,
+        w,
+        t,
+        closed.MARGIN * (0.5 * (noise + abs(slope) * blur) / w + 2.0 * ROUNDOFF_UP * w),
+        bar_t + blur / w,
     )

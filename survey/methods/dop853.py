@@ -1,10 +1,12 @@
-"""DOP853, order 8, adaptive: chooses its own steps at every point, from z at any t. The independent check.
+"""DOP853, order 8, adaptive: chooses its own steps at every point, from z at any t. The independent
+check.
 
-A step propagates the identity, so the embedded estimate bounds the entries of the propagator, and errors travel as
-in `survey.kernels.lanes`. Domain: piecewise smooth z, hard points; slower than the fixed steps, and its rounding
-(stage sums that cancel) leaves about 1e-12.
+A step propagates the identity, so the embedded estimate bounds the entries of the propagator, and
+errors travel as in `survey.kernels.lanes`. Domain: piecewise smooth z, hard points; slower than the
+fixed steps, and its rounding (stage sums that cancel) leaves about 1e-12.
 
-Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and dop853.f.
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and
+dop853.f.
 """
 
 import math
@@ -40,7 +42,15 @@ from survey.kernels.math.runge_kutta import fundamental
 ORDER = 8
 SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill", "orbit")
 # time, relative to the default of each family
-COST = {"abel": 20.0, "body": 60.0, "cylinder": 60.0, "danby": 2500.0, "floquet": 10.0, "hill": 80.0, "orbit": 20.0}
+COST = {
+    "abel": 20.0,
+    "body": 60.0,
+    "cylinder": 60.0,
+    "danby": 2500.0,
+    "floquet": 10.0,
+    "hill": 80.0,
+    "orbit": 20.0,
+}
 _ABOUT = "DOP853, order 8, adaptive: "
 _CHECK = "steps of its own at every point. The independent check."
 ABOUT = {
@@ -59,7 +69,8 @@ ADAPTIVE = True
 NODES = tuple(C[:STAGES])
 _WEIGHT = float(np.abs(B).sum())  # 12.9: some of B are negative
 _OTHER = 0.3
-# of a slope of Danby's equations, of the largest one: steps show at most 3.7 where their estimate does not exceed it
+# of a slope of Danby's equations, of the largest one: steps show at most 3.7 where their estimate
+# does not exceed it
 _SLOPE_ROUNDINGS = 4.0
 
 
@@ -85,7 +96,8 @@ def flow_setting(p, w, tolerance):
 def flow_at(p, T, dt):
     """(phi, w, integral of f, integral of g) at dt after the start of the step: one step of size dt."""
     phi, w = T[0, PHI], T[0, W]
-    x = v = e = y = 0.0  # changes: each sum is added to phi or w once, whose rounding is the one that bars count
+    # changes: each sum is added to phi or w once, whose rounding is the one that bars count
+    x = v = e = y = 0.0
     for i in range(STAGES):
         dx = dv = 0.0
         for k in range(i):
@@ -104,7 +116,9 @@ def flow_at(p, T, dt):
 
 @inline
 def _flow_estimate(T, h, row, doubt):
-    """The error estimate of dop853.f for one component, from the stages in T; it must not vanish by chance."""
+    """The error estimate of dop853.f for one component, from the stages in T; it must not vanish by
+    chance.
+    """
     e5 = e3 = 0.0
     for i in range(STAGES):
         e5 += E5[i] * T[_FIRST + i, row]
@@ -122,7 +136,8 @@ def flow_begin(p, phi, w, tolerance, T):
         _x, w1, _e, _y = flow_at(p, T, h)
         doubt, speed = 8.0 * DOUBT * (h * rate) ** 3, max(rate, 1.0 / h)
         dphi, dw = _flow_estimate(T, h, PHI, doubt), _flow_estimate(T, h, W, doubt)
-        # where the motion starts at rest, one of them may vanish by symmetry: each bounds the other, with less weight
+        # where the motion starts at rest, one of them may vanish by symmetry: each bounds the
+        # other, with less weight
         dphi, dw = max(dphi, _OTHER * dw / speed), max(dw, _OTHER * dphi * speed)
         error = max(dphi, dw / (1.0 + abs(w))) / tolerance
         factor = min(max(0.9 * (error + 1e-30) ** -0.125, 0.2), 4.0)
@@ -137,32 +152,64 @@ def flow_begin(p, phi, w, tolerance, T):
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """See `steps.trajectories`."""
-    steps.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+    steps.trajectories(
+        flow_setting,
+        flow_begin,
+        flow_at,
+        P,
+        starts,
+        times,
+        tolerance,
+        limit,
+        floats,
+        turnings,
+        status,
+    )
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `steps.abels`."""
-    steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+    steps.abels(
+        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status
+    )
 
 
 @kernel
 def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
+    returns.image(
+        flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node
+    )
 
 
 @kernel
 def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(
+        flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+    )
 
 
 @kernel
 def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """See `fate.fates`."""
     fate.fates(
-        flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
+        flow_setting,
+        flow_begin,
+        flow_at,
+        p,
+        section,
+        ends,
+        sizes,
+        eqs,
+        plus,
+        minus,
+        lib,
+        starts,
+        tolerance,
+        limit,
+        out,
     )
 
 
@@ -239,7 +286,8 @@ def _danby_step(e, d1, d2, angle, h, slopes, state, work):
                 fifth += E5[j] * slope
                 third += E3[j] * slope
                 rate = max(rate, abs(slope))
-            value = start + h * change  # one addition, whose rounding is the one that the bar counts
+            # one addition, whose rounding is the one that the bar counts
+            value = start + h * change
             # an error of order h^9 is h^3 of the estimate of order h^6
             error = max(error, abs(h) * combined(fifth, third) + abs(h) ** 4 * DOUBT * abs(fifth))
             size = max(size, abs(value))

@@ -1,8 +1,10 @@
-"""The six equations (1)-(6) of a gyrostat whose invariant set is the scene, in a rotated body frame: an audit.
+"""The six equations (1)-(6) of a gyrostat whose invariant set is the scene, in a rotated body
+frame: an audit.
 
 Builds A, B, C, s, lambda from the reduced parameters, with generic values for what these leave free
-(`kernels/cylinder/gyrostat.py`), and makes no use of the set: its bars include the growth of deviations from it. Taylor
-series of order 20. Domain: trajectories whose set is not strongly unstable.
+(`kernels/cylinder/gyrostat.py`), and makes no use of the set: its bars include the growth of
+deviations from it. Taylor series of order 20. Domain: trajectories whose set is not strongly
+unstable.
 """
 
 import math
@@ -32,7 +34,8 @@ WHEN = {"question": ("trajectory",)}
 COST = {"cylinder": 90.0}  # time, relative to the default method
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 2  # steps, relative to the Taylor method
-_PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
+# of components, in each of which a step and the initial state err; `bar` counts two for each step
+_PAIRS = 3
 _FIRST = 4.0 * ROUNDOFF_UP  # rounding of the initial state in the rotated frame
 
 
@@ -50,7 +53,11 @@ def _read(state, squares, n, near, out):
     a = b = 0.0
     for i in range(3):
         for j in range(3):
-            a += (c * frame[i, 1] - s * frame[i, 2]) * squares[3 + i, 3 + j] * (c * frame[j, 1] - s * frame[j, 2])
+            a += (
+                (c * frame[i, 1] - s * frame[i, 2])
+                * squares[3 + i, 3 + j]
+                * (c * frame[j, 1] - s * frame[j, 2])
+            )
             b += frame[i, 0] * squares[i, j] * frame[j, 0]
     out[rc.PHI], out[rc.W] = phi + turns * TWO_PI, w
     out[rc.PHI_BAR] = bar(_PAIRS * (n + 1), a) + ROUNDOFF_UP * (4.0 + 4.0 * abs(turns) * TWO_PI)
@@ -60,7 +67,12 @@ def _read(state, squares, n, near, out):
 @kernel
 def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
     """As `steps.trajectory`, by the full equations."""
-    free, G, squares, axis = np.empty(8), np.empty((14, 3)), np.zeros((6, 6)), gyrostat.FRAME[:, 0].copy()
+    free, G, squares, axis = (
+        np.empty(8),
+        np.empty((14, 3)),
+        np.zeros((6, 6)),
+        gyrostat.FRAME[:, 0].copy(),
+    )
     T, V = np.zeros((gyrostat.LAST + 1, 12)), np.zeros((LOW + 1, 6, 12))
     state, new, J, work = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((6, 6))
     here, there = np.empty(rc.STATE), np.empty((6, 6))
@@ -88,11 +100,19 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
             _read(new, there, n, phi + gyrostat.angle(T, dt, axis), here)
             if not (here[rc.PHI_BAR] < TRUST and here[rc.W_BAR] < TRUST * (1.0 + abs(here[rc.W]))):
                 return NO_CONVERGENCE
-            floats[j, rc.PHI], floats[j, rc.W] = (here[rc.PHI] + before * TWO_PI_LOW) + before * TWO_PI, here[rc.W]
-            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = here[rc.PHI_BAR] + 3e-16 * abs(before) * TWO_PI, here[rc.W_BAR]
+            floats[j, rc.PHI], floats[j, rc.W] = (
+                (here[rc.PHI] + before * TWO_PI_LOW) + before * TWO_PI,
+                here[rc.W],
+            )
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = (
+                here[rc.PHI_BAR] + 3e-16 * abs(before) * TWO_PI,
+                here[rc.W_BAR],
+            )
             from_rest = n == 1 and w0 == 0.0
             sure = unsure < 3 and count >= 0 and (abs(here[rc.W]) > here[rc.W_BAR] or from_rest)
-            turnings[j] = count + (here[rc.W] * sign < 0.0 and not from_rest) if sure else UNDETERMINED
+            turnings[j] = (
+                count + (here[rc.W] * sign < 0.0 and not from_rest) if sure else UNDETERMINED
+            )
             j += 1
         gyrostat.at(T, h, new)
         gyrostat.carry(G, T, V, h, squares, J, work)

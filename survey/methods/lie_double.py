@@ -1,7 +1,8 @@
 """Lie series at L4 in double-double arithmetic: every even order, beside resonances and mu_R too.
 
-As `lie`, 20 digits further: what cancellation beside a resonance, towards mu = 0 and mu_R costs is found there. Domain:
-0 < mu < mu_R, every mu that is a float64; NaN outside, and where a divisor of a generator is below 1e-20.
+As `lie`, 20 digits further: what cancellation beside a resonance, towards mu = 0 and mu_R costs is
+found there. Domain: 0 < mu < mu_R, every mu that is a float64; NaN outside, and where a divisor of
+a generator is below 1e-20.
 
 Source: that of `lie`.
 """

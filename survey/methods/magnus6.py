@@ -1,9 +1,10 @@
 """Magnus expansion, order 6, three Gauss points a step, exponential of sl(2) in closed form.
 
-Each step is two half steps, checked by one full step (difference / (2^6 - 1)). det P = 1 to rounding. Domain:
-smooth z, phase per step below about 4; cheapest at 1e-6 and looser.
+Each step is two half steps, checked by one full step (difference / (2^6 - 1)). det P = 1 to
+rounding. Domain: smooth z, phase per step below about 4; cheapest at 1e-6 and looser.
 
-Source: S. Blanes, F. Casas, J. A. Oteo, J. Ros, Physics Reports 470 (2009) 151-238 (section 5, numerical integrators).
+Source: S. Blanes, F. Casas, J. A. Oteo, J. Ros, Physics Reports 470 (2009) 151-238 (section 5,
+numerical integrators).
 """
 
 from math import sqrt
@@ -23,7 +24,9 @@ _SLOPE = sqrt(15.0) / 3.0
 
 
 def hill_density(rtol):
-    """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for accuracy rtol."""
+    """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for
+    accuracy rtol.
+    """
     scale = max(rtol, 1e-13) ** (-1 / ORDER)
     return 0.19 * scale, 0.69 * scale
 
@@ -44,7 +47,9 @@ def _matrix(z1, z2, z3, h):
     x1, y1, w1 = _bracket(0.0, h, a, 0.0, 0.0, b)
     x2, y2, w2 = _bracket(0.0, h, a, x1, y1, 2.0 * c + w1)
     # Omega = alpha_1 + alpha_3 / 12 + [-20 alpha_1 - alpha_3 + C1, alpha_2 + C2] / 240
-    x, y, w = _bracket(x1, y1 - 20.0 * h, w1 - 20.0 * a - c, -x2 * (1 / 60), -y2 * (1 / 60), b - w2 * (1 / 60))
+    x, y, w = _bracket(
+        x1, y1 - 20.0 * h, w1 - 20.0 * a - c, -x2 * (1 / 60), -y2 * (1 / 60), b - w2 * (1 / 60)
+    )
     return exponential(x * (1 / 240), h + y * (1 / 240), a + c * (1 / 12) + w * (1 / 240))
 
 
@@ -64,7 +69,12 @@ def hill_step(f, c2, p, h):
     size = f[9] + abs(p) * f[WIDTH + 9] + abs(base)
     half = 0.5 * h
     return doubled(
-        _matrix(z1, z2, z3, half), _matrix(z4, z5, z6, half), _matrix(left, middle, right, h), ORDER, size, h
+        _matrix(z1, z2, z3, half),
+        _matrix(z4, z5, z6, half),
+        _matrix(left, middle, right, h),
+        ORDER,
+        size,
+        h,
     )
 
 

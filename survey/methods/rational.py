@@ -1,8 +1,9 @@
-"""Closed rational forms in float64, with running error bounds: a microsecond per mass ratio, no expansion.
+"""Closed rational forms in float64, with running error bounds: a microsecond per mass ratio, no
+expansion.
 
-Domain: 0 < mu < mu_R, every mu that is a float64, those next to the resonances and to mu_R included. The forms of order
-4 are those of A. Deprit, A. Deprit-Bartholome, Astron. J. 72 (1967) 173, in the plane; the others were found by exact
-rational reconstruction (`scenes/libration.md`).
+Domain: 0 < mu < mu_R, every mu that is a float64, those next to the resonances and to mu_R
+included. The forms of order 4 are those of A. Deprit, A. Deprit-Bartholome, Astron. J. 72 (1967)
+173, in the plane; the others were found by exact rational reconstruction (`scenes/libration.md`).
 """
 
 from survey.kernels.libration.closed_forms import ROWS, closed_forms, tabulate
@@ -13,9 +14,11 @@ SERVES = ("normal_form",)
 
 
 def coefficients(mu, order):
-    """Coefficients of orders 4 to `order` (4 or 6), in the order of LABELS, and their bars, both (rows, N).
+    """Coefficients of orders 4 to `order` (4 or 6), in the order of LABELS, and their bars, both
+    (rows, N).
 
-    NaN outside 0 < mu < mu_R. Raises KeyError for another order: no closed forms of higher orders are known.
+    NaN outside 0 < mu < mu_R. Raises KeyError for another order: no closed forms of higher orders
+    are known.
     """
     return tabulate(closed_forms, mu, ROWS[order])
 

@@ -1,6 +1,8 @@
-"""Closed rational forms in double-double: every coefficient within an ulp, zeros and poles included; 8 microseconds.
+"""Closed rational forms in double-double: every coefficient within an ulp, zeros and poles
+included; 8 microseconds.
 
-Domain and sources: those of `rational`. It decides next to the critical values, where float64's bars do not.
+Domain and sources: those of `rational`. It decides next to the critical values, where float64's
+bars do not.
 """
 
 from survey.kernels.libration.closed_forms import ROWS, closed_forms_double, tabulate

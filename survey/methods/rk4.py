@@ -1,9 +1,11 @@
-"""The classical Runge-Kutta method, order 4, for comparison. Each step is two half steps, checked by one full step.
+"""The classical Runge-Kutta method, order 4, for comparison. Each step is two half steps, checked
+by one full step.
 
-Domain: any continuous z; thousands of steps for 1e-10. The error of the two half steps is estimated as their
-difference from the full step divided by 2^4 - 1 (Richardson).
+Domain: any continuous z; thousands of steps for 1e-10. The error of the two half steps is estimated
+as their difference from the full step divided by 2^4 - 1 (Richardson).
 
-Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1 and II.4.
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1 and
+II.4.
 """
 
 import math
@@ -58,7 +60,9 @@ WIDTH = len(NODES) + 1
 
 
 def hill_density(rtol):
-    """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for accuracy rtol."""
+    """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for
+    accuracy rtol.
+    """
     scale = max(rtol, 1e-13) ** (-1 / ORDER)
     return 0.4 * scale, 1.0 * scale
 
@@ -71,7 +75,9 @@ def _column(z0, z1, z2, h, y, v):
     y3, v3 = y + half * v2, v - half * z1 * y2
     y4, v4 = y + h * v3, v - h * z1 * y3
     sixth = h / 6.0
-    return y + sixth * (v + 2.0 * (v2 + v3) + v4), v - sixth * (z0 * y + 2.0 * z1 * (y2 + y3) + z2 * y4)
+    return y + sixth * (v + 2.0 * (v2 + v3) + v4), v - sixth * (
+        z0 * y + 2.0 * z1 * (y2 + y3) + z2 * y4
+    )
 
 
 @inline
@@ -92,7 +98,9 @@ def hill_step(f, c2, p, h):
     z4 = f[4] + p * f[WIDTH + 4] + base
     size = f[5] + abs(p) * f[WIDTH + 5] + abs(base)
     half = 0.5 * h
-    return doubled(_matrix(z0, z1, z2, half), _matrix(z2, z3, z4, half), _matrix(z0, z2, z4, h), ORDER, size, h)
+    return doubled(
+        _matrix(z0, z1, z2, half), _matrix(z2, z3, z4, half), _matrix(z0, z2, z4, h), ORDER, size, h
+    )
 
 
 @kernel
@@ -145,39 +153,75 @@ def flow_begin(p, phi, w, h, T):
     series(p, phi, w, T, LOW)
     x1, w1, _e, _y = _flow_classical(p, phi, w, h)
     x2, w2, _e, _y = flow_at(p, T, h)
-    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W], T[LAST, WEIGHT] = abs(x2 - x1) / 7.5, abs(w2 - w1) / 7.5, 1.0
+    T[LAST, TRUNC_PHI], T[LAST, TRUNC_W], T[LAST, WEIGHT] = (
+        abs(x2 - x1) / 7.5,
+        abs(w2 - w1) / 7.5,
+        1.0,
+    )
     return h
 
 
 @kernel
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """See `steps.trajectories`."""
-    steps.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+    steps.trajectories(
+        flow_setting,
+        flow_begin,
+        flow_at,
+        P,
+        starts,
+        times,
+        tolerance,
+        limit,
+        floats,
+        turnings,
+        status,
+    )
 
 
 @kernel
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `steps.abels`."""
-    steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+    steps.abels(
+        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status
+    )
 
 
 @kernel
 def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
+    returns.image(
+        flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node
+    )
 
 
 @kernel
 def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(
+        flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+    )
 
 
 @kernel
 def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """See `fate.fates`."""
     fate.fates(
-        flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
+        flow_setting,
+        flow_begin,
+        flow_at,
+        p,
+        section,
+        ends,
+        sizes,
+        eqs,
+        plus,
+        minus,
+        lib,
+        starts,
+        tolerance,
+        limit,
+        out,
     )
 
 
@@ -225,7 +269,9 @@ def _danby_slope(given, r, state):
 
 @splice
 def danby_columns(v, h, work, count):
-    """See `kernels.libration.danby.chain`: two half steps, and their error by Richardson with a margin of 2."""
+    """See `kernels.libration.danby.chain`: two half steps, and their error by Richardson with a
+    margin of 2.
+    """
     for j in range(len(NODES)):
         for i in range(count):
             e = work[E, i]
@@ -233,12 +279,23 @@ def danby_columns(v, h, work, count):
     for c in range(4):
         x, q, p, m = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)
         for i in range(count):
-            r0, r1, r2, r3, r4 = work[OWN, i], work[OWN + 1, i], work[OWN + 2, i], work[OWN + 3, i], work[OWN + 4, i]
+            r0, r1, r2, r3, r4 = (
+                work[OWN, i],
+                work[OWN + 1, i],
+                work[OWN + 2, i],
+                work[OWN + 3, i],
+                work[OWN + 4, i],
+            )
             rates = work[D1, i], work[D2, i]
             middle = classical(_danby_slope, rates, (r0, r1, r2), (x, q, p, m), 0.5 * h)
             x1, q1, p1, m1 = classical(_danby_slope, rates, (r2, r3, r4), middle, 0.5 * h)
             x2, q2, p2, m2 = classical(_danby_slope, rates, (r0, r2, r4), (x, q, p, m), h)
-            work[_ENDS, i], work[_ENDS + 1, i], work[_ENDS + 2, i], work[_ENDS + 3, i] = x1, q1, p1, m1
+            work[_ENDS, i], work[_ENDS + 1, i], work[_ENDS + 2, i], work[_ENDS + 3, i] = (
+                x1,
+                q1,
+                p1,
+                m1,
+            )
             error = max(max(abs(x1 - x2), abs(q1 - q2)), max(abs(p1 - p2), abs(m1 - m2)))
             work[_ENDS + 4, i] = error * (2.0 / 15.0)
         copy(work, _ENDS, c, count)

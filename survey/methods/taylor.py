@@ -24,7 +24,16 @@ from survey.kernels.cylinder import (
     steps,
     winding,
 )
-from survey.kernels.cylinder.flow import LAST, PHI, TRUNC_PHI, TRUNC_W, W, inside, longest_step, series
+from survey.kernels.cylinder.flow import (
+    LAST,
+    PHI,
+    TRUNC_PHI,
+    TRUNC_W,
+    W,
+    inside,
+    longest_step,
+    series,
+)
 from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.cylinder.records import STATE
@@ -56,11 +65,13 @@ def flow_begin(p, phi, w, tolerance, T):
     scale = 1.0 / (1.0 + abs(w))
     h = math.inf
     for n in range(_ORDER - 3, _ORDER + 1):
-        # a last term that happens to vanish proves nothing, so the two before it count too, less strictly
+        # a last term that happens to vanish proves nothing, so the two before it count too, less
+        # strictly
         share = 1.0 if n > _ORDER - 2 else _FALL
         term = share * max(abs(T[n, PHI]), scale * abs(T[n, W])) + 1e-300
         h = min(h, (tolerance / term) ** (1.0 / n))
-    shorter = min(1.0, longest_step(p, w) / h)  # the last terms, and what follows them, at the step that is taken
+    # the last terms, and what follows them, at the step that is taken
+    shorter = min(1.0, longest_step(p, w) / h)
     fourth = (shorter * shorter) ** 2
     error = tolerance * (fourth * fourth) ** 2 * shorter * shorter * shorter
     T[LAST, TRUNC_PHI], T[LAST, TRUNC_W] = error, error / scale
@@ -74,7 +85,9 @@ def flow_at(p, T, dt):
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `lockstep.trajectories`, and for programs `steps.trajectories`: each is compiled when it is needed."""
+    """See `lockstep.trajectories`, and for programs `steps.trajectories`: each is compiled when it
+    is needed.
+    """
     solve = _in_lockstep if P.shape[1] == COLUMNS else _one_by_one
     return solve(P, starts, times, tolerance, limit, floats, turnings, status)
 
@@ -86,13 +99,27 @@ def _in_lockstep(P, starts, times, tolerance, limit, floats, turnings, status):
 
 @kernel
 def _one_by_one(P, starts, times, tolerance, limit, floats, turnings, status):
-    steps.trajectories(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, floats, turnings, status)
+    steps.trajectories(
+        flow_setting,
+        flow_begin,
+        flow_at,
+        P,
+        starts,
+        times,
+        tolerance,
+        limit,
+        floats,
+        turnings,
+        status,
+    )
 
 
 @kernel
 def flow_turnings(P, starts, times, tolerance, limit, turnings):
     """See `winding.turnings`."""
-    winding.turnings(flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, turnings)
+    winding.turnings(
+        flow_setting, flow_begin, flow_at, P, starts, times, tolerance, limit, turnings
+    )
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
@@ -101,8 +128,11 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
         flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status)
         return
     ahead = np.zeros((len(P), lockstep_phi.STATE))
-    if jit.other_compiler:  # compile the longer one, by a call on nothing, while that process compiles the other
-        _abels_in_time(P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0])
+    # compile the longer one, by a call on nothing, while that process compiles the other
+    if jit.other_compiler:
+        _abels_in_time(
+            P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0]
+        )
         jit.wait_for_other_compiler()
     _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
@@ -113,7 +143,9 @@ def flow_abels_ahead():
     P, none = np.empty((0, COLUMNS)), np.empty((0, 2))
     P.flags.writeable = False
     floats = np.empty((0, 2, STATE))
-    _abels_in_angle(P, none, none, 0.0, 0, np.empty((0, lockstep_phi.STATE)), floats, np.empty((0, 2), np.int64))
+    _abels_in_angle(
+        P, none, none, 0.0, 0, np.empty((0, lockstep_phi.STATE)), floats, np.empty((0, 2), np.int64)
+    )
 
 
 @kernel
@@ -129,33 +161,66 @@ def _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status):
 @kernel
 def flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status):
     """See `steps.abels`."""
-    steps.abels(flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status)
+    steps.abels(
+        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status
+    )
 
 
 @kernel
 def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
     """See `returns.image`."""
-    returns.image(flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node)
+    returns.image(
+        flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node
+    )
 
 
 @kernel
 def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
-    return returns.fixed_points(flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges)
+    return returns.fixed_points(
+        flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+    )
 
 
 @kernel
 def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
     """See `fate.fates`."""
     fate.fates(
-        flow_setting, flow_begin, flow_at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out
+        flow_setting,
+        flow_begin,
+        flow_at,
+        p,
+        section,
+        ends,
+        sizes,
+        eqs,
+        plus,
+        minus,
+        lib,
+        starts,
+        tolerance,
+        limit,
+        out,
     )
 
 
 @kernel
 def flow_line(p, start, window, eqs, count, section, kind, tolerance, out):
     """See `lines.line`."""
-    return lines.line(flow_setting, flow_begin, flow_at, p, start, window, eqs, count, section, kind, tolerance, out)
+    return lines.line(
+        flow_setting,
+        flow_begin,
+        flow_at,
+        p,
+        start,
+        window,
+        eqs,
+        count,
+        section,
+        kind,
+        tolerance,
+        out,
+    )
 
 
 @kernel
@@ -179,4 +244,6 @@ def _body_at(G, T, dt, state):
 @kernel
 def body_trajectories(G, starts, times, tolerance, limit, floats, status):
     """See `kernels.body.motion.trajectories`."""
-    motion.trajectories(gyrostat.begin, _body_at, G, starts, times, tolerance, limit, floats, status)
+    motion.trajectories(
+        gyrostat.begin, _body_at, G, starts, times, tolerance, limit, floats, status
+    )

@@ -1,13 +1,15 @@
-"""Midpoint Taylor, order 16: both fundamental solutions of y'' + z y = 0 as power series about the middle of a step.
+"""Midpoint Taylor, order 16: both fundamental solutions of y'' + z y = 0 as power series about the
+middle of a step.
 
-On a step z is replaced by its projection on the Legendre polynomials of degree <= 9, from ten Gauss points; the
-solutions see that error only through their own components of degree >= 10. With x in [-1, 1] the series
-a (even start: a = 1, a' = 0) to x^16 and b (b = 0, b' = 1) to x^17 give Y(+h/2) and Y(-h/2), and
-P = Y(+h/2) Y(-h/2)^-1 has a local error of h^17. Domain: any z smooth on the scale of a step; best up to 1e-13.
-Linear systems of n states likewise, from the power series of A (`kernels/floquet/steps.py`).
+On a step z is replaced by its projection on the Legendre polynomials of degree <= 9, from ten Gauss
+points; the solutions see that error only through their own components of degree >= 10. With x in
+[-1, 1] the series a (even start: a = 1, a' = 0) to x^16 and b (b = 0, b' = 1) to x^17 give Y(+h/2)
+and Y(-h/2), and P = Y(+h/2) Y(-h/2)^-1 has a local error of h^17. Domain: any z smooth on the scale
+of a step; best up to 1e-13. Linear systems of n states likewise, from the power series of A
+(`kernels/floquet/steps.py`).
 
-Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, I.8 (Taylor series) and
-II.7 (why Gauss points give twice the order).
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, I.8 (Taylor
+series) and II.7 (why Gauss points give twice the order).
 """
 
 import math
@@ -26,7 +28,8 @@ ORDER = 16
 SERVES = ("danby", "floquet", "hill", "orbit")
 _ABOUT = "Midpoint Taylor, order 16: power series about the middle of each step, "
 ABOUT = {
-    "danby": _ABOUT + "of the propagator of the four linear equations about L4, over half a period.",
+    "danby": _ABOUT
+    + "of the propagator of the four linear equations about L4, over half a period.",
     "floquet": _ABOUT + "of the propagator of x' = A(t) x, of n states.",
     "hill": _ABOUT + "of both fundamental solutions of y'' + z y = 0.",
     "orbit": _ABOUT + "of the orbit and of the propagator of small deviations from it.",
@@ -37,9 +40,12 @@ _DEGREE = 9
 _POINTS, _WEIGHTS = legendre.leggauss(_DEGREE + 1)
 NODES = tuple(0.5 + 0.5 * _POINTS)
 _HALF = (_DEGREE + 1) // 2
-# Samples -> Legendre coefficients (well conditioned), then -> powers of x: the noise of the second stage is relative
-# to each Legendre coefficient, and these decay. Sums and differences of mirrored samples give the even and odd ones.
-_TO_LEGENDRE = np.array([(j + 0.5) * _WEIGHTS * legendre.Legendre.basis(j)(_POINTS) for j in range(_DEGREE + 1)])
+# Samples -> Legendre coefficients (well conditioned), then -> powers of x: the noise of the second
+# stage is relative to each Legendre coefficient, and these decay. Sums and differences of mirrored
+# samples give the even and odd ones.
+_TO_LEGENDRE = np.array(
+    [(j + 0.5) * _WEIGHTS * legendre.Legendre.basis(j)(_POINTS) for j in range(_DEGREE + 1)]
+)
 _TO_POWERS = np.zeros((_DEGREE + 1, _DEGREE + 1))
 for _j in range(_DEGREE + 1):
     _TO_POWERS[: _j + 1, _j] = legendre.leg2poly([0.0] * _j + [1.0])
@@ -47,7 +53,8 @@ _TO_LEGENDRE = np.stack([_TO_LEGENDRE[parity::2, _HALF:] for parity in (0, 1)])
 _TO_POWERS = np.stack([_TO_POWERS[parity::2, parity::2] for parity in (0, 1)])
 WIDTH = _DEGREE + 4
 _TAIL, _SIZE, _ALIAS = _DEGREE + 1, _DEGREE + 2, _DEGREE + 3
-_SLOWEST = 0.02  # a faster fall than this of two Legendre coefficients to the next two is not trusted
+# a faster fall than this of two Legendre coefficients to the next two is not trusted
+_SLOWEST = 0.02
 _ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
 _ENDS = OWN + WIDTH
 
@@ -56,12 +63,16 @@ floquet_factors = steps.factors
 
 
 def floquet_reach(rtol):
-    """How far the norm of A times half a step may go for accuracy rtol; bounds of what is missing are far larger."""
+    """How far the norm of A times half a step may go for accuracy rtol; bounds of what is missing
+    are far larger.
+    """
     return (1e-7 * max(rtol, 1e-14) * math.factorial(ORDER + 1)) ** (1 / (ORDER + 1))
 
 
 def hill_density(rtol):
-    """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for accuracy rtol."""
+    """Steps per radian of the fastest phase, and per distance to the nearest singularity of z, for
+    accuracy rtol.
+    """
     scale = max(rtol, 1e-14) ** (-1 / ORDER)
     return 0.13 * scale, 0.88 * scale
 
@@ -75,9 +86,10 @@ def _product(matrix, k, x, i):
 
 @splice
 def _hill_row(samples, h, coefficients):
-    """Per function, in units of -4/h^2: powers of x, the last two Legendre coefficients, the largest sample, and what
-    components of degree >= 20 add to the low coefficients, where the Gauss points take them for these. What rounding
-    is relative to may be larger than the samples: then it follows them.
+    """Per function, in units of -4/h^2: powers of x, the last two Legendre coefficients, the
+    largest sample, and what components of degree >= 20 add to the low coefficients, where the Gauss
+    points take them for these. What rounding is relative to may be larger than the samples: then it
+    follows them.
     """
     count = samples.shape[2]
     paired, series = np.empty((_HALF, count)), np.empty((_HALF, count))
@@ -93,7 +105,9 @@ def _hill_row(samples, h, coefficients):
                     left, right = samples[c, _HALF - 1 - k, i], samples[c, _HALF + k, i]
                     paired[k, i] = right + sign * left
                     largest = max(abs(left), abs(right))
-                    coefficients[first + _SIZE, i] = max(coefficients[first + _SIZE, i], 0.25 * h[i] * h[i] * largest)
+                    coefficients[first + _SIZE, i] = max(
+                        coefficients[first + _SIZE, i], 0.25 * h[i] * h[i] * largest
+                    )
             for k in range(_HALF):
                 for i in range(count):
                     series[k, i] = _product(_TO_LEGENDRE[parity], k, paired, i)
@@ -116,7 +130,9 @@ def _hill_row(samples, h, coefficients):
 
 
 def _convolved(z, x, n, zeros=()):
-    """The n-th coefficient of the product of the series z, of degree 9, and x, the `zeros` of which are passed over."""
+    """The n-th coefficient of the product of the series z, of degree 9, and x, the `zeros` of which
+    are passed over.
+    """
     terms = [z[n - j] * x[j] for j in range(max(0, n - _DEGREE), n + 1) if j not in zeros]
     return sum(terms[1:], terms[0])
 
@@ -157,8 +173,8 @@ def hill_step(f, c2, p, h):
     p12 = b_end * a_start - a_end * b_start
     p21 = da_end * db_start - db_end * da_start
     p22 = db_end * a_start - da_end * b_start
-    # Truncation: the next two coefficients, at the rate at which the last four fall; that rate, with its accidents,
-    # is not trusted below 1/50, nor by more than a factor of 3.
+    # Truncation: the next two coefficients, at the rate at which the last four fall; that rate,
+    # with its accidents, is not trusted below 1/50, nor by more than a factor of 3.
     a_last, b_last = abs(a[15]) + abs(a[16]), abs(b[16]) + abs(b[17])
     a_before, b_before = abs(a[13]) + abs(a[14]) + 1e-150, abs(b[14]) + abs(b[15]) + 1e-150
     inverse = 3.0 / (a_before * b_before)
@@ -167,10 +183,13 @@ def hill_step(f, c2, p, h):
     by_value = a_tail * (abs(b_even) + abs(b_odd)) + b_tail * (abs(a_even) + abs(a_odd))
     by_slope = a_tail * (abs(db_even) + abs(db_odd)) + b_tail * (abs(da_even) + abs(da_odd))
     # What the projection left out acts only through the solutions' own components of that degree.
-    missing = (f[10] + abs(p) * f[WIDTH + 10]) * (4.0 * (abs(a[9]) + abs(a[10]) + abs(b[9]) + abs(b[10])))
+    missing = (f[10] + abs(p) * f[WIDTH + 10]) * (
+        4.0 * (abs(a[9]) + abs(a[10]) + abs(b[9]) + abs(b[10]))
+    )
     missing = missing + 8.0 * (f[12] + abs(p) * f[WIDTH + 12])
     size = f[11] + abs(p) * (f[WIDTH + 11] + abs(p * c2))
-    # z's rounding reaches y within the step where what it is relative to is large on the step's scale
+    # z's rounding reaches y within the step where what it is relative to is large on the step's
+    # scale
     missing = missing + 2.0 * _ROUNDING * ((size - 1.0) + abs(size - 1.0))
     d11 = by_slope + 19.0 * by_value + missing + _ROUNDING
     d12 = 2.0 * by_value + missing + 2.0 * _ROUNDING
@@ -197,7 +216,9 @@ def danby_steps(e, rtol):
 
 @splice
 def _danby_row(v, k, work, count):
-    """Powers of x in k r(f) (rows OWN to OWN + 9), and a bound of the Legendre coefficients left out (OWN + 10)."""
+    """Powers of x in k r(f) (rows OWN to OWN + 9), and a bound of the Legendre coefficients left
+    out (OWN + 10).
+    """
     paired, series = np.empty((_HALF, TILE)), np.empty((_HALF, TILE))
     for i in range(count):
         work[OWN + _TAIL, i] = work[OWN + _SIZE, i] = 0.0
@@ -236,13 +257,19 @@ def _danby_column(f, i, k, d1, d2, x0, q0, p0, m0):
         m.append(m_next)
     even = [series[0] + _sums(series[2::2])[0] for series in (x, q, p, m)]
     odd = [_sums(series[1::2])[0] for series in (x, q, p, m)]
-    # Truncation: the next two coefficients, at the rate at which the last four fall, with a margin of 2.
-    sizes = [largest(largest(abs(x[n]), abs(q[n])), largest(abs(p[n]), abs(m[n]))) for n in range(ORDER + 1)]
+    # Truncation: the next two coefficients, at the rate at which the last four fall, with a margin
+    # of 2.
+    sizes = [
+        largest(largest(abs(x[n]), abs(q[n])), largest(abs(p[n]), abs(m[n])))
+        for n in range(ORDER + 1)
+    ]
     last, before = sizes[15] + sizes[16], sizes[13] + (sizes[14] + 1e-150)
     error = last * (2.0 * last / before + 0.004)
     # What the projection left out acts only through the solutions' own components of that degree.
     error = error + 4.0 * d1 * f[OWN + _TAIL, i] * (abs(x[9]) + abs(x[10]) + abs(m[9]) + abs(m[10]))
-    ends = [a + b for a, b in zip(even, odd, strict=True)] + [a - b for a, b in zip(even, odd, strict=True)]
+    ends = [a + b for a, b in zip(even, odd, strict=True)] + [
+        a - b for a, b in zip(even, odd, strict=True)
+    ]
     return (*ends, error, error)
 
 

@@ -1,7 +1,9 @@
-"""A checked workflow -> a model: panels of Chebyshev series in two parameters, halved until they are known to `rtol`.
+"""A checked workflow -> a model: panels of Chebyshev series in two parameters, halved until they
+are known to `rtol`.
 
-The error bound of a panel is that of `survey.kernels.math.chebyshev`: the tails of the series, the bounds at the nodes
-times the Lebesgue constants, and rounding; and what the kept terms leave out. At points that are no nodes it is tried.
+The error bound of a panel is that of `survey.kernels.math.chebyshev`: the tails of the series, the
+bounds at the nodes times the Lebesgue constants, and rounding; and what the kept terms leave out.
+At points that are no nodes it is tried.
 """
 
 import hashlib
@@ -53,10 +55,11 @@ def model(workflow, path, proof=None, progress=None):
 
 
 def packed(workflow, proof=None, budget=BUDGET, most=None, progress=None):
-    """The model file of a checked workflow, as bytes; `proof`: what is proved of the map (see `proved`).
+    """The model file of a checked workflow, as bytes; `proof`: what is proved of the map (see
+    `proved`).
 
-    At most about `budget` points are solved; `progress`: as `solved` calls it. Where there would be more than `most`
-    bytes, the smallest panels are left out.
+    At most about `budget` points are solved; `progress`: as `solved` calls it. Where there would be
+    more than `most` bytes, the smallest panels are left out.
     """
     axes, fixed = _axes(workflow)
     names = [p.name for p in axes]
@@ -65,11 +68,15 @@ def packed(workflow, proof=None, budget=BUDGET, most=None, progress=None):
     source = functions.of(workflow, names, fixed)
     panels = solved(source, sides, workflow.request.rtol, budget, progress)
     if not panels:
-        raise BadInput("model: no series converges on this map; choose axes where every point has an answer")
+        raise BadInput(
+            "model: no series converges on this map; choose axes where every point has an answer"
+        )
     content = _file(workflow, source, axes, sides, fixed, panels, proof)
     while most is not None and len(content) > most and len(panels) > 1:
         largest = sorted(panels, key=lambda own: -np.prod(np.subtract(own.high, own.low)))
-        panels = sorted(largest[: max(1, int(0.9 * len(panels) * most / len(content)))], key=lambda own: own.low)
+        panels = sorted(
+            largest[: max(1, int(0.9 * len(panels) * most / len(content)))], key=lambda own: own.low
+        )
         content = _file(workflow, source, axes, sides, fixed, panels, proof)
     return content
 
@@ -89,7 +96,8 @@ def _axes(workflow):
 def solved(source, sides, rtol, budget=BUDGET, progress=None):
     """The Panels that serve the rectangle `sides`, each halved where its series is too short.
 
-    `progress(done, total, 0, what)` is called with the part of the rectangle that is served or given up.
+    `progress(done, total, 0, what)` is called with the part of the rectangle that is served or
+    given up.
     """
     left, found, spent, settled = deque([(tuple(sides), (0, 0))]), [], 0, 0.0
     while left and spent < budget:
@@ -124,14 +132,19 @@ def _panel(source, sides, rtol, depth):
     noise = chebyshev.lebesgue(NODES) ** 2 * bars.max(axis=(1, 2))
     total = tails.sum(axis=0) + noise + rest
     served = (total[:, None, None] <= rtol * (1 + abs(values))).mean(axis=(1, 2))
-    sharp = tails.sum(axis=0) <= FLOOR * (noise + rest)  # nothing but rounding is left in the last coefficients
+    # nothing but rounding is left in the last coefficients
+    sharp = tails.sum(axis=0) <= FLOOR * (noise + rest)
     uneven = bars.max(axis=(1, 2), keepdims=True) > UNEVEN * bars
     gains = (uneven.mean(axis=(1, 2)) > 1 - MOST) & (noise > rest)
     if ((served < MOST) & (~sharp | (gains & (sum(depth) < EVEN_OUT)))).any():
         worst = int(np.argmax(tails.sum(axis=0) / (noise + rest)))
-        return None, int(tails[1, worst] > tails[0, worst]) if (~sharp).any() else _growth(values, longer)
+        return None, int(tails[1, worst] > tails[0, worst]) if (~sharp).any() else _growth(
+            values, longer
+        )
     kept, dropped = _shortened(series, DROPPED * total)
-    panel = Panel(tuple(s[0] for s in sides), tuple(s[1] for s in sides), kept, 1.001 * (total + dropped))
+    panel = Panel(
+        tuple(s[0] for s in sides), tuple(s[1] for s in sides), kept, 1.001 * (total + dropped)
+    )
     held = _holds(source, panel, middle, radius)
     return (panel, None) if held else (None, longer)
 
@@ -144,7 +157,9 @@ def expanded(values, ulps):
     sizes, k = abs(series), np.arange(values.shape[1])
     tails = np.array([chebyshev.tail(sizes.sum(axis=2)), chebyshev.tail(sizes.sum(axis=1))])
     # the transforms, the sums, and the arguments, where T_k' <= k^2
-    weights = 16.0 + 2.0 * (k[:, None] + k) + (0.5 + ulps[0]) * k[:, None] ** 2 + (0.5 + ulps[1]) * k**2
+    weights = (
+        16.0 + 2.0 * (k[:, None] + k) + (0.5 + ulps[0]) * k[:, None] ** 2 + (0.5 + ulps[1]) * k**2
+    )
     return series, tails, 2.0**-53 * (sizes * weights).sum(axis=(1, 2))
 
 
@@ -212,7 +227,10 @@ def _file(workflow, source, axes, sides, fixed, panels, proof):
     }  # fmt: skip
     out = BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
-        for name, content in ((TABLE, json.dumps(table, indent=0, allow_nan=False).encode()), (SERIES, series)):
+        for name, content in (
+            (TABLE, json.dumps(table, indent=0, allow_nan=False).encode()),
+            (SERIES, series),
+        ):
             # a fixed date: the same map has the same bytes
             member = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
             member.compress_type, member.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16

@@ -1,7 +1,9 @@
-"""What a model holds series of: the analytic functions of the parameters from which a family's verdict follows.
+"""What a model holds series of: the analytic functions of the parameters from which a family's
+verdict follows.
 
-Each family gives a Source: names of the functions, the rule by which `survey.model.reader` decides, and the values with
-their error bounds at points. Functions rather than D or multipliers, so that verdicts keep their digits at edges.
+Each family gives a Source: names of the functions, the rule by which `survey.model.reader` decides,
+and the values with their error bounds at points. Functions rather than D or multipliers, so that
+verdicts keep their digits at edges.
 """
 
 from collections.abc import Callable
@@ -22,7 +24,9 @@ INVARIANTS = {"A": "det P", "B": "det T", "C": "det Q", "D": "det S", "t": "trac
 
 @dataclass(frozen=True)
 class Source:
-    """`at(x, y)`: values and bounds (F, N1, N2) on the grid of x (N1) and y (N2); NaN where there is no answer."""
+    """`at(x, y)`: values and bounds (F, N1, N2) on the grid of x (N1) and y (N2); NaN where there
+    is no answer.
+    """
 
     rule: str
     names: tuple[str, ...]
@@ -53,11 +57,15 @@ def _hill(workflow, names, fixed):
         found = solve(x, y)
         return tuple(np.stack([found[f"{name}{end}"] for name in wanted]) for end in ("", "_error"))
 
-    return Source("hill" if even else "trace", wanted, tuple(outputs[name].long_name for name in wanted), at)
+    return Source(
+        "hill" if even else "trace", wanted, tuple(outputs[name].long_name for name in wanted), at
+    )
 
 
 def _damped(workflow, names, fixed):
-    """l^2 + c1 l + c2 of y'' + 2 c y' + z y = 0: c1 = -D, c2 = e^(-2 c T); where c is 0 throughout, D alone."""
+    """l^2 + c1 l + c2 of y'' + 2 c y' + z y = 0: c1 = -D, c2 = e^(-2 c T); where c is 0 throughout,
+    D alone.
+    """
     scene = workflow.scene
     columns = [p.name for p in scene.PARAMETERS]
     if (scene.damping if scene.place is None else fixed.get(columns[scene.place])) == 0.0:
@@ -70,7 +78,10 @@ def _damped(workflow, names, fixed):
         c = scene.damping if scene.place is None else points[columns[scene.place]]
         turn = np.broadcast_to(2.0 * c, (x.size, y.size)) * found["period"]
         det = np.exp(-turn)
-        off = det * np.expm1(abs(turn) * (8.0 * EPS + 2.0 * found["period_error"] / found["period"])) + 4.0 * EPS * det
+        off = (
+            det * np.expm1(abs(turn) * (8.0 * EPS + 2.0 * found["period_error"] / found["period"]))
+            + 4.0 * EPS * det
+        )
         return np.stack([-found["discriminant"], det]), np.stack([found["discriminant_error"], off])
 
     words = "minus the trace of the monodromy matrix", "its determinant, e^(-2 c T)"
@@ -78,7 +89,9 @@ def _damped(workflow, names, fixed):
 
 
 def _evaluated(workflow, names, fixed, wanted):
-    """What `survey.evaluate` gives on the grid of x and y, in any order: {name: values (N1, N2)}, bars too."""
+    """What `survey.evaluate` gives on the grid of x and y, in any order: {name: values (N1, N2)},
+    bars too.
+    """
     given = dict(workflow.request.options) | fixed
     asked = workflow.scene if isinstance(workflow.scene, FunctionScene) else workflow.name
 
@@ -101,7 +114,9 @@ def _danby(workflow, names, fixed):
 
     def at(x, y):
         points = {names[0]: np.repeat(x, y.size), names[1]: np.tile(y, x.size)} | fixed
-        mu, e = (np.broadcast_to(points[name], x.size * y.size).astype(float) for name in ("mu", "e"))
+        mu, e = (
+            np.broadcast_to(points[name], x.size * y.size).astype(float) for name in ("mu", "e")
+        )
         values, bars = danby_double.factors(np.ascontiguousarray(e), np.ascontiguousarray(mu))
         return values.T.reshape(-1, x.size, y.size), bars.T.reshape(-1, x.size, y.size)
 

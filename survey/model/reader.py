@@ -1,13 +1,15 @@
-"""Read a model of a map (`survey model`), with numpy alone: this file needs no other of survey and may be copied.
+"""Read a model of a map (`survey model`), with numpy alone: this file needs no other of survey and
+may be copied.
 
     model = Model("map.model")
     model(k=0.5, rho=[1.0, 1.2])     # an xarray Dataset: values, error bars, gradients, verdicts
     model.at(k, rho)                 # the same of points as a dict of numpy arrays, without xarray
 
-The file is a zip of `model.json` and `series.f64`: documented in workflows/docs/model.md. On a panel a function is
-sum_jk c_jk T_j(X) T_k(Y) within its bar, X and Y from -1 to 1 across the panel.
+The file is a zip of `model.json` and `series.f64`: documented in workflows/docs/model.md. On a
+panel a function is sum_jk c_jk T_j(X) T_k(Y) within its bar, X and Y from -1 to 1 across the panel.
 
-Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003); I. Schur, J. reine angew. Math. 147 (1917) 205.
+Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003); I. Schur, J. reine angew. Math.
+147 (1917) 205.
 """
 
 import hashlib
@@ -24,13 +26,16 @@ import numpy as np
 FORMAT, TABLE, SERIES = "survey-model 1", "model.json", "series.f64"
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
 EPS = 2.0**-52
-CHUNK, PART = 16384, 4096  # points whose temporaries stay in the processor's cache, of a grid and of a cell
-CELLS, PIECES, FEW = 16, 4, 100_000  # terms of a cell's series, cells of a panel; points from which on cells pay
+# points whose temporaries stay in the processor's cache, of a grid and of a cell
+CHUNK, PART = 16384, 4096
+# terms of a cell's series, cells of a panel; points from which on cells pay
+CELLS, PIECES, FEW = 16, 4, 100_000
 SHORTER = 0.1  # of a cell's bound: what the degrees that are left out may add to it
 LOT = 2**20  # points that are sorted together
 MOST_CELLS = 2**16  # what their numbers (uint16) tell apart
 FINE = 2**14  # places along a side, each in one cell
-BYTES, TERMS, DENSE = 2**28, 2**10, 2**27  # at most: of a member, of a series along a side, of all series
+# at most: of a member, of a series along a side, of all series
+BYTES, TERMS, DENSE = 2**28, 2**10, 2**27
 HALF, INVARIANTS = ("y1", "dy1", "y2", "dy2"), ("A", "B", "C", "D", "t")
 DERIVED = {"hill": ("discriminant", "exponent"), "trace": ("exponent",), "danby": ("a", "b")}
 
@@ -40,7 +45,8 @@ class OutOfDomain(ValueError):
 
 
 class Model:
-    """The model in the file `path`: `about` is its table, `names` the two parameters, `low` and `high` its rectangle.
+    """The model in the file `path`: `about` is its table, `names` the two parameters, `low` and
+    `high` its rectangle.
 
     Raises ValueError, in one line, where the file is not a model or its bits have changed.
     """
@@ -54,9 +60,13 @@ class Model:
         try:
             _check(self.about, len(series) // 8)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise ValueError(f"{path}: {TABLE} is not that of a model ({error!r}); make it again") from None
+            raise ValueError(
+                f"{path}: {TABLE} is not that of a model ({error!r}); make it again"
+            ) from None
         self.names = tuple(p["name"] for p in self.about["parameters"])
-        self.low, self.high = (tuple(p[end] for p in self.about["parameters"]) for end in ("low", "high"))
+        self.low, self.high = (
+            tuple(p[end] for p in self.about["parameters"]) for end in ("low", "high")
+        )
         self.functions = tuple(f["name"] for f in self.about["functions"])
         self.rule = self.about["rule"]
         self.outputs = tuple(dict.fromkeys((*DERIVED.get(self.rule, ()), *self.functions)))
@@ -70,14 +80,16 @@ class Model:
     def __call__(self, variables=None, gradient=True, **parameters):
         """Values, bars `X_error`, gradients `X_by_NAME` and `verdict` as an xarray Dataset.
 
-        `variables`: names of `outputs`; by default the first. `gradient=False`: without gradients. Numbers become
-        scalar coordinates, 1-D arrays dimensions of their own (a grid), and DataArrays keep theirs, so that those that
-        share one are taken point by point.
+        `variables`: names of `outputs`; by default the first. `gradient=False`: without gradients.
+        Numbers become scalar coordinates, 1-D arrays dimensions of their own (a grid), and
+        DataArrays keep theirs, so that those that share one are taken point by point.
         """
         import xarray as xr
 
         if set(parameters) != set(self.names):
-            raise ValueError(f"model({', '.join(parameters)}): give {self.names[0]} and {self.names[1]}")
+            raise ValueError(
+                f"model({', '.join(parameters)}): give {self.names[0]} and {self.names[1]}"
+            )
         given = [self._labelled(xr, name, parameters[name]) for name in self.names]
         x, y = (array.values.astype(float) for array in given)
         if given[0].ndim == 1 and given[1].ndim == 1 and given[0].dims != given[1].dims:
@@ -87,8 +99,12 @@ class Model:
             found = self.at(*(own.values.astype(float) for own in shape), variables, gradient)
         dims = given[0].dims + given[1].dims if shape is given else shape[0].dims
         words = {f["name"]: f["long_name"] for f in self.about["functions"]}
-        data = {name: (dims, values, self._attributes(name, words)) for name, values in found.items()}
-        about = {key: self.about[key] for key in ("title", "scene", "options")} | {"source": "a model by series"}
+        data = {
+            name: (dims, values, self._attributes(name, words)) for name, values in found.items()
+        }
+        about = {key: self.about[key] for key in ("title", "scene", "options")} | {
+            "source": "a model by series"
+        }
         if self.about.get("proof"):
             about["proof"] = self.about["proof"]["statement"]
         return xr.Dataset(data, dict(zip(self.names, given, strict=True)), about)
@@ -99,7 +115,9 @@ class Model:
             return value
         value = np.asarray(value, dtype=float)
         if value.ndim > 1:
-            raise ValueError(f"{name}: an array of {value.ndim} dimensions needs names for them; give a DataArray")
+            raise ValueError(
+                f"{name}: an array of {value.ndim} dimensions needs names for them; give a DataArray"
+            )
         return xr.DataArray(value, dims=(name,) if value.ndim else ())
 
     def _attributes(self, name, words):
@@ -113,11 +131,16 @@ class Model:
     def at(self, x, y, variables=None, gradient=True):
         """The outputs of points x, y (arrays of one shape), in a dict of arrays of that shape.
 
-        From 100,000 points on, D comes from series on smaller cells, ten times as fast; points that these leave
-        undecided from the factors. A place without an answer (around a singularity) has NaN and the verdict -1.
+        From 100,000 points on, D comes from series on smaller cells, ten times as fast; points that
+        these leave undecided from the factors. A place without an answer (around a singularity) has
+        NaN and the verdict -1.
         """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        shape, x, y = x.shape, np.ascontiguousarray(x).reshape(-1), np.ascontiguousarray(y).reshape(-1)
+        shape, x, y = (
+            x.shape,
+            np.ascontiguousarray(x).reshape(-1),
+            np.ascontiguousarray(y).reshape(-1),
+        )
         self._check(x, y)
         wanted, out = self._prepared(variables, gradient, x.size)
         if x.size >= FEW and self._cells is not None and wanted == ("discriminant",):
@@ -142,7 +165,9 @@ class Model:
         # sums over y first: they serve all rows
         sums, slopes = panel.series @ table, panel.series @ slope
         some = np.arange(x.size)[rows]
-        for part in np.split(some, range(max(1, CHUNK // table.shape[1]), some.size, max(1, CHUNK // table.shape[1]))):
+        for part in np.split(
+            some, range(max(1, CHUNK // table.shape[1]), some.size, max(1, CHUNK // table.shape[1]))
+        ):
             across, slant = panel.tables(x[part], 0)
             slants = (slant.T @ sums, across.T @ slopes) if len(out) > 2 * len(wanted) + 1 else None
             found = answer(self.rule, across.T @ sums, panel.bars, slants, wanted, self.names)
@@ -188,21 +213,35 @@ class Model:
                 (across, slant), (table, slope) = panel.tables(x[part], 0), panel.tables(y[part], 1)
                 rows, slants = panel.transposed @ across, None
                 if len(out) > 2 * len(wanted) + 1:
-                    slants = ((panel.transposed @ slant) * table).sum(axis=1), (rows * slope).sum(axis=1)
-                found = answer(self.rule, (rows * table).sum(axis=1), panel.bars, slants, wanted, self.names)
+                    slants = (
+                        ((panel.transposed @ slant) * table).sum(axis=1),
+                        (rows * slope).sum(axis=1),
+                    )
+                found = answer(
+                    self.rule, (rows * table).sum(axis=1), panel.bars, slants, wanted, self.names
+                )
                 for name, one in found.items():
                     out[name][part] = one
 
     @cached_property
     def _cells(self):
-        """Series of D on cells of the panels; None where the rule knows no D, or there are too many to be numbered."""
+        """Series of D on cells of the panels; None where the rule knows no D, or there are too many
+        to be numbered.
+        """
         if self.rule not in ("hill", "trace"):
             return None
         lattice = [_lattice(self, side, PIECES) for side in range(2)]
-        return _Cells(self, lattice) if math.prod(edges.size - 1 for edges in lattice) <= MOST_CELLS else None
+        return (
+            _Cells(self, lattice)
+            if math.prod(edges.size - 1 for edges in lattice) <= MOST_CELLS
+            else None
+        )
 
     def _by_cells(self, x, y, out):
-        left = [self._cells.solve(x, y, out, slice(first, min(first + LOT, x.size))) for first in range(0, x.size, LOT)]
+        left = [
+            self._cells.solve(x, y, out, slice(first, min(first + LOT, x.size)))
+            for first in range(0, x.size, LOT)
+        ]
         left = np.concatenate(left)
         if left.size:
             own = {name: np.full(left.size, UNDECIDED if name == "verdict" else np.nan, values.dtype)
@@ -214,8 +253,11 @@ class Model:
 
 def _read(path):
     """(the table, the bytes of the series) of a model; raises ValueError where the file holds none."""
-    if not isinstance(path, str | os.PathLike) and not hasattr(path, "seek"):  # a file that is open already
-        raise TypeError(f"Model: give the path of a file that survey model has made, not {path!r:.80}")
+    # a file that is open already
+    if not isinstance(path, str | os.PathLike) and not hasattr(path, "seek"):
+        raise TypeError(
+            f"Model: give the path of a file that survey model has made, not {path!r:.80}"
+        )
     try:
         with zipfile.ZipFile(path) as archive:
             for member in (TABLE, SERIES):
@@ -224,12 +266,24 @@ def _read(path):
             table, series = json.loads(archive.read(TABLE)), archive.read(SERIES)
         if not isinstance(table, dict):
             raise ValueError(f"{TABLE} holds no object")
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, KeyError, ValueError, RuntimeError) as error:
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        OSError,
+        KeyError,
+        ValueError,
+        RuntimeError,
+    ) as error:
         if isinstance(error, FileNotFoundError):
-            raise FileNotFoundError(f"{path}: there is no such file; name one that survey model has made") from None
+            raise FileNotFoundError(
+                f"{path}: there is no such file; name one that survey model has made"
+            ) from None
         if getattr(error, "filename", None) is not None:  # it may not be read
             raise
-        raise ValueError(f"{path}: this is not a model of survey ({error}); make one with survey model") from None
+        raise ValueError(
+            f"{path}: this is not a model of survey ({error}); make one with survey model"
+        ) from None
     return table, series
 
 
@@ -241,13 +295,21 @@ def _check(about, size):
             raise ValueError(what)
 
     def numbers(values, count):
-        return len(values) == count and all(type(v) in (int, float) and math.isfinite(v) for v in values)
+        return len(values) == count and all(
+            type(v) in (int, float) and math.isfinite(v) for v in values
+        )
 
-    need(all(isinstance(about[key], str) for key in ("title", "scene", "options")), "title, scene, options")
+    need(
+        all(isinstance(about[key], str) for key in ("title", "scene", "options")),
+        "title, scene, options",
+    )
     need(not about.get("proof") or isinstance(about["proof"]["statement"], str), "proof")
     own, rule = about["parameters"], about["rule"]
     need(len(own) == 2 and all(p["name"].isidentifier() for p in own), "parameters")
-    need(all(numbers([p["low"], p["high"]], 2) and p["low"] < p["high"] for p in own), "ends of the parameters")
+    need(
+        all(numbers([p["low"], p["high"]], 2) and p["low"] < p["high"] for p in own),
+        "ends of the parameters",
+    )
     names = [f["name"] for f in about["functions"]]
     known = {"hill": HALF, "trace": ("discriminant",), "danby": INVARIANTS}
     labels = known.get(rule, [f"c{k + 1}" for k in range(len(names))])
@@ -257,10 +319,16 @@ def _check(about, size):
     dense = 0
     for panel in about["panels"]:
         low, high, first, terms = (panel[key] for key in ("low", "high", "first", "terms"))
-        need(numbers(low, 2) and numbers(high, 2) and low[0] < high[0] and low[1] < high[1], "ends of a panel")
+        need(
+            numbers(low, 2) and numbers(high, 2) and low[0] < high[0] and low[1] < high[1],
+            "ends of a panel",
+        )
         need(numbers(panel["bars"], len(names)) and min(panel["bars"]) >= 0, "bars of a panel")
         counts = [count for own in terms for count in own]
-        need(len(terms) == len(names) and all(type(n) is int and 0 <= n <= TERMS for n in counts), "terms")
+        need(
+            len(terms) == len(names) and all(type(n) is int and 0 <= n <= TERMS for n in counts),
+            "terms",
+        )
         need(type(first) is int and 0 <= first <= size - sum(counts), "first of a panel")
         longest = max(map(len, terms))
         need(longest <= TERMS, "terms")
@@ -311,7 +379,9 @@ def tables(x, n):
 
 
 def _run(inside):
-    """The places that are True: a slice where they follow each other, else their numbers; None if there are none."""
+    """The places that are True: a slice where they follow each other, else their numbers; None if
+    there are none.
+    """
     places = np.flatnonzero(inside)
     if not places.size:
         return None
@@ -319,7 +389,9 @@ def _run(inside):
 
 
 class _Cells:
-    """D as short series on the cells of a lattice that refines the panels, with its derivatives, and its bars."""
+    """D as short series on the cells of a lattice that refines the panels, with its derivatives,
+    and its bars.
+    """
 
     def __init__(self, model, lattice):
         self.low, sizes = model.low, np.subtract(model.high, model.low)
@@ -330,7 +402,9 @@ class _Cells:
         self.places = (at[0] * (lattice[1].size - 1)).astype(np.uint16), at[1].astype(np.uint16)
 
     def _solve(self, model, lattice):
-        """Fill `series` (cells, 3 q, q): of D and its derivatives; and `bars` (cells), NaN where there is no panel."""
+        """Fill `series` (cells, 3 q, q): of D and its derivatives; and `bars` (cells), NaN where
+        there is no panel.
+        """
         q, (across, along) = CELLS, (edges.size - 1 for edges in lattice)
         self.middle, self.inverse = [], []
         for edges, number, axis in zip(lattice, (across, along), (1, 0), strict=True):
@@ -338,7 +412,10 @@ class _Cells:
             shape = (number, along) if axis == 1 else (across, number)
             self.middle.append(np.broadcast_to(np.expand_dims(middle, axis), shape).reshape(-1))
             self.inverse.append(np.broadcast_to(np.expand_dims(inverse, axis), shape).reshape(-1))
-        self.series, self.bars = np.zeros((across, along, 3, q, q)), np.full((across, along), np.nan)
+        self.series, self.bars = (
+            np.zeros((across, along, 3, q, q)),
+            np.full((across, along), np.nan),
+        )
         theta = np.pi * (np.arange(q) + 0.5) / q
         matrix = 2.0 / q * np.cos(np.outer(np.arange(q), theta))
         matrix[0] /= 2
@@ -350,7 +427,9 @@ class _Cells:
                 middle = 0.5 * (edges[1:] + edges[:-1])
                 inside = np.flatnonzero(panel.holds(middle, side))
                 own.append(inside)
-                nodes.append(middle[inside, None] + 0.5 * np.diff(edges)[inside, None] * np.cos(theta))
+                nodes.append(
+                    middle[inside, None] + 0.5 * np.diff(edges)[inside, None] * np.cos(theta)
+                )
             table = panel.tables(nodes[1].reshape(-1), 1)[0]
             sums = panel.series @ table
             for i, x in zip(own[0], nodes[0], strict=True):
@@ -365,13 +444,15 @@ class _Cells:
                 for axis in (1, 2):
                     ends = size.sum(axis=3 - axis)
                     tail = tail + 2.0 * ends[:, -2:].sum(axis=1)
-                rounding = EPS * (size * (20.0 + 4.0 * np.add.outer(np.arange(q) ** 2, np.arange(q) ** 2))).sum(
-                    axis=(1, 2)
-                )
+                rounding = EPS * (
+                    size * (20.0 + 4.0 * np.add.outer(np.arange(q) ** 2, np.arange(q) ** 2))
+                ).sum(axis=(1, 2))
                 bars = 1.5 * bar.max(axis=(1, 2))
                 self.series[i, own[1], 0] = series
                 self.series[i, own[1], 1] = derive @ series * (2.0 / np.diff(lattice[0])[i])
-                self.series[i, own[1], 2] = series @ derive.T * (2.0 / np.diff(lattice[1])[own[1], None, None])
+                self.series[i, own[1], 2] = (
+                    series @ derive.T * (2.0 / np.diff(lattice[1])[own[1], None, None])
+                )
                 self.bars[i, own[1]] = bars + tail + rounding
         self._shorten(self.series.reshape(-1, 3, q, q), self.bars.reshape(-1))
 
@@ -379,11 +460,15 @@ class _Cells:
         """Leave out of each cell the highest degrees, as long as they add to its bound by a tenth at most."""
         q = series.shape[-1]
         degree, size = np.maximum.outer(np.arange(q), np.arange(q)), abs(series[:, 0])
-        layers = np.stack([size[:, degree == k].sum(axis=1) for k in range(q)] + [np.zeros(bars.size)], axis=1)
+        layers = np.stack(
+            [size[:, degree == k].sum(axis=1) for k in range(q)] + [np.zeros(bars.size)], axis=1
+        )
         rest = layers[:, ::-1].cumsum(axis=1)[:, ::-1]
         kept = np.maximum((rest > SHORTER * bars[:, None]).sum(axis=1), 2)
         self.bars = bars + 1.001 * rest[np.arange(bars.size), kept]
-        self.series = [own[:, :k, :k].reshape(3 * k, k) for own, k in zip(series, kept, strict=True)]
+        self.series = [
+            own[:, :k, :k].reshape(3 * k, k) for own, k in zip(series, kept, strict=True)
+        ]
 
     def solve(self, x, y, out, lot):
         """Answer a `lot` (slice) of the points from their cells; returns those that stay undecided."""
@@ -403,7 +488,10 @@ class _Cells:
             for first in range(ends[c], ends[c + 1], PART):
                 part = slice(first, min(first + PART, ends[c + 1]))
                 n = part.stop - first
-                table, sums = tables[: 2 * q * n].reshape(q, 2, n), products[: parts * q * n].reshape(parts * q, n)
+                table, sums = (
+                    tables[: 2 * q * n].reshape(q, 2, n),
+                    products[: parts * q * n].reshape(parts * q, n),
+                )
                 for values, side in ((x, 0), (y, 1)):
                     np.subtract(values[part], self.middle[side][c], out=table[1, side])
                     table[1, side] *= self.inverse[side][c]
@@ -418,7 +506,9 @@ class _Cells:
         size = np.abs(values)
         size -= 2.0
         out["verdict"][lot] = (size < -bars).view(np.int8) - (abs(size) <= bars).view(np.int8)
-        open_points = (out["verdict"][lot] == UNDECIDED) | ~np.isfinite(out["discriminant_error"][lot])
+        open_points = (out["verdict"][lot] == UNDECIDED) | ~np.isfinite(
+            out["discriminant_error"][lot]
+        )
         return lot.start + np.flatnonzero(open_points)
 
 
@@ -441,7 +531,8 @@ def _short_tables(table):
 
 
 def answer(rule, values, bars, slopes, wanted, names):
-    """The outputs of points from the functions' `values` (F, ...), `bars` (F) and derivatives, by rule.
+    """The outputs of points from the functions' `values` (F, ...), `bars` (F) and derivatives, by
+    rule.
 
     A dict of `wanted` names, `X_error`, `X_by_NAME` and `verdict`; `slopes` (2, F, ...) or None.
     """
@@ -461,12 +552,17 @@ def _functions(values, bars, slopes, wanted, names, labels):
         if label in wanted:
             out[label], out[f"{label}_error"] = values[f], np.broadcast_to(bars[f], values[f].shape)
             if slopes is not None:
-                out |= {f"{label}_by_{name}": slope[f] for name, slope in zip(names, slopes, strict=True)}
+                out |= {
+                    f"{label}_by_{name}": slope[f]
+                    for name, slope in zip(names, slopes, strict=True)
+                }
     return out
 
 
 def _hill(values, bars, slopes, wanted, names):
-    """y1, y1', y2, y2' at half a period: D = 2 + 4 y1' y2 = 4 y1 y2' - 2; unstable where y1' y2 > 0 or y1 y2' < 0."""
+    """y1, y1', y2, y2' at half a period: D = 2 + 4 y1' y2 = 4 y1 y2' - 2; unstable where y1' y2 > 0
+    or y1 y2' < 0.
+    """
     y1, dy1, y2, dy2 = values
     sine, sine_bar = _product(dy1, y2, bars[1], bars[2])
     cosine, cosine_bar = _product(y1, dy2, bars[0], bars[3])
@@ -482,7 +578,9 @@ def _hill(values, bars, slopes, wanted, names):
     if "discriminant" in wanted:
         by_sine = sine_bar <= cosine_bar
         out["discriminant"] = np.where(by_sine, 2.0 + 4.0 * sine, 4.0 * cosine - 2.0)
-        out["discriminant_error"] = 4.0 * np.minimum(sine_bar, cosine_bar) + EPS * (2.0 + abs(out["discriminant"]))
+        out["discriminant_error"] = 4.0 * np.minimum(sine_bar, cosine_bar) + EPS * (
+            2.0 + abs(out["discriminant"])
+        )
         for name, slope in zip(names, slopes if slopes is not None else (), strict=False):
             one, other = slope[1] * y2 + dy1 * slope[2], slope[0] * dy2 + y1 * slope[3]
             out[f"discriminant_by_{name}"] = 4.0 * np.where(by_sine, one, other)
@@ -499,17 +597,26 @@ def _hill(values, bars, slopes, wanted, names):
 
 def _exponent(square, bar, verdict):
     """2 asinh sqrt(square) and its bound; exactly 0 where stable, anything from 0 on where undecided."""
-    low, high = (2.0 * np.arcsinh(np.sqrt(np.maximum(square + side * bar, 0.0))) for side in (-1.0, 1.0))
+    low, high = (
+        2.0 * np.arcsinh(np.sqrt(np.maximum(square + side * bar, 0.0))) for side in (-1.0, 1.0)
+    )
     value = 2.0 * np.arcsinh(np.sqrt(np.maximum(square, 0.0)))
     error = np.maximum(high - value, value - low) + 4.0 * EPS * value
     stable = verdict == STABLE
-    return {"exponent": np.where(stable, 0.0, value), "exponent_error": np.where(stable, 0.0, error)}
+    return {
+        "exponent": np.where(stable, 0.0, value),
+        "exponent_error": np.where(stable, 0.0, error),
+    }
 
 
 def _growth(slope, square, verdict):
     """The derivative of 2 asinh sqrt(square): 0 where stable, NaN on edges."""
     with np.errstate(all="ignore"):
-        return np.where(verdict == STABLE, 0.0, np.where(square > 0, slope / np.sqrt(square * (1.0 + square)), np.nan))
+        return np.where(
+            verdict == STABLE,
+            0.0,
+            np.where(square > 0, slope / np.sqrt(square * (1.0 + square)), np.nan),
+        )
 
 
 def _trace(values, bars, slopes, wanted, names):
@@ -535,10 +642,16 @@ def _danby(values, bars, slopes, wanted, names):
     near, far = 2.0 * abs(t) * bar + 4.0 * ab_bar, 2.0 * abs(t - 2.0) * bar + 4.0 * cd_bar
     root, other = np.where(near <= far, t, t - 2.0), np.where(near <= far, ab, cd)
     k = root * root - 4.0 * other
-    k_bar = np.minimum(near, far) + bar * bar + EPS * (2.0 * root * root + 4.0 * abs(other) + 4.0 * abs(root))
+    k_bar = (
+        np.minimum(near, far)
+        + bar * bar
+        + EPS * (2.0 * root * root + 4.0 * abs(other) + 4.0 * abs(root))
+    )
     verdict = np.full(t.shape, UNDECIDED, np.int8)
     verdict[(ab > ab_bar) & (cd > cd_bar) & (k > k_bar) & (t > bar) & (t - 2.0 < -bar)] = STABLE
-    verdict[(ab < -ab_bar) | (cd < -cd_bar) | (k < -k_bar) | (t < -bar) | (t - 2.0 > bar)] = UNSTABLE
+    verdict[(ab < -ab_bar) | (cd < -cd_bar) | (k < -k_bar) | (t < -bar) | (t - 2.0 > bar)] = (
+        UNSTABLE
+    )
     out = _functions(values, bars, slopes, wanted, names, INVARIANTS) | {"verdict": verdict}
     if "a" in wanted:
         out["a"], out["a_error"] = 4.0 * t - 4.0, 4.0 * bar + EPS * (4.0 * abs(t) + 4.0)
@@ -557,7 +670,9 @@ def _danby(values, bars, slopes, wanted, names):
 
 
 def _reciprocal(values, bars, slopes, wanted, names):
-    """s + c1, or s^2 + c1 s + c2, s = l + 1 / l: stable where all s are real, different and between -2 and 2."""
+    """s + c1, or s^2 + c1 s + c2, s = l + 1 / l: stable where all s are real, different and between
+    -2 and 2.
+    """
     c, bar = values, bars
     if len(values) == 1:
         tests = [(2.0 - abs(c[0]), bar[0] + 0.0 * c[0])]
@@ -569,13 +684,15 @@ def _reciprocal(values, bars, slopes, wanted, names):
             (4.0 - 2.0 * abs(c[0]) + c[1], 2.0 * bar[0] + bar[1] + EPS * (8.0 + 4.0 * abs(c[0]) + 2.0 * abs(c[1]))),
             (4.0 - abs(c[0]), bar[0] + EPS * (4.0 + abs(c[0]))),
         ]  # fmt: skip
-    return _functions(values, bars, slopes, wanted, names, [f"c{k + 1}" for k in range(len(values))]) | {
-        "verdict": _all(tests)
-    }
+    return _functions(
+        values, bars, slopes, wanted, names, [f"c{k + 1}" for k in range(len(values))]
+    ) | {"verdict": _all(tests)}
 
 
 def _all(tests):
-    """Stable where every test (value, bar) is certainly positive, unstable where one is certainly negative."""
+    """Stable where every test (value, bar) is certainly positive, unstable where one is certainly
+    negative.
+    """
     verdict = np.full(np.shape(tests[0][0]), STABLE, np.int8)
     for value, bar in tests:
         verdict[~(value > bar)] = UNDECIDED
@@ -604,7 +721,15 @@ def _schur(values, bars, slopes, wanted, names):
             scale = abs(q[0]) + 1e-300
             p, e = [one / scale for one in q], [one / scale * (1.0 + 4.0 * EPS) + EPS for one in f]
     verdict[open_points] = STABLE
-    return _functions(values, bars, slopes, wanted, names, [f"c{k + 1}" for k in range(n)]) | {"verdict": verdict}
+    return _functions(values, bars, slopes, wanted, names, [f"c{k + 1}" for k in range(n)]) | {
+        "verdict": verdict
+    }
 
 
-RULES = {"hill": _hill, "trace": _trace, "danby": _danby, "reciprocal": _reciprocal, "schur": _schur}
+RULES = {
+    "hill": _hill,
+    "trace": _trace,
+    "danby": _danby,
+    "reciprocal": _reciprocal,
+    "schur": _schur,
+}

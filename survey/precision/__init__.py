@@ -1,4 +1,5 @@
-"""The work-precision chart: error with respect to reference values against time per point, for every method and peer.
+"""The work-precision chart: error with respect to reference values against time per point, for
+every method and peer.
 
 Everything specific to a scene is in the file of its name in `cases/`:
 
@@ -15,8 +16,8 @@ Everything specific to a scene is in the file of its name in `cases/`:
     ALL                    works for which all outputs are asked, not ERROR and the verdict alone (optional)
     NOTE                   what a reader of the chart must know, such as that peers are asked for less (optional)
 
-Where a parameter for which one solution serves all values (times, angles) varies along the last axis, samples of the
-work keep whole rows.
+Where a parameter for which one solution serves all values (times, angles) varies along the last
+axis, samples of the work keep whole rows.
 """
 
 import csv
@@ -55,10 +56,12 @@ from survey.scene import Request, exists
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
 REPEATS = 5
 ENOUGH_SECONDS = 0.5
-LONG = 20.0  # seconds that a method may take for a work at one setting: if more, it gets no finer ones
+# seconds that a method may take for a work at one setting: if more, it gets no finer ones
+LONG = 20.0
 # Points of a map on which methods other than auto, which treats a map as a whole, are timed.
 POINTS = 10_000
-TOGETHER = 5_000  # scattered points with which a reference is solved, as from 4,096 on they may share series
+# scattered points with which a reference is solved, as from 4,096 on they may share series
+TOGETHER = 5_000
 
 
 @dataclass
@@ -77,7 +80,9 @@ class Record:
 
 @dataclass
 class Least:
-    """The least time of a method's steps: its operations at the peak rate, with separate or fused multiply-adds."""
+    """The least time of a method's steps: its operations at the peak rate, with separate or fused
+    multiply-adds.
+    """
 
     work: str
     method: str
@@ -94,16 +99,24 @@ def write(scene, directory, peers=False, say=lambda line: None):
     try:
         directory.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(f"-o {str(directory)!r}: cannot make this folder ({error.strerror})") from None
+        raise BadInput(
+            f"-o {str(directory)!r}: cannot make this folder ({error.strerror})"
+        ) from None
     records = measure(scene, case, peers, say)
     name = getattr(case, "NAME", scene)
     paths = [directory / f"precision_{name}.{kind}" for kind in ("json", "csv", "png")]
     machine = provenance() | {"system": platform.platform(), "threads": 1} | limit(scene, case)
     machine |= {"missing_peers": missing(peers), "note": getattr(case, "NOTE", "")}
-    machine |= {"load": psutil.getloadavg(), "entry": "scene.solve", "outputs": outputs(case), "works": described(case)}
+    machine |= {
+        "load": psutil.getloadavg(),
+        "entry": "scene.solve",
+        "outputs": outputs(case),
+        "works": described(case),
+    }
     machine["peers"] = {peer: version(peer) for peer in sorted({r.peer for r in records} - {""})}
     paths[0].write_text(
-        json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n", encoding="utf-8"
+        json.dumps({"records": [asdict(r) for r in records], "machine": machine}, indent=1) + "\n",
+        encoding="utf-8",
     )
     with open(paths[1], "w", newline="") as file:
         table = csv.DictWriter(file, list(asdict(records[0])))
@@ -121,13 +134,18 @@ def _case(scene):
         return own_file.case(scene)
     found = modules.load(cases, scene, "precision chart")
     if found is own_file:
-        raise BadInput("own_file: name your own file, such as my_equation.py, or a workflow that names it")
+        raise BadInput(
+            "own_file: name your own file, such as my_equation.py, or a workflow that names it"
+        )
     return found
 
 
 def outputs(case):
     """{work: the outputs that are timed}, in words."""
-    return {work: "all" if work in getattr(case, "ALL", ()) else f"{case.ERROR}, verdict" for work in case.works()}
+    return {
+        work: "all" if work in getattr(case, "ALL", ()) else f"{case.ERROR}, verdict"
+        for work in case.works()
+    }
 
 
 def described(case):
@@ -142,16 +160,25 @@ def described(case):
 def measure(scene, case, peers=False, say=lambda line: None):
     """The records of every method (and, if requested, of every installed peer) at every setting.
 
-    A method is left out of a work if it has no answer for one of its references (closed forms, where there is none).
+    A method is left out of a work if it has no answer for one of its references (closed forms,
+    where there is none).
     """
     module = _scene(scene, case)
     methods = ["auto", *methods_of(module, next(iter(case.works().values()))[1])]
     fewer = getattr(case, "MOST", {})
-    runs = {(method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods}
+    runs = {
+        (method, ""): (_solver(module, method, case.ERROR), fewer.get(method)) for method in methods
+    }
     absent = missing(peers)
     for name in absent:
-        say(f"{name} is not installed and is missing from the chart: pip install 'stability-survey[bench]'")
-    for name in sorted(set(modules.names(programs)) - set(absent)) if peers and hasattr(case, "system") else ():
+        say(
+            f"{name} is not installed and is missing from the chart: pip install 'stability-survey[bench]'"
+        )
+    for name in (
+        sorted(set(modules.names(programs)) - set(absent))
+        if peers and hasattr(case, "system")
+        else ()
+    ):
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
     full, shared, whole = case.works(), _shared(module), getattr(case, "ALL", ())
@@ -159,7 +186,10 @@ def measure(scene, case, peers=False, say=lambda line: None):
     records = []
     for (method, peer), (solve, most) in runs.items():
         works = full if peer or method == "auto" else thinned
-        timed = {work: (_sample(point, most, shared), options) for work, (point, options) in works.items()}
+        timed = {
+            work: (_sample(point, most, shared), options)
+            for work, (point, options) in works.items()
+        }
         smallest = timed[_smallest(works)]
         compile_seconds = _first_call(solve, *smallest) if peer else _cold(scene, method, smallest)
         for work, (point, options) in timed.items():  # every path is compiled before it is timed
@@ -173,7 +203,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 if work in slow:
                     continue
                 began, references = time.process_time(), case.references(work)
-                if method == "auto":  # it treats a dense row as a whole: its error is the one within such a row
+                # it treats a dense row as a whole: its error is the one within such a row
+                if method == "auto":
                     errors, references = {}, [_within(reference, point) for reference in references]
                 if id(references) not in errors:
                     errors[id(references)] = _against(solve, references, case.ERROR, setting)
@@ -182,10 +213,14 @@ def measure(scene, case, peers=False, say=lambda line: None):
                     continue
                 asked = solve if peer or work not in whole else partial(solve, everything=True)
                 seconds = _per_point(asked, *timed[work], setting)
-                records.append(Record(work, method, peer, setting, error, seconds, wrong, compile_seconds))
+                records.append(
+                    Record(work, method, peer, setting, error, seconds, wrong, compile_seconds)
+                )
                 if time.process_time() - began > LONG:
                     slow.add(work)
-                    say(f"{scene}: {method or peer} takes long for {work}: no setting finer than {setting:g}")
+                    say(
+                        f"{scene}: {method or peer} takes long for {work}: no setting finer than {setting:g}"
+                    )
         say(f"{scene}: {method or peer} measured")
     return records
 
@@ -198,7 +233,9 @@ def _scene(chart, case):
 
 def missing(peers):
     """Names of the requested peers that are not installed."""
-    return [name for name in modules.names(programs) if peers and not importlib.util.find_spec(name)]
+    return [
+        name for name in modules.names(programs) if peers and not importlib.util.find_spec(name)
+    ]
 
 
 def limit(scene, case):
@@ -227,32 +264,50 @@ def _peer(case, peer):
 
 
 def _axes(point):
-    """{name: (its dimensions, its values)} of a work, whose arrays have as many dimensions each, of length 1 where they
-    do not vary.
+    """{name: (its dimensions, its values)} of a work, whose arrays have as many dimensions each, of
+    length 1 where they do not vary.
     """
     shapes = {name: np.shape(values) for name, values in point.items()}
-    own = {name: tuple(i for i, size in enumerate(shape) if size > 1) for name, shape in shapes.items()}
+    own = {
+        name: tuple(i for i, size in enumerate(shape) if size > 1) for name, shape in shapes.items()
+    }
     return {name: (own[name], np.ravel(values)) for name, values in point.items()}
 
 
 def _within(reference, point):
-    """The reference as the first point of a row of the work, or of scattered points about it, if the work has such."""
+    """The reference as the first point of a row of the work, or of scattered points about it, if
+    the work has such.
+    """
     parameters, options, exact, verdict = reference
     axes = _axes(point)
     dense = [name for name in grid.lines(axes) if np.shape(point[name])[-1] > 1]
     if not dense:
-        about = {name: values[:TOGETHER] for name, (_, values) in axes.items() if np.size(values) >= TOGETHER}
-        if not about or not all(v.min() <= parameters[name] <= v.max() for name, v in about.items()):
+        about = {
+            name: values[:TOGETHER]
+            for name, (_, values) in axes.items()
+            if np.size(values) >= TOGETHER
+        }
+        if not about or not all(
+            v.min() <= parameters[name] <= v.max() for name, v in about.items()
+        ):
             return reference
         whole = {name: np.array([value]) for name, value in parameters.items()}
-        return whole | {name: np.append(whole[name], v) for name, v in about.items()}, options, exact, verdict
+        return (
+            whole | {name: np.append(whole[name], v) for name, v in about.items()},
+            options,
+            exact,
+            verdict,
+        )
     whole = {name: np.array([[value]]) for name, value in parameters.items()}
-    whole |= {name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in dense}
+    whole |= {
+        name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in dense
+    }
     return whole, options, exact, verdict
 
 
 def _solver(module, method, error):
-    """A function of (point, options, rtol) that calls the scene for the output `error` and the verdict; see `works`.
+    """A function of (point, options, rtol) that calls the scene for the output `error` and the
+    verdict; see `works`.
 
     A run knows its axes before its first block: they are described once for each point.
     """
@@ -267,13 +322,17 @@ def _solver(module, method, error):
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}
         if described.get("point") is not point:
             axes = _axes(arrays)
-            described.update(point=point, axes=(grid.lines(axes), grid.fixed(axes), grid.ranges(axes)))
+            described.update(
+                point=point, axes=(grid.lines(axes), grid.fixed(axes), grid.ranges(axes))
+            )
         request = Request(options, method, rtol, wanted, *described["axes"])
         dense.panels.cache_clear()  # every call includes its set-up
         floquet.panels.cache_clear()
         fate.forget()
         basins.forget()
-        return module.solve({key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request)
+        return module.solve(
+            {key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request
+        )
 
     return solve
 
@@ -286,7 +345,11 @@ def _cold(scene, method, work):
         program = f"from survey import precision; print(precision.first_call({scene!r}, {method!r}, {str(given)!r}))"
         environment = os.environ | {"NUMBA_CACHE_DIR": empty}
         done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment
+            [sys.executable, "-c", program],
+            capture_output=True,
+            text=True,
+            check=True,
+            env=environment,
         )
     return float(done.stdout)
 
@@ -297,7 +360,9 @@ def first_call(scene, method, path):
     `path`: a file that holds the work, whose making may compile kernels.
     """
     case = _case(scene)
-    return _first_call(_solver(_scene(scene, case), method, case.ERROR), *pickle.loads(Path(path).read_bytes()))
+    return _first_call(
+        _solver(_scene(scene, case), method, case.ERROR), *pickle.loads(Path(path).read_bytes())
+    )
 
 
 def _smallest(works):
@@ -330,7 +395,11 @@ def _against(solve, references, name, rtol):
         solved = solve(parameters, options, rtol)
         wanted = np.atleast_1d(exact[name])
         value = np.ravel(solved[name])[: wanted.size]
-        if np.isnan(value).any() and verdict is not None and np.ravel(solved.get("verdict", 0))[0] == -1:
+        if (
+            np.isnan(value).any()
+            and verdict is not None
+            and np.ravel(solved.get("verdict", 0))[0] == -1
+        ):
             continue
         worst = float(np.maximum(worst, np.max(abs(value - wanted) / (1 + abs(wanted)))))
         if verdict is not None and "verdict" in solved:
@@ -339,12 +408,15 @@ def _against(solve, references, name, rtol):
 
 
 def _per_point(solve, point, options, rtol):
-    """Median seconds of processor time per point of a few calls: all run on one thread, beside others perhaps.
+    """Median seconds of processor time per point of a few calls: all run on one thread, beside
+    others perhaps.
 
     Those that compile do not count, as for the first points that need double-double arithmetic.
     """
     times, compiled, begin = [], [], time.perf_counter()
-    while len(times + compiled) < REPEATS and (not times or time.perf_counter() - begin < ENOUGH_SECONDS):
+    while len(times + compiled) < REPEATS and (
+        not times or time.perf_counter() - begin < ENOUGH_SECONDS
+    ):
         compiling, start = compile_seconds(), time.process_time()
         solve(point, options, rtol)
         (times if compile_seconds() == compiling else compiled).append(time.process_time() - start)
@@ -354,21 +426,31 @@ def _per_point(solve, point, options, rtol):
 def _thinned(point):
     """About POINTS points of a larger map, in complete rows: enough where rows are independent."""
     every = -(-_points(point) // POINTS)
-    return {name: values[::every] if np.ndim(values) > 1 else values for name, values in point.items()}
+    return {
+        name: values[::every] if np.ndim(values) > 1 else values for name, values in point.items()
+    }
 
 
 def _sample(point, most, shared=()):
-    """At most `most` random points of the work, or about as many in whole rows where one of `shared` varies along them.
+    """At most `most` random points of the work, or about as many in whole rows where one of
+    `shared` varies along them.
 
     The parameters of `shared` are those for which one solution serves all values.
     """
     if most is None or _points(point) <= most:
         return point
-    if any(name in shared and np.shape(values)[-1:] > (1,) for name, values in point.items() if np.ndim(values) > 1):
+    if any(
+        name in shared and np.shape(values)[-1:] > (1,)
+        for name, values in point.items()
+        if np.ndim(values) > 1
+    ):
         columns = max(np.shape(values)[-1] for values in point.values())
         rows = max(np.shape(values)[0] for values in point.values() if np.ndim(values) > 1)
         chosen = np.random.default_rng(0).permutation(rows)[: max(1, most // columns)]
-        return {name: values[chosen] if len(values) == rows else values for name, values in point.items()}
+        return {
+            name: values[chosen] if len(values) == rows else values
+            for name, values in point.items()
+        }
     names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]
     chosen = np.random.default_rng(0).permutation(flat[0].size)[:most]
     return {name: values[chosen] for name, values in zip(names, flat, strict=True)}

@@ -1,4 +1,6 @@
-"""The work-precision chart as a figure: one panel per work, one line per method or peer, and the machine's limit."""
+"""The work-precision chart as a figure: one panel per work, one line per method or peer, and the
+machine's limit.
+"""
 
 from functools import partial
 from textwrap import fill
@@ -6,7 +8,8 @@ from textwrap import fill
 import matplotlib.pyplot as plt
 import numpy as np
 
-# Colours, mostly Okabe and Ito's, and markers: the same in every chart, and those of methods that are named in few.
+# Colours, mostly Okabe and Ito's, and markers: the same in every chart, and those of methods that
+# are named in few.
 STYLES = {
     "auto": ("#D55E00", "o"), "dop853": ("#0072B2", "s"), "rk4": ("#009E73", "D"), "taylor": ("#CC79A7", "^"),
     "taylor16": ("#CC79A7", "^"), "magnus6": ("#5D3A9B", "v"), "CyRK": ("#E69F00", "P"), "diffrax": ("#56B4E9", "*"),
@@ -47,14 +50,22 @@ def draw(records, machine, scene, name, path):
     for axes in panels[:, 0]:
         axes.set_ylabel(f"largest error of {name} / (1 + |value|)")
     named = {
-        label: line for axes in panels.ravel() for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
+        label: line
+        for axes in panels.ravel()
+        for line, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
     title = _asked(machine) + "in brackets: compilation time, not included"
     if machine["missing_peers"]:
         title += f"; not installed: {', '.join(machine['missing_peers'])}"
     title = "\n".join(fill(line, int(SMALL * size[0])) for line in title.splitlines())
     figure.legend(
-        named.values(), named.keys(), loc="outside lower center", ncols=5, fontsize=8, title=title, title_fontsize=8
+        named.values(),
+        named.keys(),
+        loc="outside lower center",
+        ncols=5,
+        fontsize=8,
+        title=title,
+        title_fontsize=8,
     )
     words = f"{scene}: error against time, lower left is better (numbers at points: wrong verdicts on the references)"
     figure.suptitle(fill(words, int(PLAIN * size[0])))
@@ -67,7 +78,11 @@ def _between(axes, x, _position):
     low, high = np.log10(axes.get_xlim())
     power = int(np.floor(np.log10(x)))
     mantissa = round(x / 10.0**power)
-    return rf"$\mathdefault{{{mantissa}\times10^{{{power}}}}}$" if mantissa in (2, 5) and high - low < 1.5 else ""
+    return (
+        rf"$\mathdefault{{{mantissa}\times10^{{{power}}}}}$"
+        if mantissa in (2, 5) and high - low < 1.5
+        else ""
+    )
 
 
 def _asked(machine):
@@ -84,15 +99,28 @@ def _asked(machine):
 
 
 def _line(axes, records, style):
-    """One method or peer (hollow, dashed), with the number of wrong verdicts beside each point that has any."""
+    """One method or peer (hollow, dashed), with the number of wrong verdicts beside each point that
+    has any.
+    """
     method, peer = records[0].method, records[0].peer
-    seconds, errors = [r.seconds_per_point for r in records], [max(r.error, LEAST_ERROR) for r in records]
+    seconds, errors = (
+        [r.seconds_per_point for r in records],
+        [max(r.error, LEAST_ERROR) for r in records],
+    )
     name = f"peer {peer}" if peer else method
-    style |= {"ls": "--", "mfc": "white", "lw": 1.2} if peer else {"lw": 2.5 if method == "auto" else 1.2}
+    style |= (
+        {"ls": "--", "mfc": "white", "lw": 1.2}
+        if peer
+        else {"lw": 2.5 if method == "auto" else 1.2}
+    )
     axes.plot(seconds, errors, ms=5, label=f"{name} ({records[0].compile_seconds:.1f} s)", **style)
     for number, record in enumerate(r for r in records if r.wrong_verdicts):
         # alternately right and left, else the numbers of neighbours would read as one
-        position = {"xytext": (5, 3), "ha": "left"} if number % 2 == 0 else {"xytext": (-5, -9), "ha": "right"}
+        position = (
+            {"xytext": (5, 3), "ha": "left"}
+            if number % 2 == 0
+            else {"xytext": (-5, -9), "ha": "right"}
+        )
         axes.annotate(record.wrong_verdicts, (record.seconds_per_point, max(record.error, LEAST_ERROR)),
                       textcoords="offset points", color=style["color"], fontsize=8, **position)  # fmt: skip
 
@@ -101,7 +129,9 @@ def _limit(axes, least, records):
     """Draw the least time of a method's operations against its errors, if they were counted."""
     if not least:
         return
-    errors = {r.setting: max(r.error, LEAST_ERROR) for r in records if r.method == least[0]["method"]}
+    errors = {
+        r.setting: max(r.error, LEAST_ERROR) for r in records if r.method == least[0]["method"]
+    }
     heights = [errors[entry["setting"]] for entry in least]
     axes.plot(
         [entry["seconds_per_point"] for entry in least], heights, "k--", lw=1,

@@ -1,4 +1,6 @@
-"""Floating-point operations: the measured peak rates of one core, and the number of operations of a formula."""
+"""Floating-point operations: the measured peak rates of one core, and the number of operations of a
+formula.
+"""
 
 import time
 
@@ -11,7 +13,10 @@ CHAINS, DEPTH = 12, 16  # measured: fewer are limited by the latency of an opera
 
 def rates():
     """Multiply-add pairs per nanosecond: separate, as in survey's kernels, and fused."""
-    return {"multiply_add_per_ns": _rate(), "fused_multiply_add_per_ns": _rate(fastmath={"contract"})}
+    return {
+        "multiply_add_per_ns": _rate(),
+        "fused_multiply_add_per_ns": _rate(fastmath={"contract"}),
+    }
 
 
 def _rate(**flags):
@@ -26,7 +31,9 @@ def _rate(**flags):
 
 
 def _burner(flags):
-    """A kernel of independent chains x -> m x + c that stay in registers, lanes innermost as in survey's own."""
+    """A kernel of independent chains x -> m x + c that stay in registers, lanes innermost as in
+    survey's own.
+    """
     inline = numba.njit(forceinline=True, **flags)
 
     @inline
@@ -44,9 +51,35 @@ def _burner(flags):
         for _ in range(rounds):
             for i in range(values.size):
                 v = values[i]
-                x = (v, 2 * v, 3 * v, 4 * v, 5 * v, 6 * v, 7 * v, 8 * v, 9 * v, 10 * v, 11 * v, 12 * v)
+                x = (
+                    v,
+                    2 * v,
+                    3 * v,
+                    4 * v,
+                    5 * v,
+                    6 * v,
+                    7 * v,
+                    8 * v,
+                    9 * v,
+                    10 * v,
+                    11 * v,
+                    12 * v,
+                )
                 x = four(four(four(four(x, m, c), m, c), m, c), m, c)
-                values[i] = 0.01 * (x[0] + x[1] + x[2] + x[3] + x[4] + x[5] + x[6] + x[7] + x[8] + x[9] + x[10] + x[11])
+                values[i] = 0.01 * (
+                    x[0]
+                    + x[1]
+                    + x[2]
+                    + x[3]
+                    + x[4]
+                    + x[5]
+                    + x[6]
+                    + x[7]
+                    + x[8]
+                    + x[9]
+                    + x[10]
+                    + x[11]
+                )
 
     return burn
 
@@ -62,7 +95,8 @@ class Counted:
         return self
 
     def _times(self, other):
-        return self if isinstance(other, float) and other == 1.0 else self._count()  # the compiler removes it
+        # the compiler removes it
+        return self if isinstance(other, float) and other == 1.0 else self._count()
 
     __add__ = __radd__ = __sub__ = __rsub__ = __truediv__ = __rtruediv__ = _count
     __mul__ = __rmul__ = _times

@@ -6,9 +6,13 @@ import numpy as np
 
 
 def references(truth, points, options, name):
-    """[(parameters, options, {name: exact value}, None), ...] of points {parameter: (N)}, as a case gives them."""
+    """[(parameters, options, {name: exact value}, None), ...] of points {parameter: (N)}, as a case
+    gives them.
+    """
     size = max(np.size(values) for values in points.values())
-    given = {key: np.broadcast_to(np.asarray(values, float), size) for key, values in points.items()}
+    given = {
+        key: np.broadcast_to(np.asarray(values, float), size) for key, values in points.items()
+    }
     found = truth(given, _Silent(size))
     value, low, _doubt = found[name]
     exact = np.asarray(value + np.asarray(low), dtype=float)

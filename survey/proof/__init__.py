@@ -1,1 +1,3 @@
-"""Proofs of stability maps: what to state (`search`, `formulas`), and the program that proves it (`checker`)."""
+"""Proofs of stability maps: what to state (`search`, `formulas`), and the program that proves it
+(`checker`).
+"""

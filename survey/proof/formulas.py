@@ -1,7 +1,8 @@
-"""A user's z(u, p) as a formula that `survey-check` reads: its Python code, run on symbols instead of numbers.
+"""A user's z(u, p) as a formula that `survey-check` reads: its Python code, run on symbols instead
+of numbers.
 
-Decimal constants in the code are taken as the decimals that Python prints for them; constants that are simple multiples
-of pi to the last bit are taken as these.
+Decimal constants in the code are taken as the decimals that Python prints for them; constants that
+are simple multiples of pi to the last bit are taken as these.
 """
 
 import ast
@@ -22,7 +23,8 @@ LARGEST_DENOMINATOR = 12
 def formula(z, names, piece):
     """z(u, p) as text, in u and the `names` of p (or their decimals); raises Unsupported.
 
-    `piece`: the ends of the piece of u to which the formula applies: comparisons of u alone must turn out alike in it.
+    `piece`: the ends of the piece of u to which the formula applies: comparisons of u alone must
+    turn out alike in it.
     """
     low, high = piece
     samples = tuple(low + (high - low) * (i + 0.5) / TRIED for i in range(TRIED))
@@ -32,7 +34,9 @@ def formula(z, names, piece):
         raise
     except Exception as error:
         raise Unsupported(f"{type(error).__name__}: {error}") from None
-    return ast.unparse(ast.parse(found.text if isinstance(found, Symbol) else number(found), mode="eval"))
+    return ast.unparse(
+        ast.parse(found.text if isinstance(found, Symbol) else number(found), mode="eval")
+    )
 
 
 def number(value):
@@ -62,7 +66,9 @@ class Symbol:
         values = other.samples if isinstance(other, Symbol) else (float(other),) * TRIED
         samples = None
         if self.samples and values:
-            pairs = zip(*((values, self.samples) if swapped else (self.samples, values)), strict=True)
+            pairs = zip(
+                *((values, self.samples) if swapped else (self.samples, values)), strict=True
+            )
             samples = tuple(own(x, y) for x, y in pairs)
         return Symbol(f"({first} {operator} {second})", samples)
 
@@ -114,7 +120,9 @@ class Symbol:
         found = {holds(x) for x in difference.samples or ()}
         if len(found) != 1:
             raise Unsupported(
-                "it branches within a piece: name each position in BREAKS" if found else "it branches on a parameter"
+                "it branches within a piece: name each position in BREAKS"
+                if found
+                else "it branches on a parameter"
             )
         return found.pop()
 
@@ -169,4 +177,6 @@ def _call(name, x):
     if not isinstance(x, Symbol):
         return own(x)
     text = f"({x.text})" if "-{0}" in FUNCTIONS[name] or "*{0}" in FUNCTIONS[name] else x.text
-    return Symbol(FUNCTIONS[name].format(text), x.samples and tuple(own(value) for value in x.samples))
+    return Symbol(
+        FUNCTIONS[name].format(text), x.samples and tuple(own(value) for value in x.samples)
+    )

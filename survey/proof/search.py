@@ -1,8 +1,10 @@
-"""What a certificate states: panels on which few nodes suffice, and cells whose verdicts the checker will prove.
+"""What a certificate states: panels on which few nodes suffice, and cells whose verdicts the
+checker will prove.
 
-The nodes and the bounds are the checker's own (`survey.proof.checker`), in balls. The cells of a map are searched in
-binary64, many at a time, with a bound of all rounding: nothing is stated that does not hold with a margin. Those of a
-row, which are far smaller about its edges, are the checker's own, too.
+The nodes and the bounds are the checker's own (`survey.proof.checker`), in balls. The cells of a
+map are searched in binary64, many at a time, with a bound of all rounding: nothing is stated that
+does not hold with a margin. Those of a row, which are far smaller about its edges, are the
+checker's own, too.
 """
 
 import math
@@ -19,9 +21,12 @@ BITS = 96  # of the balls
 ORDERS = range(12, 80, 4)  # of the Taylor series
 NODES = (6, 8, 10, 12, 14, 16, 18, 20, 24, 28, 32, 36, 40)
 ELLIPSES = (1.6, 1.9, 2.3, 2.8, 3.5, 4.5, 6, 8, 12, 20)
-RATES = np.geomspace(0.03, 1.3, 10)  # least w relative to the square root of the largest |L11|, which are tried
-POWERS = {1: 1, 2: 1, 4: 1, 7: np.array([2, 2, 2, 2, 2, 2, 4])}  # of the growth in the factors, by their number
-SAMPLES, CHECKED = 96, 12  # positions in a piece that are sampled; every so many of their ends K and L must be analytic
+# least w relative to the square root of the largest |L11|, which are tried
+RATES = np.geomspace(0.03, 1.3, 10)
+# of the growth in the factors, by their number
+POWERS = {1: 1, 2: 1, 4: 1, 7: np.array([2, 2, 2, 2, 2, 2, 4])}
+# positions in a piece that are sampled; every so many of their ends K and L must be analytic
+SAMPLES, CHECKED = 96, 12
 UNIT = 2.0**-53
 PANEL = "."  # in a layout
 SMALLEST = 2  # halvings of a map's panel: for fewer cells it is not worth its nodes
@@ -29,11 +34,13 @@ PANELS = 10  # halvings of a row, at most, to find panels
 
 
 def plan(equation, sides, tolerance):
-    """A panel without its cells, on which the polynomials leave out less than `tolerance`, or than this part of the
-    largest factor that is found there; raises checker.Failed.
+    """A panel without its cells, on which the polynomials leave out less than `tolerance`, or than
+    this part of the largest factor that is found there; raises checker.Failed.
 
     `sides`: the ends of both, rational."""
-    sides = [(checker.exact((low + high) / 2), checker.exact((high - low) / 2)) for low, high in sides]
+    sides = [
+        (checker.exact((low + high) / 2), checker.exact((high - low) / 2)) for low, high in sides
+    ]
     allowed = tolerance * _scale(equation, sides)
     chosen = [_ellipse(equation, sides, name, allowed) for name in equation.names]
     nodes, ellipses, rates = zip(*chosen, strict=True)
@@ -47,7 +54,10 @@ def _scale(equation, sides):
     """The largest modulus of each factor at the middle and the corners of the sides, at least 1."""
     found = [np.ones(1)]
     for at in [(0,) * len(sides), *product((-1, 1), repeat=len(sides))]:
-        point = {n: centre + x * half for n, x, (centre, half) in zip(equation.names, at, sides, strict=True)}
+        point = {
+            n: centre + x * half
+            for n, x, (centre, half) in zip(equation.names, at, sides, strict=True)
+        }
         factors = equation.factors(equation.steps(point, ORDERS[4]), ORDERS[4], point)
         found.append(np.array([abs(float(f.mid())) for f in factors]))
     return reduce(np.maximum, found)
@@ -55,13 +65,20 @@ def _scale(equation, sides):
 
 def _ellipse(equation, sides, name, allowed):
     """(number of nodes, r, least w) for one parameter: the fewest nodes."""
-    tried, why = [], checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
+    tried, why = (
+        [],
+        checker.Failed("no ellipse has a small enough bound: smaller panels are needed"),
+    )
     for r in map(arb, ELLIPSES):
         length, entries = _sampled(equation, sides, name, r)
         if not np.isfinite(entries).all():  # they are singular in this ellipse, and in larger ones
             break
         for w in np.sqrt(abs(checker.blocks(entries)[1][0][0])).max() * RATES:
-            bound = 4 * np.max(_growth(length, entries, w) ** POWERS[len(allowed)] / allowed) / (float(r) - 1)
+            bound = (
+                4
+                * np.max(_growth(length, entries, w) ** POWERS[len(allowed)] / allowed)
+                / (float(r) - 1)
+            )
             n = next((n for n in NODES if bound * float(r) ** (1 - n) < 0.1), None)
             if n:
                 tried.append((n, bound * float(r) ** (1 - n), r, w))
@@ -72,7 +89,11 @@ def _ellipse(equation, sides, name, allowed):
         except checker.Failed as failed:
             why = failed
             continue
-        bound = 4 * max(float(x.upper()) / own for x, own in zip(grown, allowed, strict=True)) / (float(r) - 1)
+        bound = (
+            4
+            * max(float(x.upper()) / own for x, own in zip(grown, allowed, strict=True))
+            / (float(r) - 1)
+        )
         for more in NODES[NODES.index(n) :]:
             if bound * float(r) ** (1 - more) < 0.2:
                 return more, _rational(float(r), 10), least
@@ -92,14 +113,16 @@ def _best_of_each(tried):
 
 
 def _sampled(equation, sides, name, r):
-    """(the length of each sample of u, the entries of K and L at them on the border of the ellipse, each an array with
-    samples along its first axis), no bounds; NaN where they are singular."""
+    """(the length of each sample of u, the entries of K and L at them on the border of the ellipse,
+    each an array with samples along its first axis), no bounds; NaN where they are singular."""
     arcs, boxes = equation.cover(sides, name, r)
     arcs = [{key: x.mid() for key, x in place.items()} for place in arcs]
     lengths, rows = [], []
     for start, end, _, entries in equation.pieces:
         known = [start + (end - start) * (arb(k) / SAMPLES) for k in range(0, SAMPLES + 1, CHECKED)]
-        if not all(acb(f(u=u, **place)).is_finite() for u in known for place in boxes for f in entries):
+        if not all(
+            acb(f(u=u, **place)).is_finite() for u in known for place in boxes for f in entries
+        ):
             return np.array([1.0]), np.full((1, 1, 1), math.nan)
         for k in range(SAMPLES):
             u = start + (end - start) * (arb(2 * k + 1) / (2 * SAMPLES))
@@ -124,7 +147,10 @@ def _growth(length, entries, least):
 
 def _order(equation, sides, allowed):
     """The order at which the factors in the middle are known well enough."""
-    real = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, sides, strict=True)}
+    real = {
+        name: centre + half * arb(0, 1)
+        for name, (centre, half) in zip(equation.names, sides, strict=True)
+    }
     middle = {name: centre for name, (centre, _) in zip(equation.names, sides, strict=True)}
     for order in ORDERS:
         found = equation.factors(equation.steps(real, order), order, middle)
@@ -134,9 +160,11 @@ def _order(equation, sides, allowed):
 
 
 def panels(equation, sides, depth, tolerance, smallest=None):
-    """(layout, panels of the certificate) of a part of the rectangle, whose cells are halved at most `depth` times.
+    """(layout, panels of the certificate) of a part of the rectangle, whose cells are halved at
+    most `depth` times.
 
-    Where few nodes do not suffice, its quarters are proved instead, down to panels of `smallest` halvings.
+    Where few nodes do not suffice, its quarters are proved instead, down to panels of `smallest`
+    halvings.
     """
     row = len(sides) == 1
     if smallest is None:
@@ -150,7 +178,10 @@ def panels(equation, sides, depth, tolerance, smallest=None):
     except checker.Failed:
         if depth <= smallest:
             return PANEL, [open_panel(len(sides))]
-    parts = [panels(equation, part, depth - 1, tolerance, smallest) for part in reversed(checker.halved(sides))]
+    parts = [
+        panels(equation, part, depth - 1, tolerance, smallest)
+        for part in reversed(checker.halved(sides))
+    ]
     layouts, lists = zip(*parts, strict=True)
     found = [panel for some in lists for panel in some]
     if all(panel["cells"] == checker.OPEN for panel in found):
@@ -166,7 +197,9 @@ def row_cells(panel, depth):
         if letter == checker.OPEN:
             if not left:
                 return panel.edge(*cell) or letter
-            return checker.SPLIT + "".join(found(panel.cell(cell, (half,)), left - 1) for half in (0, 1))
+            return checker.SPLIT + "".join(
+                found(panel.cell(cell, (half,)), left - 1) for half in (0, 1)
+            )
         return letter
 
     return found(panel.cell(), depth)
@@ -183,7 +216,9 @@ def cells(panel, depth):
     """The certificate's cells of a checker's Panel, halved at most `depth` times."""
     tables, bounds, _ = zip(*panel.factors, strict=True)
     margins = [float(bound) for bound in bounds]
-    floats = [np.array([[float(x.mid()) for x in row] for row in table.tolist()]) for table in tables]
+    floats = [
+        np.array([[float(x.mid()) for x in row] for row in table.tolist()]) for table in tables
+    ]
     rounding = [
         max(float(x.rad().upper()) for x in table.entries()) + 4 * UNIT * abs(values).max()
         for table, values in zip(tables, floats, strict=True)
@@ -192,14 +227,17 @@ def cells(panel, depth):
 
 
 class Search:
-    """Level by level: the cells that are not decided, each with the coefficients of the factors of unknown sign."""
+    """Level by level: the cells that are not decided, each with the coefficients of the factors of
+    unknown sign.
+    """
 
     def __init__(self, panel, floats, margins, rounding, depth):
         self.panel, self.depth, self.margins, self.rounding = panel, depth, margins, list(rounding)
         self.largest = [abs(values).max() for values in floats]
         self.halves = [_halving(n) for n in panel.counts]
         self.signs = np.zeros((1, len(floats)), np.int8)
-        self.tables = [(np.zeros(1, int), values[None]) for values in floats]  # (cells, their coefficients)
+        # (cells, their coefficients)
+        self.tables = [(np.zeros(1, int), values[None]) for values in floats]
 
     def run(self):
         """The cells as a text."""
@@ -220,7 +258,9 @@ class Search:
             margin = (self.margins[factor] + self.rounding[factor]) * (1 + 1e-9)
             low, high = table.min((1, 2)), table.max((1, 2))
             self.signs[index, factor] = np.where(low > margin, 1, np.where(high < -margin, -1, 0))
-        letters = np.array([checker.verdict(dict(enumerate(signs))) for signs in self.signs.tolist()])
+        letters = np.array(
+            [checker.verdict(dict(enumerate(signs))) for signs in self.signs.tolist()]
+        )
         return letters if last else np.where(letters == checker.OPEN, checker.SPLIT, letters)
 
     def _split(self, going):
@@ -233,13 +273,19 @@ class Search:
             quarters = np.empty((len(index), 4, *table.shape[1:]))
             for at, (upper, right) in enumerate(product((0, 1), repeat=2)):
                 quarters[:, at] = self.halves[0][right] @ table @ self.halves[1][upper].T
-            self.tables[factor] = (4 * index[:, None] + np.arange(4)).ravel(), quarters.reshape(-1, *table.shape[1:])
+            self.tables[factor] = (
+                (4 * index[:, None] + np.arange(4)).ravel(),
+                quarters.reshape(-1, *table.shape[1:]),
+            )
             self.rounding[factor] += 2 * (sum(table.shape[1:]) + 2) * UNIT * self.largest[factor]
 
 
 def _halving(n):
     """The checker's matrices in binary64, in which they are exact."""
-    return [np.array([[float(x.mid()) for x in row] for row in half.tolist()]) for half in checker.halving(n)]
+    return [
+        np.array([[float(x.mid()) for x in row] for row in half.tolist()])
+        for half in checker.halving(n)
+    ]
 
 
 def _text_of(levels):
@@ -248,6 +294,10 @@ def _text_of(levels):
     for letters in reversed(levels[:-1]):
         below, found = iter(texts), []
         for letter in letters.tolist():
-            found.append(letter + "".join(next(below) for _ in range(4)) if letter == checker.SPLIT else letter)
+            found.append(
+                letter + "".join(next(below) for _ in range(4))
+                if letter == checker.SPLIT
+                else letter
+            )
         texts = found
     return texts[0]

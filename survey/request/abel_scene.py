@@ -109,15 +109,24 @@ class AbelScene(FunctionScene):
         panels = orbit.ON_PLANE if self.period is None else orbit.ON_CYLINDER
         request = Request({"question": "trajectory"}, rtol=1e-9)
         names = [p.name for p in self.own]
-        flow = None if self.period is None else self.flows(np.array([[point[name] for name in names]]))[0]
-        return orbit.solve(lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels, flow)
+        flow = (
+            None
+            if self.period is None
+            else self.flows(np.array([[point[name] for name in names]]))[0]
+        )
+        return orbit.solve(
+            lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels, flow
+        )
 
     def flows(self, points):
         """The programs of the parameters (N, n)."""
         try:
             return equation.flows(self.f, self.g, points, self.period is not None)
         except Unsupported as error:
-            self._refuse(str(error), "f and g must be analytic in phi: + - * / ** and functions such as sin, exp, sqrt")
+            self._refuse(
+                str(error),
+                "f and g must be analytic in phi: + - * / ** and functions such as sin, exp, sqrt",
+            )
         except equation.Raised as error:
             self._refuse(f"{error}(phi, p) raises {error.__cause__!r}", "make it return nan there")
 
@@ -136,7 +145,10 @@ class AbelScene(FunctionScene):
                 "correct it, or set PERIOD = None",
             )
         if lost.size == len(points):
-            self._refuse(f"f or g is undefined at {self._where(points[0])}", "correct it, or the domains of PARAMETERS")
+            self._refuse(
+                f"f or g is undefined at {self._where(points[0])}",
+                "correct it, or the domains of PARAMETERS",
+            )
 
     def _finite(self, point):
         """Have f and g values at these parameters?"""
@@ -158,6 +170,8 @@ class AbelScene(FunctionScene):
             except IndexError as error:
                 self._refuse_index(f"{name}(phi, p)", error)
             except Exception as error:
-                self._refuse(f"{name}(phi, p) fails ({type(error).__name__}: {reason(error)})", "correct it")
+                self._refuse(
+                    f"{name}(phi, p) fails ({type(error).__name__}: {reason(error)})", "correct it"
+                )
             if not is_number(value):
                 self._refuse(f"{name}(phi, p) returns {value!r}", "it must return a real number")

@@ -17,7 +17,9 @@ def check_size(axes):
     """Raise BadInput for a map of too many points, before any is made."""
     points = prod(axis.num if isinstance(axis, Spread) else 1 for axis in axes.values())
     if points > MAX_POINTS:
-        raise BadInput(f"the axes span {points:.3g} points; a map holds at most {MAX_POINTS:.0e}; use fewer")
+        raise BadInput(
+            f"the axes span {points:.3g} points; a map holds at most {MAX_POINTS:.0e}; use fewer"
+        )
 
 
 def as_float(key, number):
@@ -44,14 +46,18 @@ def values_of(key, axis):
 
 
 def check_domain(parameter, values, outputs, others=(), given=()):
-    """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain for these outputs.
+    """Raise BadInput if a single value or an end of an axis lies outside the parameter's domain for
+    these outputs.
 
-    `others`: names of the parameters that may take its place; `given`: those of the axes as they were given.
+    `others`: names of the parameters that may take its place; `given`: those of the axes as they
+    were given.
     """
     ends = np.atleast_1d(values)[[0, -1]]
     for value in ends[~parameter.holds(ends, outputs)]:
         what = "is" if np.ndim(values) == 0 else "has an end"
-        instead = f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
+        instead = (
+            f"; instead of {parameter.name} you can give {' or '.join(others)}" if others else ""
+        )
         raise BadInput(
             f"axes.{parameter.name} {what} {value:g}, outside its domain; allowed: {parameter.domain}"
             f"{physical.hint(parameter, float(value), given)}{instead}"
@@ -61,7 +67,11 @@ def check_domain(parameter, values, outputs, others=(), given=()):
 def grid_of(parameters, given):
     """The grid of the workflow's axes (their order is that of the dimensions), fixed numbers and defaults."""
     axes = {key: values for key, values in given.items() if np.ndim(values)}
-    fixed = {key: given.get(key, parameter.default) for key, parameter in parameters.items() if key not in axes}
+    fixed = {
+        key: given.get(key, parameter.default)
+        for key, parameter in parameters.items()
+        if key not in axes
+    }
     return Grid(
         sizes={key: values.size for key, values in axes.items()},
         parameters={key: ((key,), values) for key, values in axes.items()}

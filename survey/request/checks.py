@@ -15,27 +15,43 @@ from survey.wording import short, shown
 
 
 def check_options(scene, given, parameters=(), table=""):
-    """Every option that exists beside the given `parameters`, with its value; raises BadInput for an unknown one."""
+    """Every option that exists beside the given `parameters`, with its value; raises BadInput for
+    an unknown one.
+    """
     known = {option.name: option for option in scene.OPTIONS}
     for key, value in given.items():
         if key not in known:
             if key in {p.name for p in scene.PARAMETERS}:
                 raise BadInput(f"{table}{key} is a parameter, not an option; put it under [axes]")
-            raise BadInput(f"{table}{short(key, 40)}: {modules.unknown('option', key, sorted(known))}")
+            raise BadInput(
+                f"{table}{short(key, 40)}: {modules.unknown('option', key, sorted(known))}"
+            )
         option, text = known[key], value if isinstance(value, str) else shown(value)
         if text not in option.choices:
             raise BadInput(f"{table}{key}: {modules.unknown('value', text, list(option.choices))}")
         if option.replaced_by in parameters:
-            raise BadInput(f"{table}{key} and {option.replaced_by} specify the same thing; give only one of them")
+            raise BadInput(
+                f"{table}{key} and {option.replaced_by} specify the same thing; give only one of them"
+            )
         if option.only_with and option.only_with not in parameters:
-            raise BadInput(f"{table}{key} requires the parameter {option.only_with}; give that too, or leave this out")
-    exist = [o for o in known.values() if o.replaced_by not in parameters and o.only_with in ("", *parameters)]
+            raise BadInput(
+                f"{table}{key} requires the parameter {option.only_with}; give that too, or leave this out"
+            )
+    exist = [
+        o
+        for o in known.values()
+        if o.replaced_by not in parameters and o.only_with in ("", *parameters)
+    ]
     values = {option.name: str(given.get(option.name, option.default)) for option in exist}
     for option in exist:
         if not exists(option, values):
             if option.name in given:
-                allowed = ", ".join(f"{key} = {' | '.join(them)}" for key, them in option.when.items())
-                raise BadInput(f"{table}{option.name} exists only with {allowed}; change that, or leave this out")
+                allowed = ", ".join(
+                    f"{key} = {' | '.join(them)}" for key, them in option.when.items()
+                )
+                raise BadInput(
+                    f"{table}{option.name} exists only with {allowed}; change that, or leave this out"
+                )
             del values[option.name]
     return values
 
@@ -48,9 +64,13 @@ def check_parameters(scene, name, options, given, table=""):
     for key in given:
         if key not in known:
             if key in {option.name for option in scene.OPTIONS}:
-                raise BadInput(f"{table}{key} is an option of {name}, not a parameter; put it under [options]")
+                raise BadInput(
+                    f"{table}{key} is an option of {name}, not a parameter; put it under [options]"
+                )
             if key in all_of:
-                raise BadInput(f"{table}{key} {_why_excluded(scene, all_of[key].when, key, given, table)}")
+                raise BadInput(
+                    f"{table}{key} {_why_excluded(scene, all_of[key].when, key, given, table)}"
+                )
             raise BadInput(f"{table}{short(key, 40)}: {unknown_parameter(name, key, list(known))}")
         original = known[key].instead_of or key
         if original in replaced:
@@ -73,7 +93,9 @@ def check_parameters(scene, name, options, given, table=""):
 
 
 def _why_excluded(scene, when, key, given, table):
-    """Why a parameter that exists `when` cannot be combined with the `given` ones, naming the one in its way."""
+    """Why a parameter that exists `when` cannot be combined with the `given` ones, naming the one
+    in its way.
+    """
     options = {option.name: option.only_with for option in scene.OPTIONS}
     for name, allowed in when.items():
         if not any(allowed) and options[name] in given:
@@ -83,27 +105,39 @@ def _why_excluded(scene, when, key, given, table):
 
 def unknown_parameter(scene, key, known):
     """One line for a parameter that the scene of this name does not have."""
-    return modules.unknown(f"parameter of scene {scene}", key, known, more=("rtol", "method", "variables"))
+    return modules.unknown(
+        f"parameter of scene {scene}", key, known, more=("rtol", "method", "variables")
+    )
 
 
 def check_request(scene, options, method, rtol, variables, tables=("", "")):
     """The Request; raises BadInput for an unknown method or variable, or an rtol outside (0, 1)."""
     _check_method(scene, options, method, tables[0])
     if isinstance(rtol, bool) or not isinstance(rtol, Real) or not 0 < rtol < 1:
-        raise BadInput(f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10")
+        raise BadInput(
+            f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10"
+        )
     existing = [output for output in scene.OUTPUTS if exists(output, options)]
     outputs = [output.name for output in existing]
     for variable in variables or ():
         if not isinstance(variable, str) or variable not in outputs:
-            raise BadInput(f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}")
-    wanted = [output.name for output in existing if not output.on_request] if variables is None else variables
+            raise BadInput(
+                f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}"
+            )
+    wanted = (
+        [output.name for output in existing if not output.on_request]
+        if variables is None
+        else variables
+    )
     return Request(options, method, float(rtol), frozenset(wanted))
 
 
 def _check_method(scene, options, method, table):
     """Raise BadInput for a method that is unknown or does not support these options."""
     if not isinstance(method, str):
-        raise BadInput(f"{table}method: {modules.unknown('method', method, ['auto', *methods_of(scene, options)])}")
+        raise BadInput(
+            f"{table}method: {modules.unknown('method', method, ['auto', *methods_of(scene, options)])}"
+        )
     if method == "auto":
         return  # the methods' modules need not be imported
     applicable = methods_of(scene, options)
@@ -112,13 +146,19 @@ def _check_method(scene, options, method, table):
     if method not in methods_of(scene):
         raise BadInput(f"{table}method: {modules.unknown('method', method, ['auto', *applicable])}")
     given = ", ".join(f"{name} = {value}" for name, value in options.items())
-    raise BadInput(f"{table}method: {method!r} does not support {given} (allowed: {', '.join(['auto', *applicable])})")
+    raise BadInput(
+        f"{table}method: {method!r} does not support {given} (allowed: {', '.join(['auto', *applicable])})"
+    )
 
 
 def methods_of(scene, options=None):
-    """Names of the methods that serve the scene's family (and these option values), found by walking their folder."""
+    """Names of the methods that serve the scene's family (and these option values), found by
+    walking their folder.
+    """
     found = {name: measures.method(name) for name in modules.names(survey.methods)}
-    return [name for name, m in found.items() if scene.FAMILY in m.SERVES and _fits(scene, m, options)]
+    return [
+        name for name, m in found.items() if scene.FAMILY in m.SERVES and _fits(scene, m, options)
+    ]
 
 
 def _fits(scene, method, options):

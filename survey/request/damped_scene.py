@@ -1,6 +1,8 @@
-"""The scene of y'' + 2 c y' + z(u, p) y = 0, with y = e^(-c u) x: x'' + (z - c^2) x = 0 is Hill's equation.
+"""The scene of y'' + 2 c y' + z(u, p) y = 0, with y = e^(-c u) x: x'' + (z - c^2) x = 0 is Hill's
+equation.
 
-The multipliers are those of x times e^(-c T), so that the damped motion grows by the exponent of x less c T.
+The multipliers are those of x times e^(-c T), so that the damped motion grows by the exponent of x
+less c T.
 """
 
 from collections.abc import Callable
@@ -28,7 +30,9 @@ ROUNDING = 8.0 * EPS  # of c T and of e^(-c T), relative
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DampedScene(FunctionScene):
-    """What a scene's module offers (see `survey.scenes`); `damping` is c, or the place of the parameter that is c."""
+    """What a scene's module offers (see `survey.scenes`); `damping` is c, or the place of the
+    parameter that is c.
+    """
 
     z: Callable
     damping: float | None
@@ -52,7 +56,11 @@ class DampedScene(FunctionScene):
     @property
     def OUTPUTS(self):
         """Those of Hill's equation that have a meaning here, and the exponent of the damped motion."""
-        kept = (replace(o, long_name=WORDS.get(o.name, o.long_name)) for o in monodromy.OUTPUTS if o.name in KEPT)
+        kept = (
+            replace(o, long_name=WORDS.get(o.name, o.long_name))
+            for o in monodromy.OUTPUTS
+            if o.name in KEPT
+        )
         grows = "growth exponent of the amplitude per period, negative where all motions decay"
         return (*kept, Output("exponent", grows, r"\mu T"))
 
@@ -78,14 +86,26 @@ class DampedScene(FunctionScene):
         wanted = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
         out = self._inner.solve(point, replace(request, variables=wanted))
         c, turn, bar = self._loss(point, out)
-        exponent, off = out["exponent"] - turn, out["exponent_error"] + bar + EPS * abs(out["exponent"])
+        exponent, off = (
+            out["exponent"] - turn,
+            out["exponent_error"] + bar + EPS * abs(out["exponent"]),
+        )
         certain = np.where(exponent + off < 0.0, 1, np.where(exponent - off > 0.0, 0, -1))
-        verdict = np.where(c == 0.0, out["verdict"], np.where(out["status"] == status.OK, certain, -1))
+        verdict = np.where(
+            c == 0.0, out["verdict"], np.where(out["status"] == status.OK, certain, -1)
+        )
         with np.errstate(over="ignore", invalid="ignore"):
             factor = np.exp(-turn)
             trace = out["discriminant"] * factor
-            error = factor * out["discriminant_error"] + abs(trace) * (np.expm1(2.0 * bar) + ROUNDING)
-        known = {"discriminant": trace, "discriminant_error": error, "exponent": exponent, "exponent_error": off}
+            error = factor * out["discriminant_error"] + abs(trace) * (
+                np.expm1(2.0 * bar) + ROUNDING
+            )
+        known = {
+            "discriminant": trace,
+            "discriminant_error": error,
+            "exponent": exponent,
+            "exponent_error": off,
+        }
         return {**out, **known, "verdict": verdict.astype(np.int8)}
 
     def _loss(self, point, out):
@@ -109,7 +129,9 @@ class DampedScene(FunctionScene):
 
     def why(self, answer):
         """Why the point has its verdict (see `survey.scenes`)."""
-        sign = {"stable": "< 0: all motions decay", "unstable": "> 0: one grows"}.get(answer["verdict"], "is open")
+        sign = {"stable": "< 0: all motions decay", "unstable": "> 0: one grows"}.get(
+            answer["verdict"], "is open"
+        )
         return f"{named(answer, 'exponent')} per period {sign}"
 
 
@@ -128,6 +150,10 @@ def checked_damping(damping, refuse):
         if not damping.isidentifier():
             refuse(f"damping = {damping!r}: it must be a number or the name of a parameter")
         return None, damping
-    if isinstance(damping, bool) or not isinstance(damping, (int, float, np.number)) or not np.isfinite(damping):
+    if (
+        isinstance(damping, bool)
+        or not isinstance(damping, (int, float, np.number))
+        or not np.isfinite(damping)
+    ):
         refuse(f"damping = {damping!r}: it must be a finite number, or the name of a parameter")
     return float(damping), None

@@ -18,21 +18,27 @@ FURTHER = ("boundaries", "refine")  # found anew
 
 
 def find(workflow, path, fresh=False):
-    """(survey.sweep.reuse.Earlier or None, a sentence on how much of the file at `path` is taken over, or why not).
+    """(survey.sweep.reuse.Earlier or None, a sentence on how much of the file at `path` is taken
+    over, or why not).
 
-    Raises BadInput or Damaged if there is no survey in the file, or if it is finished, nothing is taken from it and the
-    run would replace it without being `fresh`.
+    Raises BadInput or Damaged if there is no survey in the file, or if it is finished, nothing is
+    taken from it and the run would replace it without being `fresh`.
     """
     ds = reading.load(Path(path))
     found, why = None, _unlike(workflow, ds.attrs)
     if not why:
         found, why = _common(workflow, ds, Path(path))
     if why and not (fresh or finished.lost(ds.attrs)) and _is_output(workflow, path):
-        remedy = "write another file with -o, or replace it with --fresh (in Python output=, fresh=True)"
+        remedy = (
+            "write another file with -o, or replace it with --fresh (in Python output=, fresh=True)"
+        )
         raise BadInput(f"{path}: nothing can be taken from this file: {why}; {remedy}")
     if why:
         return None, f"{path}: nothing is taken from this file: {why}"
-    return found, f"{path}: {found.points:,} of {workflow.grid.points:,} points are taken from this file"
+    return (
+        found,
+        f"{path}: {found.points:,} of {workflow.grid.points:,} points are taken from this file",
+    )
 
 
 def _is_output(workflow, path):
@@ -65,15 +71,23 @@ def _unlike(workflow, attributes):
 
 
 def _checked(workflow, attributes):
-    """The workflow of the file, as this version of the code understands it, with our scene: it may name code."""
-    data = {key: table for key, table in tomllib.loads(attributes["workflow"]).items() if key not in FURTHER}
+    """The workflow of the file, as this version of the code understands it, with our scene: it may
+    name code.
+    """
+    data = {
+        key: table
+        for key, table in tomllib.loads(attributes["workflow"]).items()
+        if key not in FURTHER
+    }
     data.get("output", {}).pop("figures", None)
     ours = workflow.scene if hasattr(workflow.scene, "HASH") else workflow.name
     return workflows.check(data | {"scene": ours}, output=workflow.path)
 
 
 def _common(workflow, ds, path):
-    """(the Earlier, "") of the points that are in both; (None, why) where there are none, or their bits differ."""
+    """(the Earlier, "") of the points that are in both; (None, why) where there are none, or their
+    bits differ.
+    """
     old, new = _checked(workflow, ds.attrs).grid, workflow.grid
     if old.parameters.keys() != new.parameters.keys():
         return None, "it has other parameters"
@@ -88,7 +102,10 @@ def _common(workflow, ds, path):
             where[name] = place
         elif name in old.sizes:
             fixed[name] = int(place[0])
-    where, shared = {dim: where[dim] for dim in new.sizes}, tuple(dim for dim in new.sizes if dim in old.sizes)
+    where, shared = (
+        {dim: where[dim] for dim in new.sizes},
+        tuple(dim for dim in new.sizes if dim in old.sizes),
+    )
     found = Earlier(str(path.absolute()), path.stat().st_mtime_ns, where, shared, fixed)
     why = reuse.obstacle(workflow.scene, workflow.request, new, found, old)
     return (None, why) if why else (found, "")

@@ -25,7 +25,9 @@ STATUS = {
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FloquetScene(TracedScene):
-    """What a scene's module offers (see `survey.scenes`), for a user's A, or M, C, K; `about` is its docstring."""
+    """What a scene's module offers (see `survey.scenes`), for a user's A, or M, C, K; `about` is
+    its docstring.
+    """
 
     matrices: dict[str, Callable]
     period: float | Callable
@@ -33,7 +35,8 @@ class FloquetScene(TracedScene):
     states: tuple[str, ...]
     structure: str
     conserved: tuple[float, ...] | Callable | None
-    _known: dict[str, float] = field(default_factory=dict, repr=False)  # by the last check, for the cost
+    # by the last check, for the cost
+    _known: dict[str, float] = field(default_factory=dict, repr=False)
     FAMILY = "floquet"
     AUDIT = ("dop853",)
     OPTIONS = ()
@@ -43,14 +46,21 @@ class FloquetScene(TracedScene):
     @cached_property
     def _system(self):
         return System(
-            self.matrices, len(self.states), self.period, self.breaks, self.structure == "symplectic", self.conserved
+            self.matrices,
+            len(self.states),
+            self.period,
+            self.breaks,
+            self.structure == "symplectic",
+            self.conserved,
         )
 
     @property
     def OUTPUTS(self):
         """The outputs; Krein signs and indices where the system is symplectic."""
         symplectic = self.structure == "symplectic"
-        return tuple(o for o in stability.OUTPUTS if symplectic or o.name not in stability.SYMPLECTIC)
+        return tuple(
+            o for o in stability.OUTPUTS if symplectic or o.name not in stability.SYMPLECTIC
+        )
 
     @property
     def DIMENSIONS(self):
@@ -75,32 +85,54 @@ class FloquetScene(TracedScene):
         longest = sorted(sizes.values())[-2:]
         if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
             return alone
-        # what series do not answer: by more multipliers inside the circle the radius is lost sooner than by pairs on it
+        # what series do not answer: by more multipliers inside the circle the radius is lost sooner
+        # than by pairs on it
         left = 0.05 if self.structure != "none" else min(0.05 + 0.1 * (n - 1), 1.0)
         return 1e-7 * n + (left + NODES / np.prod(longest)) * alone
 
     @property
     def curves_seconds(self):
-        """Seconds that the curves of a map take, roughly: a lattice, and points of curves, most of them in narrow
-        tongues, which damped systems do not have; measured on the examples in `workflows`."""
-        return 1e4 * self._alone + 0.03 * len(self.states) ** 3 * (1.0 if self.structure == "none" else 7.0)
+        """Seconds that the curves of a map take, roughly: a lattice, and points of curves, most of
+        them in narrow tongues, which damped systems do not have; measured on the examples in
+        `workflows`."""
+        return 1e4 * self._alone + 0.03 * len(self.states) ** 3 * (
+            1.0 if self.structure == "none" else 7.0
+        )
 
     @property
     def _alone(self):
         """Seconds of a point on its own."""
         n = len(self.states)
         further = max(self._known.get("series", 2.0) - 2.0, 0.0)  # besides 1 and a function of time
-        return 2e-5 + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0)) + 1e-6 * n**2 + 1e-7 * n**3
+        return (
+            2e-5
+            + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0))
+            + 1e-6 * n**2
+            + 1e-7 * n**3
+        )
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
         points, shape = self._points(point)
         points = points.reshape(*shape, -1)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
-        lines = {k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)}
-        ranges = {k: request.ranges[p.name] for k, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        lines = {
+            k: request.line(p.name) for k, p in enumerate(self.PARAMETERS) if request.line(p.name)
+        }
+        ranges = {
+            k: request.ranges[p.name]
+            for k, p in enumerate(self.PARAMETERS)
+            if p.name in request.ranges
+        }
         free = {k for k, p in enumerate(self.PARAMETERS) if p.name not in request.fixed}
-        given = (points, request.method, request.rtol, wanted, lines, ranges if set(ranges) == free else {})
+        given = (
+            points,
+            request.method,
+            request.rtol,
+            wanted,
+            lines,
+            ranges if set(ranges) == free else {},
+        )
         return self._called(stability.solve, self._system, self.structure, *given)
 
     def is_analytic(self, point):
@@ -109,7 +141,9 @@ class FloquetScene(TracedScene):
         return self._called(dense.is_analytic, self._system, given)
 
     def judged(self, values, axes, fixed, M, E):
-        """M and E (N, n, n) without the multiplier of what is conserved, at `values` (N, len(axes)) of the axes."""
+        """M and E (N, n, n) without the multiplier of what is conserved, at `values` (N, len(axes))
+        of the axes.
+        """
         if self.conserved is None:
             return M, E
         given = fixed | {name: values[:, k] for k, name in enumerate(axes)}
@@ -135,9 +169,15 @@ class FloquetScene(TracedScene):
 
     def _why_never(self, answer):
         """What to state of a system whose multipliers have the product 1, so that none is stable without."""
-        if self.structure != "none" or self.conserved is not None or "multiplier_re_error" not in answer:
+        if (
+            self.structure != "none"
+            or self.conserved is not None
+            or "multiplier_re_error" not in answer
+        ):
             return ""
-        product = np.prod(np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"]))
+        product = np.prod(
+            np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"])
+        )
         if not abs(product - 1.0) < 1e-6:
             return ""
         return '; their product is 1: state the structure if the system is Hamiltonian ("symplectic") or "reversible"'
@@ -156,7 +196,9 @@ class FloquetScene(TracedScene):
         return self._called(motion.solve, self._system, self.states, points, answer, time)
 
     def check(self, points):
-        """Raise BadInput if A cannot be used, or contradicts the scene's other entries at these points (N, n)."""
+        """Raise BadInput if A cannot be used, or contradicts the scene's other entries at these
+        points (N, n).
+        """
         given = points if len(points) else np.ones((1, len(self.PARAMETERS)))
         for point in given:
             self._try(point)
@@ -168,7 +210,9 @@ class FloquetScene(TracedScene):
                 self._called(system.traced, given, edges)
             return
         if np.isnan(period).all():
-            self._refuse(f"PERIOD is not a positive number at {self._where(points[0])}", "make it positive")
+            self._refuse(
+                f"PERIOD is not a positive number at {self._where(points[0])}", "make it positive"
+            )
         known = np.flatnonzero(np.isfinite(edges).all(axis=1))
         groups = self._called(system.traced, given[known], edges[known])
         followed = np.concatenate([[], *(own for own, _ in groups)]).astype(int)
@@ -192,17 +236,24 @@ class FloquetScene(TracedScene):
             )
 
     def _compare(self, programs, point, period, edges):
-        """Refuse what the recorded operations show: another value than the code's, no period, no structure."""
+        """Refuse what the recorded operations show: another value than the code's, no period, no
+        structure.
+        """
         n, size, plain, recorded, bars = len(self.states), 0.0, [], [], []
         for k, program in enumerate(programs):
             t = edges[k] + (edges[k + 1] - edges[k]) * (0.01 + 0.98 * TRIED)
             A, E = program.at(point[None], t[None], n)
             recorded.append(A[0])
             bars.append(E[0])
-            plain.append(None if "A" not in self.matrices else [self._plain("A", time, point) for time in t])
+            plain.append(
+                None if "A" not in self.matrices else [self._plain("A", time, point) for time in t]
+            )
         size = max(abs(A).max() for A in recorded)
         if not np.isfinite(size):
-            self._refuse(f"A has no finite value at {self._where(point)}", "correct it, or the domains of PARAMETERS")
+            self._refuse(
+                f"A has no finite value at {self._where(point)}",
+                "correct it, or the domains of PARAMETERS",
+            )
         for own, bar, other in zip(recorded, bars, plain, strict=True):
             if other is not None and not (abs(own - np.array(other)) <= SAME * size + bar).all():
                 self._refuse(
@@ -222,11 +273,19 @@ class FloquetScene(TracedScene):
         some = {}
         for name, function in self.matrices.items():
             shape = 2 * (self._size_of(name),)
-            some[name] = np.abs([self._of(function, (float(t), p), shape) for p in points for t in times]).max(axis=0)
+            some[name] = np.abs(
+                [self._of(function, (float(t), p), shape) for p in points for t in times]
+            ).max(axis=0)
         for name, size in some.items():
-            if not size.any() and (name != "C" or rebinds(self.matrices[name])):  # no damping may be said by a C
-                self._refuse(f"{name}(t, p, out) leaves out all 0", "fill its entries: out[0, 0] = ..., not out = ...")
-        used = sum(size - np.diag(np.diag(size)) if name == "M" else size for name, size in some.items())
+            # no damping may be said by a C
+            if not size.any() and (name != "C" or rebinds(self.matrices[name])):
+                self._refuse(
+                    f"{name}(t, p, out) leaves out all 0",
+                    "fill its entries: out[0, 0] = ..., not out = ...",
+                )
+        used = sum(
+            size - np.diag(np.diag(size)) if name == "M" else size for name, size in some.items()
+        )
         for k in np.flatnonzero(~(used.any(axis=0) | used.any(axis=1))):
             added = ", to which velocities are added" if "A" not in some else ""
             self._refuse(
@@ -240,8 +299,12 @@ class FloquetScene(TracedScene):
         w = self._called(system.weights, given)
         points = self._called(monodromy.Points, system, given)
         if not (np.isfinite(w).all() and (w != 0.0).any(axis=1).all()):
-            self._refuse("CONSERVED must be numbers, not all 0", "name the coefficients of the states")
-        found = monodromy.solve(points, monodromy.method_of("auto"), 1e-10, np.ones(len(given)), some, sharp=False)
+            self._refuse(
+                "CONSERVED must be numbers, not all 0", "name the coefficients of the states"
+            )
+        found = monodromy.solve(
+            points, monodromy.method_of("auto"), 1e-10, np.ones(len(given)), some, sharp=False
+        )
         for i in np.flatnonzero(points.valid):
             off, bar = abs(w[i] @ found.M[i] - w[i]), abs(w[i]) @ found.E[i]
             if not (off <= bar + SAME * abs(w[i]).max() * (1.0 + abs(found.M[i]).max())).all():
@@ -265,7 +328,8 @@ class FloquetScene(TracedScene):
         """Refuse A unless signs r of the states exist with r_i r_j A_ij(-t) = -A_ij(t)."""
         times = edges[-1] * (0.013 + 0.97 * TRIED)
         there, back = (
-            np.array([self._at(programs, point, edges, t) for t in some]) for some in (times, edges[-1] - times)
+            np.array([self._at(programs, point, edges, t) for t in some])
+            for some in (times, edges[-1] - times)
         )
         odd, even = (abs(back + sign * there).max(axis=0) <= SAME * size for sign in (1, -1))
         if alike_or_opposite(odd, even) is None:
@@ -280,7 +344,10 @@ class FloquetScene(TracedScene):
 
     def _check_period(self, point, period, size):
         for name in self.matrices:
-            one, two = ([self._plain(name, t + shift, point) for t in TRIED * period] for shift in (0.0, period))
+            one, two = (
+                [self._plain(name, t + shift, point) for t in TRIED * period]
+                for shift in (0.0, period)
+            )
             off = abs(np.array(one) - np.array(two)).max()
             largest = max(size, abs(np.array(one)).max())
             if not off <= SAME * largest:
@@ -306,8 +373,8 @@ class FloquetScene(TracedScene):
 
 
 def _effort(points):
-    """{"series": functions of time in A, "steps": in a period}: the means over some Points, by which a point's cost
-    goes."""
+    """{"series": functions of time in A, "steps": in a period}: the means over some Points, by
+    which a point's cost goes."""
     reach, valid = monodromy.method_of("auto").floquet_reach(1e-10), np.flatnonzero(points.valid)
     if not valid.size:
         return {}

@@ -15,13 +15,26 @@ _KEYS = re.compile(
     r"\b(PARAMETERS|PERIOD|EVEN|BREAKS|STATES|STRUCTURE|CONSERVED|START|CONTINUATION|REVERSED|HELD|TRANSVERSE|DAMPING)\b"
 )
 # Beginnings of those lines of numba's messages that do not say what is wrong.
-CHATTER = ("Failed in", "During", "This error", "There are", "- Of which", "Overload", "File ", "Unknown", "^", "[1]")
+CHATTER = (
+    "Failed in",
+    "During",
+    "This error",
+    "There are",
+    "- Of which",
+    "Overload",
+    "File ",
+    "Unknown",
+    "^",
+    "[1]",
+)
 _known = {}  # by hash: a worker process compiles a scene once, for all of its blocks
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FunctionScene:
-    """Base of the scenes of a user's functions; `own`: the functions' parameters, `about`: the scene's docstring."""
+    """Base of the scenes of a user's functions; `own`: the functions' parameters, `about`: the
+    scene's docstring.
+    """
 
     own: tuple[Parameter, ...]
     NAME: str
@@ -59,13 +72,22 @@ class FunctionScene:
         yield "scene", self.NAME
         for p in self.PARAMETERS:
             default = "" if p.default is None else f", default {p.default:g}"
-            yield p.name, f"{p.long_name}, {p.domain}{default}" if p.long_name != p.name else f"{p.domain}{default}"
+            yield (
+                p.name,
+                f"{p.long_name}, {p.domain}{default}"
+                if p.long_name != p.name
+                else f"{p.domain}{default}",
+            )
         for option in self.OPTIONS:
             yield option.name, f"{' | '.join(option.choices)} (default {option.default})"
         yield "outputs", ", ".join(dict.fromkeys(o.name for o in self.OUTPUTS))
 
     def __reduce__(self):
-        return _restored, (type(self), self.HASH, {field.name: getattr(self, field.name) for field in fields(self)})
+        return _restored, (
+            type(self),
+            self.HASH,
+            {field.name: getattr(self, field.name) for field in fields(self)},
+        )
 
     def _points(self, point):
         """The parameters of the functions at the points of a block (N, n), and the block's shape."""
@@ -82,20 +104,31 @@ class FunctionScene:
     def _refuse_name(self, call):
         """Refuse a function that takes p, or x, for a mapping."""
         if "x, p" in call:
-            self._refuse(f"{call} accesses an array by a name, but x and p hold numbers", "write x[0], ..., p[0], ...")
-        self._refuse(f"{call} accesses a parameter by name, but p is an array", "write p[0], p[1], ...")
+            self._refuse(
+                f"{call} accesses an array by a name, but x and p hold numbers",
+                "write x[0], ..., p[0], ...",
+            )
+        self._refuse(
+            f"{call} accesses a parameter by name, but p is an array", "write p[0], p[1], ..."
+        )
 
     def _refuse_index(self, call, error):
         """Refuse a function that raised this IndexError, as `call` is written."""
         n = len(self.own)
         if "only integers" in str(error):
             self._refuse_name(call)
-        self._refuse(f"{call} indexes beyond an array ({error})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]")
+        self._refuse(
+            f"{call} indexes beyond an array ({error})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]"
+        )
 
 
 def refusal(name, message):
-    """The BadInput of a scene: what its file calls EVEN is `even` to who gave it to `survey.hill`, and so on."""
-    return BadInput(f"{name}: {message if name.endswith('.py') else _KEYS.sub(lambda key: key[0].lower(), message)}")
+    """The BadInput of a scene: what its file calls EVEN is `even` to who gave it to `survey.hill`,
+    and so on.
+    """
+    return BadInput(
+        f"{name}: {message if name.endswith('.py') else _KEYS.sub(lambda key: key[0].lower(), message)}"
+    )
 
 
 def reason(error):
@@ -105,5 +138,7 @@ def reason(error):
 
 
 def _restored(kind, digest, values):
-    """The scene with these values; the same object for the same hash, so that its kernels are compiled once."""
+    """The scene with these values; the same object for the same hash, so that its kernels are
+    compiled once.
+    """
     return _known.setdefault(digest, kind(**values))

@@ -10,7 +10,15 @@ import numpy as np
 from survey import status
 from survey.errors import BadInput
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import dependence, monodromy, motion, multiprecision, user_equation, user_rows, why
+from survey.measures.hill import (
+    dependence,
+    monodromy,
+    motion,
+    multiprecision,
+    user_equation,
+    user_rows,
+    why,
+)
 from survey.measures.rows import Rows
 from survey.proof import formulas
 from survey.request.checks import is_number
@@ -50,7 +58,9 @@ class HillScene(FunctionScene):
     @property
     def OUTPUTS(self):
         """The outputs for Hill's equation; where z is not even, y1 to dy2 are values at T."""
-        return monodromy.OUTPUTS if self.EVEN else tuple(_at_full_period(o) for o in monodromy.OUTPUTS)
+        return (
+            monodromy.OUTPUTS if self.EVEN else tuple(_at_full_period(o) for o in monodromy.OUTPUTS)
+        )
 
     @property
     def _divisor(self):
@@ -64,10 +74,16 @@ class HillScene(FunctionScene):
     @cached_property
     def NOTES(self):
         """How z is known, as global attributes of a file."""
-        checked = f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
+        checked = (
+            f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
+        )
         unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower at half its height may go unseen"
         obstacle = self._obstacle
-        digits = f"none: {obstacle}" if obstacle else "double-double, where float64 cannot decide a verdict"
+        digits = (
+            f"none: {obstacle}"
+            if obstacle
+            else "double-double, where float64 cannot decide a verdict"
+        )
         return {
             "z_resolved_width": 1 / (self._divisor * user_equation.PROBES),
             "z_resolution": f"{unseen} unless its position is one of the breaks (z_resolved_width is a fraction of T)",
@@ -78,7 +94,10 @@ class HillScene(FunctionScene):
         """Seconds per point, roughly: those of rows share their samples."""
         of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
         names = [p.name for p in self.PARAMETERS]
-        rows = [sizes.get(name, 1) >= LANES and of_z[i] <= 1 and not of_ranges[i] for i, name in enumerate(names)]
+        rows = [
+            sizes.get(name, 1) >= LANES and of_z[i] <= 1 and not of_ranges[i]
+            for i, name in enumerate(names)
+        ]
         return 1e-6 if any(rows) else 1e-5
 
     def solve(self, point, request):
@@ -88,7 +107,11 @@ class HillScene(FunctionScene):
             return self._solve_rows(point, request, axes)
         box = self._box_axes(point, request) if request.method == "auto" else None
         points, shape = self._points(point)
-        out = self._solve_points(points, request) if box is None else self._solve_scattered(points, box, request)
+        out = (
+            self._solve_points(points, request)
+            if box is None
+            else self._solve_scattered(points, box, request)
+        )
         return {name: values.reshape(shape) for name, values in out.items()}
 
     def _solve_points(self, points, request):
@@ -110,15 +133,31 @@ class HillScene(FunctionScene):
             return problem
 
         box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
-        position, p = np.ascontiguousarray(points[:, axes.across]), np.ascontiguousarray(points[:, axes.lane])
-        out = self._called(monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables)
+        position, p = (
+            np.ascontiguousarray(points[:, axes.across]),
+            np.ascontiguousarray(points[:, axes.lane]),
+        )
+        out = self._called(
+            monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables
+        )
         return self._labelled(out, rough, np.full(len(points), self._ranges(points[:1])[0][0]))
 
     def _box_axes(self, point, request):
-        """The parameters on the axes of a box that holds points on their own, two of which alone differ; or None."""
-        ranges = {i: request.ranges[p.name] for i, p in enumerate(self.PARAMETERS) if p.name in request.ranges}
+        """The parameters on the axes of a box that holds points on their own, two of which alone
+        differ; or None.
+        """
+        ranges = {
+            i: request.ranges[p.name]
+            for i, p in enumerate(self.PARAMETERS)
+            if p.name in request.ranges
+        }
         free = [i for i, p in enumerate(self.PARAMETERS) if p.name not in request.fixed]
-        if len(ranges) != 2 or set(ranges) != set(free) or callable(self.period) or callable(self.breaks):
+        if (
+            len(ranges) != 2
+            or set(ranges) != set(free)
+            or callable(self.period)
+            or callable(self.breaks)
+        ):
             return None
         number = monodromy.boxed(min(given[0] for given in ranges.values()))
         if number is None or any(not given[2] > given[1] for given in ranges.values()):
@@ -126,18 +165,24 @@ class HillScene(FunctionScene):
         of_z, _ = _dependence(self, self._numbers(point, request))
         for lane, across in (free, free[::-1]):
             if of_z[lane] <= 1 and of_z[across] <= dependence.ENTIRE:
-                return user_rows.Axes(lane, (number, *ranges[lane][1:]), across, (number, *ranges[across][1:]))
+                return user_rows.Axes(
+                    lane, (number, *ranges[lane][1:]), across, (number, *ranges[across][1:])
+                )
         return None
 
     def _numbers(self, point, request):
         """The parameters that are single numbers; None for others."""
         names = [p.name for p in self.PARAMETERS]
-        return tuple(float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names)
+        return tuple(
+            float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names
+        )
 
     def _solve_rows(self, point, request, axes):
         """As `solve`, in rows along an axis of which z is a linear function."""
         names = [p.name for p in self.PARAMETERS]
-        block = Rows([point[name] for i, name in enumerate(names) if i != axes.lane], point[names[axes.lane]])
+        block = Rows(
+            [point[name] for i, name in enumerate(names) if i != axes.lane], point[names[axes.lane]]
+        )
         lanes, points = block.per_point(point[names[axes.lane]]), np.zeros((block.rows, len(names)))
         for i, name in enumerate(names):
             points[:, i] = axes.line[1] if i == axes.lane else block.per_row(point[name])
@@ -159,7 +204,9 @@ class HillScene(FunctionScene):
         return {name: block.back(values) for name, values in out.items()}
 
     def _families(self, points, axes):
-        """The rows that a series across them serves: they differ in one parameter; all of them if there is no such."""
+        """The rows that a series across them serves: they differ in one parameter; all of them if
+        there is no such.
+        """
         if axes.across is None:
             return [np.arange(len(points))]
         others = np.delete(points, [axes.lane, axes.across], axis=1)
@@ -167,12 +214,16 @@ class HillScene(FunctionScene):
         return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
 
     def _answers(self, problem, rough, period, request):
-        out = self._called(monodromy.solve, problem, request.method, request.rtol, request.variables)
+        out = self._called(
+            monodromy.solve, problem, request.method, request.rtol, request.variables
+        )
         return self._labelled(out, rough, period)
 
     def _labelled(self, out, rough, period):
         """The outputs with the period, and the status of points whose z is rough."""
-        out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(np.int8)
+        out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(
+            np.int8
+        )
         out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
         out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
         return out
@@ -181,7 +232,9 @@ class HillScene(FunctionScene):
         """The axes along and across the rows of a map of this request; None where z is linear along none."""
         names = [p.name for p in self.PARAMETERS]
         lines = {i: request.line(name) for i, name in enumerate(names)}
-        lines = {i: line for i, line in lines.items() if line and line[0] >= LANES and line[2] > line[1]}
+        lines = {
+            i: line for i, line in lines.items() if line and line[0] >= LANES and line[2] > line[1]
+        }
         if not lines:
             return None
         of_z, of_ranges = _dependence(self, self._numbers(point, request))
@@ -190,8 +243,12 @@ class HillScene(FunctionScene):
             return None
         # of long ones the last: blocks cut it last, and each has to solve all rows' nodes
         order, most = list(request.lines), max(lines[i][0] for i in lanes)
-        lane = max((i for i in lanes if 2 * lines[i][0] >= most), key=lambda i: order.index(names[i]))
-        across = [i for i in lines if i != lane and of_z[i] <= dependence.ENTIRE and not of_ranges[i]]
+        lane = max(
+            (i for i in lanes if 2 * lines[i][0] >= most), key=lambda i: order.index(names[i])
+        )
+        across = [
+            i for i in lines if i != lane and of_z[i] <= dependence.ENTIRE and not of_ranges[i]
+        ]
         if not across:
             return user_rows.Axes(lane, lines[lane])
         across = max(across, key=lambda i: lines[i][0])
@@ -201,7 +258,9 @@ class HillScene(FunctionScene):
         """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""
         values = [ends[p.name][0] for p in self.PARAMETERS]
         if callable(self.period) or callable(self.breaks):
-            raise BadInput(f"prove: {self.NAME}: PERIOD and BREAKS must be numbers, not functions of p")
+            raise BadInput(
+                f"prove: {self.NAME}: PERIOD and BREAKS must be numbers, not functions of p"
+            )
         _, edges, _ = self._ranges(np.array([values]))
         written = [names[p.name] for p in self.PARAMETERS]
         try:
@@ -221,15 +280,21 @@ class HillScene(FunctionScene):
         """Solutions and multipliers of a point (see `survey.scenes`), damped or not."""
         points = np.array([[point[p.name] for p in self.PARAMETERS]])
         period, edges, slack = self._ranges(points)
-        problem, _ = self._called(user_equation.problem, self.z, points, edges, period, slack, self.EVEN)
+        problem, _ = self._called(
+            user_equation.problem, self.z, points, edges, period, slack, self.EVEN
+        )
         return motion.solve(problem, answer, time, "u", damping)
 
     def _ranges(self, points):
-        """Period (N), edges of the pieces (N, P + 1; NaN where there are none) and slack (N; see `user_equation`)."""
+        """Period (N), edges of the pieces (N, P + 1; NaN where there are none) and slack (N; see
+        `user_equation`).
+        """
         if callable(self.period) or callable(self.breaks):
             period, edges, slack = self._ranges_of(points)
         else:
-            period, edges, slack = (np.repeat(values, len(points), axis=0) for values in self._same_ranges)
+            period, edges, slack = (
+                np.repeat(values, len(points), axis=0) for values in self._same_ranges
+            )
         edges[~np.isfinite(points).all(axis=1)] = np.nan
         return period, edges, slack
 
@@ -244,8 +309,14 @@ class HillScene(FunctionScene):
         breaks = [np.atleast_1d(self._value("BREAKS", self.breaks, p)) for p in points]
         rows = [self._row(some, length) for some, length in zip(breaks, period, strict=True)]
         most = max((len(row) for row in rows), default=2)
-        edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
-        return period, edges, np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period
+        edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(
+            len(rows), most
+        )
+        return (
+            period,
+            edges,
+            np.array([user_equation.SLACK * (some.size > 0) for some in breaks]) * period,
+        )
 
     def _row(self, breaks, period):
         """0, the breaks inside the part that is solved, and its end."""
@@ -291,11 +362,16 @@ class HillScene(FunctionScene):
         given = given if isinstance(given, list) else [given]
         known = [mp.mpf(u) for u in given] + [length - u for u in given if self.EVEN]
         end = length / 2 if self.EVEN else length
-        rows = [min(known, key=lambda u, edge=edge: abs(u - edge)) for edge in np.unique(edges)[1:-1].tolist()]
+        rows = [
+            min(known, key=lambda u, edge=edge: abs(u - edge))
+            for edge in np.unique(edges)[1:-1].tolist()
+        ]
         return lambda u: z(u, p), [mp.mpf(0), *rows, end]
 
     def check(self, points):
-        """Raise BadInput if z cannot be compiled, or contradicts the scene's other entries at these points (N, n)."""
+        """Raise BadInput if z cannot be compiled, or contradicts the scene's other entries at these
+        points (N, n).
+        """
         _checked(self, points.shape, points.tobytes())
 
     def _check(self, points):
@@ -307,13 +383,18 @@ class HillScene(FunctionScene):
         if np.isnan(period).all():
             self._refuse(f"PERIOD is {self._period(points[0]):g} at {where}", "make it positive")
         if np.isnan(edges).all():
-            self._refuse(f"BREAKS lie outside 0 <= u <= T at {where}", "name positions within a period")
+            self._refuse(
+                f"BREAKS lie outside 0 <= u <= T at {where}", "name positions within a period"
+            )
         mirror = period if self.EVEN else None
-        size, _, scale, rough = self._called(user_equation.measured, self.z, points, edges, mirror, slack)
+        size, _, scale, rough = self._called(
+            user_equation.measured, self.z, points, edges, mirror, slack
+        )
         finite = np.isfinite(size).all(axis=1)
         if not finite.any():
             self._refuse(
-                f"z has no finite value at {self._where(points[0])}", "correct it, or the domains of PARAMETERS"
+                f"z has no finite value at {self._where(points[0])}",
+                "correct it, or the domains of PARAMETERS",
             )
         for i in np.flatnonzero(finite & rough):
             remedy = "name the positions where it jumps or has a kink in BREAKS"
@@ -324,9 +405,12 @@ class HillScene(FunctionScene):
                 "set EVEN = False, or correct z or PERIOD",
             )
         of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
-        for i in np.flatnonzero(np.array(of_z) <= 1):  # a mean of two z has no other spikes than these
+        # a mean of two z has no other spikes than these
+        for i in np.flatnonzero(np.array(of_z) <= 1):
             if not of_ranges[i]:
-                finite &= (points[:, i] == points[:, i].min()) | (points[:, i] == points[:, i].max())
+                finite &= (points[:, i] == points[:, i].min()) | (
+                    points[:, i] == points[:, i].max()
+                )
         finite &= ~user_equation.unprobed(self.z, points, edges, slack, size.max(axis=1))
         if finite.any():
             self._check_spikes(points[finite], edges[finite], slack[finite])
@@ -341,7 +425,10 @@ class HillScene(FunctionScene):
         )
         for i in np.flatnonzero((one[1] != fine[1]).any(axis=1) | (one[3] != fine[3])):
             u = np.linspace(0, edges[i, -1], user_equation.CHECKED)
-            position = u[3 + abs(np.diff(user_equation.at(self.z, points[i : i + 1], u[None])[0], 6)).argmax()]
+            position = u[
+                3
+                + abs(np.diff(user_equation.at(self.z, points[i : i + 1], u[None])[0], 6)).argmax()
+            ]
             narrow = f"too narrow to be seen by {self._sampling}"
             self._refuse(
                 f"z has a spike near u = {position:.6g} at {self._where(points[i])}, {narrow}",
@@ -353,14 +440,19 @@ class HillScene(FunctionScene):
         ends = user_equation.at(self.z, points, np.stack([0 * period, period], axis=1))
         for i in np.flatnonzero(abs(ends[:, 1] - ends[:, 0]) > user_equation.MIRRORED * size):
             breaks = np.atleast_1d(self._value("BREAKS", self.breaks, points[i]))
-            if np.minimum(abs(breaks), abs(breaks - period[i])).min(initial=np.inf) > SAME * period[i]:
+            if (
+                np.minimum(abs(breaks), abs(breaks - period[i])).min(initial=np.inf)
+                > SAME * period[i]
+            ):
                 self._refuse(
                     f"z(T) is not z(0) at {self._where(points[i])}, T = {period[i]:g}",
                     "correct PERIOD, or name 0 in BREAKS if z jumps there",
                 )
 
     def _try(self, point):
-        """Raise BadInput unless z(u, p) can be compiled; run as Python, it shows why not, and the bounds of p."""
+        """Raise BadInput unless z(u, p) can be compiled; run as Python, it shows why not, and the
+        bounds of p.
+        """
         value = failed = None
         try:
             with np.errstate(all="ignore"):
@@ -375,7 +467,9 @@ class HillScene(FunctionScene):
             if failed is None and not is_number(value):
                 self._refuse(f"z(u, p) returns {value!r}", "it must return a real number")
             remedy = "use only numbers and math functions; functions that it calls need numba.njit"
-            self._refuse(f"numba cannot compile z(u, p) ({reason(failed or error.__cause__)})", remedy)
+            self._refuse(
+                f"numba cannot compile z(u, p) ({reason(failed or error.__cause__)})", remedy
+            )
 
     def _period(self, p):
         value = self._value("PERIOD", self.period, p)
@@ -392,7 +486,10 @@ class HillScene(FunctionScene):
         except (ArithmeticError, ValueError):
             return np.float64(np.nan)
         except Exception as error:
-            self._refuse(f"{name}(p) fails ({type(error).__name__}: {reason(error)})", "it must return numbers")
+            self._refuse(
+                f"{name}(p) fails ({type(error).__name__}: {reason(error)})",
+                "it must return numbers",
+            )
 
     def _called(self, function, *arguments):
         try:
@@ -404,13 +501,14 @@ class HillScene(FunctionScene):
 @lru_cache(maxsize=64)
 def _checked(scene, shape, values):
     """`check` once for the same points: what it raises is raised again."""
-    scene._check(np.frombuffer(values).reshape(shape).copy())  # kernels would be compiled again for what is read-only
+    # kernels would be compiled again for what is read-only
+    scene._check(np.frombuffer(values).reshape(shape).copy())
 
 
 @lru_cache(maxsize=64)
 def _dependence(scene, fixed):
-    """The degrees of z, and of the period and the breaks, in each parameter but those `fixed` numbers; OPAQUE if
-    unknown.
+    """The degrees of z, and of the period and the breaks, in each parameter but those `fixed`
+    numbers; OPAQUE if unknown.
     """
     nothing = [dependence.OPAQUE] * len(fixed)
     example = np.array([[1.0 if value is None else value for value in fixed]])
@@ -419,7 +517,9 @@ def _dependence(scene, fixed):
         of_ranges = [max(degrees) for degrees in zip(*ranges, strict=True)] or [0] * len(fixed)
         _, edges, _ = scene._ranges(example)
         ends = np.stack([edges[0, :-1], edges[0, 1:]], axis=1)
-        u = ends[:, :1] + np.diff(ends, axis=1) * user_equation.chebyshev_points(user_equation.SIZES[0])
+        u = ends[:, :1] + np.diff(ends, axis=1) * user_equation.chebyshev_points(
+            user_equation.SIZES[0]
+        )
         return dependence.degrees(scene.z, fixed, u[:, 1:-1].ravel().tolist()), of_ranges
     except dependence.Unknown:
         return nothing, nothing

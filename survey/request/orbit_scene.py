@@ -1,4 +1,6 @@
-"""The scene of periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes` offers, as an object."""
+"""The scene of periodic orbits of a user's x' = f(t, x, p): what a module of `survey.scenes`
+offers, as an object.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -55,7 +57,10 @@ class OrbitScene(TracedScene):
         if self.continued is None:
             return self.own
         along = self.continued.index
-        return (*(replace(p, uncut=True) if k == along else p for k, p in enumerate(self.own)), BRANCH)
+        return (
+            *(replace(p, uncut=True) if k == along else p for k, p in enumerate(self.own)),
+            BRANCH,
+        )
 
     @property
     def OUTPUTS(self):
@@ -71,7 +76,12 @@ class OrbitScene(TracedScene):
         """Coordinates: the names of the states, numbers of multipliers, of rows and columns."""
         number = np.arange(1, len(self.states) + 1)
         judged = number[: self.equation.judged]
-        return {"state": np.array(self.states), "multiplier": judged, "row": number, "column": number}
+        return {
+            "state": np.array(self.states),
+            "multiplier": judged,
+            "row": number,
+            "column": number,
+        }
 
     @property
     def NOTES(self):
@@ -109,7 +119,9 @@ class OrbitScene(TracedScene):
         points, shape = self._points(point)
         wanted = set(request.variables) or {o.name for o in self.OUTPUTS}
         if self.continued is None:
-            out = self._called(orbit.solve, self.equation, points, request.method, request.rtol, wanted)
+            out = self._called(
+                orbit.solve, self.equation, points, request.method, request.rtol, wanted
+            )
         else:
             branch = np.broadcast_to(point["branch"], shape).reshape(-1)
             given = points, branch, self.continued, request.method, request.rtol, wanted
@@ -139,17 +151,25 @@ class OrbitScene(TracedScene):
         return radius + {
             "unstable": ": it is certainly above 1",
             "stable": ": it is certainly below 1",
-        }.get(str(answer["verdict"]), ": the error bar allows multipliers outside the unit circle, and inside or on it")
+        }.get(
+            str(answer["verdict"]),
+            ": the error bar allows multipliers outside the unit circle, and inside or on it",
+        )
 
     def trajectory(self, point, answer, options, time=None):
         """The orbit and the multipliers of a point (see `survey.scenes`)."""
         if not np.isfinite(answer["x0"]).all():
-            self._refuse(f"no orbit is shown to exist at {self._where([point[p.name] for p in self.own])}", ELSEWHERE)
+            self._refuse(
+                f"no orbit is shown to exist at {self._where([point[p.name] for p in self.own])}",
+                ELSEWHERE,
+            )
         points = np.array([[point[p.name] for p in self.own]])
         return self._called(orbit_motion.solve, self.equation, self.states, points, answer, time)
 
     def check(self, points):
-        """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these points (N, n)."""
+        """Raise BadInput if f cannot be used, or contradicts the scene's other entries at these
+        points (N, n).
+        """
         equation = self.equation
         given = points if len(points) else np.ones((1, len(self.own)))
         if self.continued is not None:  # orbits are followed from where there is a start
@@ -159,8 +179,16 @@ class OrbitScene(TracedScene):
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
         if len(points) and not known.any():
-            ends = "the guess of the period, the last number of START," if self.period is None else "PERIOD(p)"
-            what = "START(p) has no finite value" if not np.isfinite(x0).all() else f"{ends} is not positive"
+            ends = (
+                "the guess of the period, the last number of START,"
+                if self.period is None
+                else "PERIOD(p)"
+            )
+            what = (
+                "START(p) has no finite value"
+                if not np.isfinite(x0).all()
+                else f"{ends} is not positive"
+            )
             self._refuse(f"{what} at {self._where(points[0])}", "correct it")
         for point, x, T in zip(given[known], x0[known], period[known], strict=True):
             self._try(point, x)
@@ -177,12 +205,18 @@ class OrbitScene(TracedScene):
         for key, some in (("REVERSED", symmetry.odd), ("TRANSVERSE", symmetry.transverse)):
             for k in some:
                 if x[k] != 0.0:
-                    self._refuse(f"START has {self.states[k]} = {x[k]:g} at {here}", f"states of {key} begin at 0")
+                    self._refuse(
+                        f"START has {self.states[k]} = {x[k]:g} at {here}",
+                        f"states of {key} begin at 0",
+                    )
         spread = np.random.default_rng(1).standard_normal((TRIED.size, n))
         states = x + NEARBY * spread * (abs(x).max() + 1e-300)
         states[:, list(symmetry.transverse)] = 0.0
         numbers = tuple(np.repeat(one, TRIED.size, axis=0) for one in programs.numbers(point[None]))
-        f, back = (programs.slopes(numbers, np.zeros(TRIED.size), one)[0] for one in (states, symmetry.signs * states))
+        f, back = (
+            programs.slopes(numbers, np.zeros(TRIED.size), one)[0]
+            for one in (states, symmetry.signs * states)
+        )
         off = abs(back + symmetry.signs * f).max(axis=0)
         if (off > SAME * abs(f).max()).any():
             k = int(off.argmax())
@@ -190,7 +224,13 @@ class OrbitScene(TracedScene):
                 f"REVERSED: the derivative of {self.states[k]} is not what time reversed would give, at {here}",
                 "name the states whose sign changes with the direction of time",
             )
-        A = programs.along(programs.A, numbers, np.zeros((TRIED.size, 1)), states[:, :, None], np.zeros((*f.shape, 1)))
+        A = programs.along(
+            programs.A,
+            numbers,
+            np.zeros((TRIED.size, 1)),
+            states[:, :, None],
+            np.zeros((*f.shape, 1)),
+        )
         if symmetry.couples(A[0][:, 0]).any() or f[:, list(symmetry.transverse)].any():
             self._refuse(
                 f"TRANSVERSE: where these states are 0, f couples them to the others at {here}",
@@ -201,7 +241,9 @@ class OrbitScene(TracedScene):
         """Raise BadInput unless f, run as Python, fills its array."""
         n = len(self.states)
         sizes = f"STATES names {n} for x and out, PARAMETERS {len(self.own)} for p"
-        self._tried(self.f, "f(t, x, p, out)", (0.25, x.copy(), point), (n,), sizes, f"of {n} numbers")
+        self._tried(
+            self.f, "f(t, x, p, out)", (0.25, x.copy(), point), (n,), sizes, f"of {n} numbers"
+        )
 
     def _check_filled(self, point, x, T):
         """Refuse f where the derivative of a state is 0 always: orbits are not isolated then."""
@@ -215,7 +257,8 @@ class OrbitScene(TracedScene):
         for k in np.flatnonzero(~np.any(f, axis=0)):
             name = self.states[k]
             self._refuse(
-                f"f(t, x, p, out) leaves out[{k}] 0: {name} never changes", f"fill out[{k}] = d{name}/dt, not out = ..."
+                f"f(t, x, p, out) leaves out[{k}] 0: {name} never changes",
+                f"fill out[{k}] = d{name}/dt, not out = ...",
             )
 
     def _at(self, t, x, point):
@@ -223,7 +266,9 @@ class OrbitScene(TracedScene):
         return self._filled(self.f, (float(t), x.copy(), point), (len(self.states),))
 
     def _compare(self, programs, point, x, T):
-        """Refuse what the recorded operations show: other values than the code's, no period, another Jacobian."""
+        """Refuse what the recorded operations show: other values than the code's, no period,
+        another Jacobian.
+        """
         n, here = len(self.states), self._where(point)
         t = T * TRIED
         numbers = tuple(np.repeat(one, t.size, axis=0) for one in programs.numbers(point[None]))
@@ -246,11 +291,19 @@ class OrbitScene(TracedScene):
             later = np.array([self._at(time + T, x, point) for time in t])
             off = abs(later - plain).max()
             if not off <= SAME * size:
-                self._refuse(f"f(t + T) differs from f(t) by {off:.2g} at {here}, T = {T:g}", "correct PERIOD")
+                self._refuse(
+                    f"f(t + T) differs from f(t) by {off:.2g} at {here}, T = {T:g}",
+                    "correct PERIOD",
+                )
         if self.jacobian is not None:
             sizes = f"STATES names {n} for x, out is {n} x {n}, PARAMETERS {len(self.own)} for p"
             call, what = "jacobian(t, x, p, out)", f"{n} x {n}"
-            asked = [(self.jacobian, call, (float(time), x.copy(), point), (n, n), sizes, what) for time in t]
+            asked = [
+                (self.jacobian, call, (float(time), x.copy(), point), (n, n), sizes, what)
+                for time in t
+            ]
             given = np.array([self._tried(*one) for one in asked])
             if not (abs(given - A) <= SAME * abs(A).max()).all():
-                self._refuse(f"jacobian(t, x, p, out) is not df/dx at {here}", "correct it, or leave it out")
+                self._refuse(
+                    f"jacobian(t, x, p, out) is not df/dx at {here}", "correct it, or leave it out"
+                )

@@ -16,7 +16,9 @@ OTHER_KINDS = set(
 
 
 def check_path(path):
-    """The output path; raises BadInput unless a file can be created there, Stopped where the disk is read-only."""
+    """The output path; raises BadInput unless a file can be created there, Stopped where the disk
+    is read-only.
+    """
     if not isinstance(path, (str, os.PathLike)):
         raise BadInput(f"output = {shown(path)}: give the path of a netCDF file, such as 'map.nc'")
     if not str(path):
@@ -39,13 +41,17 @@ def _checked(path):
     if path.is_file() and not _is_netcdf(path):
         raise BadInput(f"{key} exists and is not a netCDF file; move it away, or use -o OUT.nc")
     if path.is_dir():
-        raise BadInput(f"{key} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}")
+        raise BadInput(
+            f"{key} is a folder; name a file, such as {shown(str(path / 'map.nc'), 120)}"
+        )
     if not folder.is_dir():
         raise BadInput(f"{key}: there is no folder {where}; create it first, or use -o OUT.nc")
     longest = os.pathconf(folder, "PC_NAME_MAX") if hasattr(os, "pathconf") else LONGEST_NAME
     if len(os.fsencode(path.name)) > longest - LONGEST_SUFFIX:
         raise BadInput(f"{key}: this name is too long for the files beside it; shorten it")
-    if os.access(folder, os.W_OK | os.X_OK) and not str(folder.resolve()).startswith(("/proc", "/sys")):
+    if os.access(folder, os.W_OK | os.X_OK) and not str(folder.resolve()).startswith(
+        ("/proc", "/sys")
+    ):
         return path
     if _is_read_only(folder):
         raise Stopped(

@@ -1,8 +1,10 @@
-"""Physical input: degrees, moments of inertia, masses or named bodies in place of a scene's own parameters.
+"""Physical input: degrees, moments of inertia, masses or named bodies in place of a scene's own
+parameters.
 
-GM: R. S. Park et al., Astronomical Journal 161 (2021) 105 (DE440), table 2; of Mars and beyond with their moons, of the
-Earth without. Eccentricities: E. M. Standish, Keplerian elements for approximate positions of the major planets, JPL
-(J2000), for the Sun and the Earth that of the barycentre with the Moon; of the Moon's orbit, the mean.
+GM: R. S. Park et al., Astronomical Journal 161 (2021) 105 (DE440), table 2; of Mars and beyond with
+their moons, of the Earth without. Eccentricities: E. M. Standish, Keplerian elements for
+approximate positions of the major planets, JPL (J2000), for the Sun and the Earth that of the
+barycentre with the Moon; of the Moon's orbit, the mean.
 """
 
 import numpy as np
@@ -37,7 +39,11 @@ def resolved(scene, given):
         if key not in names and key != angle and angle in names and names[angle].units == "rad":
             found |= _put(given, {angle: _of(value, key, np.radians)})
             if key in found[angle].coords:
-                about = {"long_name": names[angle].long_name, "symbol": names[angle].symbol, "units": "degree"}
+                about = {
+                    "long_name": names[angle].long_name,
+                    "symbol": names[angle].symbol,
+                    "units": "degree",
+                }
                 found[angle].coords[key].attrs.update(about)
         else:
             found[key] = value
@@ -53,7 +59,9 @@ def resolved(scene, given):
 def _put(given, new):
     for key in new:
         if key in given:
-            raise BadInput(f"{key} is given twice, by itself and by physical input; give only one of them")
+            raise BadInput(
+                f"{key} is given twice, by itself and by physical input; give only one of them"
+            )
     return new
 
 
@@ -71,10 +79,14 @@ def _of(value, name, function):
     try:
         array = value if isinstance(value, xr.DataArray) else np.asarray(value, float)
         if not isinstance(array, xr.DataArray):
-            array = xr.DataArray(array, {name: array} if array.ndim == 1 else {}, (name,) if array.ndim == 1 else ())
+            array = xr.DataArray(
+                array, {name: array} if array.ndim == 1 else {}, (name,) if array.ndim == 1 else ()
+            )
         return function(array.astype(float))
     except (TypeError, ValueError):
-        raise BadInput(f"{name} = {shown(value)}: it must be a real number or an array of real numbers") from None
+        raise BadInput(
+            f"{name} = {shown(value)}: it must be a real number or an array of real numbers"
+        ) from None
 
 
 def _ratio(m1, m2):
@@ -88,9 +100,13 @@ def _axial(a, b, c):
     """Iz / I of a body with two equal moments of inertia, in any unit."""
     for name, moment in zip(MOMENTS, (a, b, c), strict=True):
         if not bool((moment >= 0).all()):
-            raise BadInput(f"{name} = {shown(float(moment.min()))}: a moment of inertia must be positive, or 0")
+            raise BadInput(
+                f"{name} = {shown(float(moment.min()))}: a moment of inertia must be positive, or 0"
+            )
     if not bool(((a <= b + c) & (b <= a + c) & (c <= a + b)).all()):
-        raise BadInput("A, B, C: no body has these moments of inertia: none may exceed the sum of the two others")
+        raise BadInput(
+            "A, B, C: no body has these moments of inertia: none may exceed the sum of the two others"
+        )
     for one, other, axial in ((a, b, c), (b, c, a), (a, c, b)):
         if bool(((one == other) & (one > 0)).all()):
             return axial / one
@@ -144,8 +160,12 @@ def described(scene):
     angles = {f"{key}{DEGREES}": f"{p.long_name} in degrees, instead of {key}" for key, p in names.items()
               if p.units == "rad"}  # fmt: skip
     if "mu" in names:
-        angles |= {"body": f"instead of mu{' and e' if 'e' in names else ''}: {listed(ECCENTRICITY)}"}
+        angles |= {
+            "body": f"instead of mu{' and e' if 'e' in names else ''}: {listed(ECCENTRICITY)}"
+        }
         angles |= {"m1, m2": "masses in any unit, instead of mu"} if "m1" not in names else {}
     if "inertia_ratio" in names and not set(MOMENTS) & set(names):
-        angles |= {"A, B, C": "moments of inertia in any unit, two of them equal, instead of inertia_ratio"}
+        angles |= {
+            "A, B, C": "moments of inertia in any unit, two of them equal, instead of inertia_ratio"
+        }
     return angles

@@ -1,4 +1,6 @@
-"""The plane that a chart or a map of failures covers: of a user's own file, or of a workflow's first two axes."""
+"""The plane that a chart or a map of failures covers: of a user's own file, or of a workflow's
+first two axes.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,7 +34,9 @@ def is_file(scene):
 
 
 def of(path):
-    """The Ranges of a user's own file (its parameters' domains, or what `survey init` writes), or of a workflow."""
+    """The Ranges of a user's own file (its parameters' domains, or what `survey init` writes), or
+    of a workflow.
+    """
     if str(path).endswith(".toml"):
         checked = workflow.read(path)
         given = checked.grid.parameters
@@ -42,7 +46,13 @@ def of(path):
     else:
         _, scene = user_scene.find(path)
         axes = {p.name: np.array(starter.ends(p)) for p in scene.PARAMETERS}
-        fixed, options = {p.name: starter.inside(p) if p.default is None else p.default for p in scene.PARAMETERS}, {}
+        fixed, options = (
+            {
+                p.name: starter.inside(p) if p.default is None else p.default
+                for p in scene.PARAMETERS
+            },
+            {},
+        )
     if not axes:
         raise BadInput(f"{path}: it has no axis; a chart needs a range of a parameter at least")
     chosen = dict(list(axes.items())[:2])

@@ -1,4 +1,6 @@
-"""What a workflow file may hold: its tables and keys as pydantic models, and what is wrong with one in a line."""
+"""What a workflow file may hold: its tables and keys as pydantic models, and what is wrong with one
+in a line.
+"""
 
 from typing import Annotated, Any, Literal
 
@@ -33,7 +35,9 @@ def _axis_kind(value):
 
 
 AxisEntry = Annotated[
-    Annotated[Number, Tag("number")] | Annotated[Spread, Tag("spread")] | Annotated[Listed, Tag("values")],
+    Annotated[Number, Tag("number")]
+    | Annotated[Spread, Tag("spread")]
+    | Annotated[Listed, Tag("values")],
     Discriminator(_axis_kind),
 ]
 
@@ -90,9 +94,11 @@ def complaint(error):
     """
     extra = "extra_forbidden"
     first = min(
-        error.errors(), key=lambda one: (one["type"] != extra, one["type"] == extra and one["loc"][-1] == "values")
+        error.errors(),
+        key=lambda one: (one["type"] != extra, one["type"] == extra and one["loc"][-1] == "values"),
     )
-    tag = 2 if first["loc"][0] in ("axes", "refine") else None  # pydantic names the kind of axis after the axis
+    # pydantic names the kind of axis after the axis
+    tag = 2 if first["loc"][0] in ("axes", "refine") else None
     key = ".".join(short(part, 40) for i, part in enumerate(first["loc"]) if i != tag)
     left = error.error_count() - 1
     more = f" (and {left} more {'mistake' if left == 1 else 'mistakes'})" if left else ""
@@ -112,7 +118,8 @@ def complaint(error):
     if first["type"] == "list_type":
         example = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
         return (
-            f"{key} = {shown(first['input'])}: it must be a list, such as --set '{key}={example}' (with quotes){more}"
+            f"{key} = {shown(first['input'])}: it must be a list, "
+            f"such as --set '{key}={example}' (with quotes){more}"
         )
     if first["type"] in ("model_type", "model_attributes_type", "dict_type"):
         return f"{key} = {shown(first['input'])}: it must be a valid table, [{key}] on a line of its own{more}"
@@ -141,4 +148,6 @@ def _nearest(location):
             return f"; put {meant} under [{name}]"
     table = TABLES.get(location[0], File) if len(location) > 1 else File
     known = list(table.model_fields) + (["values"] if table is Spread else [])
-    return modules.unknown("", str(location[-1]), known).removeprefix(f"unknown  {shown(str(location[-1]))}")
+    return modules.unknown("", str(location[-1]), known).removeprefix(
+        f"unknown  {shown(str(location[-1]))}"
+    )

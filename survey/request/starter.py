@@ -15,7 +15,11 @@ SCHEMA = "https://json-schema.org/draft/2020-12/schema"
 def schema():
     """The JSON schema of a workflow file, from the models that check it."""
     table = File.model_json_schema()
-    return {"$schema": SCHEMA, "title": "survey workflow", **{k: v for k, v in table.items() if k != "title"}}
+    return {
+        "$schema": SCHEMA,
+        "title": "survey workflow",
+        **{k: v for k, v in table.items() if k != "title"},
+    }
 
 
 def workflow(scene):
@@ -24,13 +28,25 @@ def workflow(scene):
     options = check_options(module, {}, ())
     given = getattr(module, "STARTER", {})
     existing = [p for p in module.PARAMETERS if exists(p, options) and not p.instead_of]
-    axes = sorted(existing, key=lambda p: (not isinstance(given.get(p.name), tuple), p.default is not None))[:2]
+    axes = sorted(
+        existing, key=lambda p: (not isinstance(given.get(p.name), tuple), p.default is not None)
+    )[:2]
     used = check_parameters(module, name, options, {p.name: 0.0 for p in axes} | _missing(existing))
-    lines = [f'title = "{module.TITLE}"', f'scene = "{name}"', *_options(module, options), "", "[axes]"]
-    lines += ['# in this order the dimensions; { start, stop, num, spacing = "log" }, { values = [...] }, or a number']
+    lines = [
+        f'title = "{module.TITLE}"',
+        f'scene = "{name}"',
+        *_options(module, options),
+        "",
+        "[axes]",
+    ]
+    lines += [
+        '# in this order the dimensions; { start, stop, num, spacing = "log" }, { values = [...] }, or a number'
+    ]
     for p, number in zip(axes, NUMBERS, strict=False):
         low, high = given.get(p.name) or ends(p)
-        lines += [f"{p.name} = {{ start = {low:g}, stop = {high:g}, num = {number} }}  # {_about(p)}"]
+        lines += [
+            f"{p.name} = {{ start = {low:g}, stop = {high:g}, num = {number} }}  # {_about(p)}"
+        ]
     for i, p in enumerate(p for p in existing if p not in axes):
         value = given.get(p.name, inside(p, i) if p.default is None else p.default)
         line = f"{p.name} = {value:g}  # {_about(p)}"
@@ -45,8 +61,13 @@ def workflow(scene):
     lines += [f'figures = ["{figure}"]  # pictures beside the file; of {", ".join(dict.fromkeys(drawn))}',
               "# variables = [...]  # which outputs are stored; by default all but those on request"]  # fmt: skip
     curves = measures.curves(module)
-    if curves and not (hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module, options)):
-        lines += ["", "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures"]
+    if curves and not (
+        hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module, options)
+    ):
+        lines += [
+            "",
+            "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures",
+        ]
     if measures.cells(module) is not None:
         lines += ["", "# [refine]  # cells as small as needed where the verdict changes, and the area of each verdict",
                   "# width = 0.001  # of the smallest cells, as a fraction of the axes"]  # fmt: skip
@@ -89,4 +110,7 @@ def inside(p, number=0):
     """A value of the parameter, another one for each `number`: where two are equal, motions are special."""
     low, high = ends(p)
     some = (0.5 + 0.1 * number, 0.5, 1.0)
-    return next((x for x in some if low < x < high and p.holds([x]).all()), round(low + 0.3 * (high - low), 3))
+    return next(
+        (x for x in some if low < x < high and p.holds([x]).all()),
+        round(low + 0.3 * (high - low), 3),
+    )

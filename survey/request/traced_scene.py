@@ -1,4 +1,6 @@
-"""What `FloquetScene` and `OrbitScene` share: functions that fill an array, and whose operations are recorded."""
+"""What `FloquetScene` and `OrbitScene` share: functions that fill an array, and whose operations
+are recorded.
+"""
 
 import dis
 
@@ -10,13 +12,16 @@ from survey.request.function_scene import FunctionScene, reason
 
 
 def rebinds(function):
-    """Does the function, of Python, assign to the name of its last argument, which leaves the array as it was?"""
+    """Does the function, of Python, assign to the name of its last argument, which leaves the array
+    as it was?
+    """
     code = getattr(getattr(function, "py_func", function), "__code__", None)
     if code is None or not code.co_argcount:
         return False
     last = code.co_varnames[code.co_argcount - 1]
     return any(
-        i.opname.startswith("STORE_FAST") and last in np.atleast_1d(i.argval) for i in dis.get_instructions(code)
+        i.opname.startswith("STORE_FAST") and last in np.atleast_1d(i.argval)
+        for i in dis.get_instructions(code)
     )
 
 
@@ -24,7 +29,9 @@ class TracedScene(FunctionScene):
     """A scene of functions that run as Python on numbers, and on symbols."""
 
     def _filled(self, function, arguments, shape):
-        """The array of this shape that the function, run on numbers, fills or returns; NaN where it is undefined."""
+        """The array of this shape that the function, run on numbers, fills or returns; NaN where it
+        is undefined.
+        """
         out = np.zeros(shape)
         with np.errstate(all="ignore"):
             try:
@@ -47,7 +54,9 @@ class TracedScene(FunctionScene):
             return np.full(shape, np.nan)
 
     def _tried(self, function, call, arguments, shape, sizes, what):
-        """As `_filled`, but BadInput if the function fails; `sizes` says what it may index, `what` it must fill."""
+        """As `_filled`, but BadInput if the function fails; `sizes` says what it may index, `what`
+        it must fill.
+        """
         try:
             value = self._filled(function, arguments, shape)
         except IndexError as error:
@@ -58,10 +67,15 @@ class TracedScene(FunctionScene):
             if isinstance(error, AttributeError) and "'numpy.ndarray'" in str(error):
                 self._refuse_name(call)
             if isinstance(error, TypeError) and "'complex'" in str(error):
-                self._refuse(f"{call} fills in a complex number", "write real and imaginary parts as two states")
+                self._refuse(
+                    f"{call} fills in a complex number",
+                    "write real and imaginary parts as two states",
+                )
             self._refuse(f"{call} fails ({type(error).__name__}: {reason(error)})", "correct it")
         if value.shape != shape:
-            self._refuse(f"{call} returns an array of shape {value.shape}", f"it must fill out, {what}")
+            self._refuse(
+                f"{call} returns an array of shape {value.shape}", f"it must fill out, {what}"
+            )
         return value
 
     def _called(self, function, *arguments):

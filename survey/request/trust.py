@@ -1,7 +1,9 @@
-"""Which scene files may run: those whose exact text this user has run here before, or allows in this process.
+"""Which scene files may run: those whose exact text this user has run here before, or allows in
+this process.
 
-Until then, a file that a survey names is untrusted. Texts are identified by their SHA-256; those of earlier runs are
-recorded in the user's state folder as empty files, `scenes/HASH`, so that writers need no lock.
+Until then, a file that a survey names is untrusted. Texts are identified by their SHA-256; those of
+earlier runs are recorded in the user's state folder as empty files, `scenes/HASH`, so that writers
+need no lock.
 """
 
 import os
@@ -26,7 +28,9 @@ def allow(digest: str) -> None:
 
 
 def keep(digest: str) -> None:
-    """Record that this user has run the text with this hash; if nothing can be written, for this process only."""
+    """Record that this user has run the text with this hash; if nothing can be written, for this
+    process only.
+    """
     if digest in _kept:
         return
     _kept.add(digest)
@@ -37,7 +41,11 @@ def keep(digest: str) -> None:
     with suppress(OSError):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         if _is_private(folder, stat.S_ISDIR):
-            os.close(os.open(folder / digest, os.O_WRONLY | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600))
+            os.close(
+                os.open(
+                    folder / digest, os.O_WRONLY | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o600
+                )
+            )
 
 
 def _folder() -> Path | None:
@@ -51,13 +59,18 @@ def _folder() -> Path | None:
 
 def _is_kept(digest: str) -> bool:
     folder = _folder()
-    return folder is not None and _is_private(folder, stat.S_ISDIR) and _is_private(folder / digest, stat.S_ISREG)
+    return (
+        folder is not None
+        and _is_private(folder, stat.S_ISDIR)
+        and _is_private(folder / digest, stat.S_ISREG)
+    )
 
 
 def _is_private(path: Path, kind) -> bool:  # type: ignore[no-untyped-def]
     """Is it of this kind, not a link, owned by this user, and writable by nobody else?
 
-    Windows has no owners and modes to look at: there, only this user can write to the user's own folders.
+    Windows has no owners and modes to look at: there, only this user can write to the user's own
+    folders.
     """
     try:
         found = path.lstat()
@@ -65,4 +78,8 @@ def _is_private(path: Path, kind) -> bool:  # type: ignore[no-untyped-def]
         return False
     if not hasattr(os, "geteuid"):
         return kind(found.st_mode)  # type: ignore[no-any-return]
-    return kind(found.st_mode) and found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return (
+        kind(found.st_mode)
+        and found.st_uid == os.geteuid()
+        and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    )

@@ -9,7 +9,8 @@ The file of a Hill equation y'' + z(u, p) y = 0 holds
     BREAKS       where z or a derivative jumps, in [0, T]: number(s), or a function of p; none by default
     DAMPING      c of y'' + 2 c y' + z y = 0: a number, or the name of the parameter that is c; 0 by default
 
-that of an Abel equation w w' = f(phi, p) w + g(phi, p), or phi' = w, w' = f(phi, p) w + g(phi, p) in time,
+that of an Abel equation w w' = f(phi, p) w + g(phi, p), or phi' = w, w' = f(phi, p) w + g(phi, p)
+in time,
 
     f(phi, p), g(phi, p)    functions, plain or numba's; p as above
     PARAMETERS              as above
@@ -23,7 +24,8 @@ that of a linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0,
     PARAMETERS      as above
     PERIOD          T, a number or a function of p
     STRUCTURE       "none" by default; "symplectic": J A is symmetric, J = (0 1; -1 0), the states being coordinates,
-                    then momenta (with K: M q' + C q / 2); "reversible": R A(-t) R = -A(t) with signs R. It is checked
+                    then momenta (with K: M q' + C q / 2); "reversible": R A(-t) R = -A(t) with
+                    signs R. It is checked
     BREAKS          times in [0, T] at which A jumps or has a kink: number(s), or a function of p; none by default
     CONSERVED       optional: n numbers w, or a function of p: w x, x the states at t = 0, is the same a period later
                     (checked); its multiplier, 1, is neither given nor judged
@@ -34,44 +36,49 @@ that of the periodic orbits of x' = f(t, x, p)
     STATES, PARAMETERS as above
     PERIOD             T, a number or a function of p; None: f does not depend on t, and T is found
     START              where Newton's method begins: the n states at t = 0, or a function of p that returns them; if
-                       PERIOD is None, a guess of the period after them; with CONTINUATION it may be NaN where there is
-                       no guess, and orbits are followed from elsewhere
+                       PERIOD is None, a guess of the period after them; with CONTINUATION it may be
+                       NaN where there is no guess, and orbits are followed from elsewhere
     CONTINUATION       optional: (name, least, greatest value) of a parameter along which orbits are followed
     REVERSED, HELD     optional, if PERIOD is None: the names of the states, half of all, that change their sign when
-                       time is reversed (checked), and of one of the others, whose value at t = 0 is that of START:
-                       orbits are sought in which the REVERSED are 0 at t = 0 and half a period later
+                       time is reversed (checked), and of one of the others, whose value at t = 0 is
+                       that of START: orbits are sought in which the REVERSED are 0 at t = 0 and
+                       half a period later
     TRANSVERSE         optional, with these: states that are 0 on all orbits, and do not act on the others there; the
                        stability against motions in these states alone is judged
     jacobian(t, x, p, out)    optional: fills the n x n matrix df/dx, and is compared with that of the record
 
-and all optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only files that you
-trust. A file that is named only by a survey runs if this user has run it here before, or allows it (see `trust.py`).
-Changes in what it imports are not noticed when a run is resumed. z is continued with period T. [boundaries] and
-[refine] assume that z is analytic in the parameters.
+and all optionally a docstring, TITLE and REFERENCES. It is executed like any Python file: use only
+files that you trust. A file that is named only by a survey runs if this user has run it here
+before, or allows it (see `trust.py`). Changes in what it imports are not noticed when a run is
+resumed. z is continued with period T. [boundaries] and [refine] assume that z is analytic in the
+parameters.
 
-z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as `z_resolved_width`; at the
-ends and middles of the axes there is one every T/16384 (T/32768), and a spike that only these show is refused. Features
-narrower than both may go unseen; near BREAKS the samples are as dense as necessary. A z without BREAKS that its code
-shows to have no spikes (see `survey.measures.hill.bands`) needs no such samples.
+z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as
+`z_resolved_width`; at the ends and middles of the axes there is one every T/16384 (T/32768), and a
+spike that only these show is refused. Features narrower than both may go unseen; near BREAKS the
+samples are as dense as necessary. A z without BREAKS that its code shows to have no spikes (see
+`survey.measures.hill.bands`) needs no such samples.
 
-A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the power series of A in
-every step, for all points, and bounds of the rounding. Branches are followed as the code takes them: points that take
-others are recorded on their own. What depends on t must be analytic between BREAKS. A spike is seen if it is T/128 wide
-at half its height (`A_resolved_width`); a narrower one may go unseen, unless its position is one of BREAKS.
+A (or M, C, K) is run once, as Python, to record its operations on t and p; the record gives the
+power series of A in every step, for all points, and bounds of the rounding. Branches are followed
+as the code takes them: points that take others are recorded on their own. What depends on t must be
+analytic between BREAKS. A spike is seen if it is T/128 wide at half its height
+(`A_resolved_width`); a narrower one may go unseen, unless its position is one of BREAKS.
 
-f(t, x, p, out) is recorded likewise, and its derivatives by x are those of the record; it must be analytic in t and x:
-branches may depend on parameters alone.
+f(t, x, p, out) is recorded likewise, and its derivatives by x are those of the record; it must be
+analytic in t and x: branches may depend on parameters alone.
 
-f and g are run once at every set of parameters, as Python, to record their operations on phi; the record gives their
-Taylor series, bounds of them and of their rounding. So what depends on phi must be analytic: + - * / ** and functions
-of math or numpy (sin to atanh, exp to log10, sqrt, erf, hypot); what depends on p alone may branch and loop. Numbers in
-the code are taken as exact binary64 numbers.
+f and g are run once at every set of parameters, as Python, to record their operations on phi; the
+record gives their Taylor series, bounds of them and of their rounding. So what depends on phi must
+be analytic: + - * / ** and functions of math or numpy (sin to atanh, exp to log10, sqrt, erf,
+hypot); what depends on p alone may branch and loop. Numbers in the code are taken as exact binary64
+numbers.
 
-Where float64 cannot decide a verdict of a Hill equation, the point is solved again in double-double, as in built-in
-scenes: z is run once more, as Python, with mpmath's functions in place of those of math and numpy. Numbers in the code,
-PERIOD and BREAKS are taken as exact binary64 numbers (math.pi is not quite pi), and if EVEN, z is used up to T/2 and
-mirrored. Where z cannot be run like this, the attribute `z_more_digits` of the file says why, and float64's answer
-stays.
+Where float64 cannot decide a verdict of a Hill equation, the point is solved again in
+double-double, as in built-in scenes: z is run once more, as Python, with mpmath's functions in
+place of those of math and numpy. Numbers in the code, PERIOD and BREAKS are taken as exact binary64
+numbers (math.pi is not quite pi), and if EVEN, z is used up to T/2 and mirrored. Where z cannot be
+run like this, the attribute `z_more_digits` of the file says why, and float64's answer stays.
 """
 
 from __future__ import annotations
@@ -155,7 +162,8 @@ def hill(
     damping: float | str = 0.0,
     title: str | None = None,
 ) -> HillScene | DampedScene:
-    """The scene of y'' + z(u, p) y = 0, or y'' + 2 c y' + z(u, p) y = 0, for `survey.evaluate` and `survey.run`.
+    """The scene of y'' + z(u, p) y = 0, or y'' + 2 c y' + z(u, p) y = 0, for `survey.evaluate` and
+    `survey.run`.
 
     Parameters
     ----------
@@ -197,7 +205,8 @@ def abel(
     period: float | None = None,
     title: str | None = None,
 ) -> AbelScene:
-    """The scene of Abel's equation w w' = f(phi, p) w + g(phi, p), for `survey.evaluate` and `survey.run`.
+    """The scene of Abel's equation w w' = f(phi, p) w + g(phi, p), for `survey.evaluate` and
+    `survey.run`.
 
     In time it is phi' = w, w' = f(phi, p) w + g(phi, p), so that turning points (w = 0) are passed.
 
@@ -244,7 +253,8 @@ def floquet(
     K: Callable[[Any, Any, Any], Any] | None = None,
     title: str | None = None,
 ) -> FloquetScene:
-    """The scene of x' = A(t, p) x, or of M q'' + C q' + K q = 0, for `survey.evaluate` and `survey.run`.
+    """The scene of x' = A(t, p) x, or of M q'' + C q' + K q = 0, for `survey.evaluate` and
+    `survey.run`.
 
     Parameters
     ----------
@@ -274,15 +284,34 @@ def floquet(
     >>> int(survey.evaluate(mathieu, delta=1.0, epsilon=0.3, zeta=0.2).verdict)
     1
     """
-    given = {name: function for name, function in (("A", A), ("M", M), ("C", C), ("K", K)) if function is not None}
+    given = {
+        name: function
+        for name, function in (("A", A), ("M", M), ("C", C), ("K", K))
+        if function is not None
+    }
     first = getattr(given.get("A", given.get("K")), "py_func", given.get("A", given.get("K")))
     name = f"floquet({', '.join(getattr(h, '__name__', name).strip('<>') for name, h in given.items())})"
     try:
-        text = "\n".join(dict.fromkeys(inspect.getsource(getattr(h, "py_func", h)) for h in given.values()))
+        text = "\n".join(
+            dict.fromkeys(inspect.getsource(getattr(h, "py_func", h)) for h in given.values())
+        )
     except (OSError, TypeError):
         text = ""
     about = inspect.getdoc(first) if first is not None else None
-    scene = _floquet(given, period, parameters, states, structure, breaks, conserved, name, text, title, about, ())
+    scene = _floquet(
+        given,
+        period,
+        parameters,
+        states,
+        structure,
+        breaks,
+        conserved,
+        name,
+        text,
+        title,
+        about,
+        (),
+    )
     _made[scene.HASH] = scene
     return scene
 
@@ -303,11 +332,12 @@ def orbit(
 ) -> OrbitScene:
     """The scene of the periodic orbits of x' = f(t, x, p), for `survey.evaluate` and `survey.run`.
 
-    Outputs are the state `x0` at t = 0, the period, and those of `survey.floquet` for motions next to the orbit.
-    Every orbit is shown to exist within its error bars; `status` is no_orbit where that fails. Where f does not
-    depend on t, x0 is in the plane through the start that f is normal to there, or, where no orbit is found from it,
-    through the state that the motion has 32 periods later, and the multipliers do not include the +1 that every orbit
-    has then. Where there are several orbits, the start decides.
+    Outputs are the state `x0` at t = 0, the period, and those of `survey.floquet` for motions next
+    to the orbit. Every orbit is shown to exist within its error bars; `status` is no_orbit where
+    that fails. Where f does not depend on t, x0 is in the plane through the start that f is normal
+    to there, or, where no orbit is found from it, through the state that the motion has 32 periods
+    later, and the multipliers do not include the +1 that every orbit has then. Where there are
+    several orbits, the start decides.
 
     Parameters
     ----------
@@ -352,13 +382,29 @@ def orbit(
     name = f"orbit({getattr(function, '__name__', 'f').strip('<>')})"
     about = inspect.getdoc(function)
     mirror = reversed, held, transverse
-    scene = _orbit(f, period, parameters, states, start, jacobian, continuation, mirror, name, text, title, about, ())
+    scene = _orbit(
+        f,
+        period,
+        parameters,
+        states,
+        start,
+        jacobian,
+        continuation,
+        mirror,
+        name,
+        text,
+        title,
+        about,
+        (),
+    )
     _made[scene.HASH] = scene
     return scene
 
 
 def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
-    """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or an own scene."""
+    """(name, scene) for a scene's name, a file `*.py` (relative to this folder, or else `near`), or
+    an own scene.
+    """
     if isinstance(scene, FunctionScene):
         return scene.NAME, scene
     if callable(scene):
@@ -370,12 +416,20 @@ def find(scene: Any, near: str | Path | None = None) -> tuple[str, Any]:
         try:
             return scene, load(scene)
         except BadInput:
-            files = [Path(at) / f"{scene}.py" for at in (".", near or ".")] if isinstance(scene, str) else []
+            files = (
+                [Path(at) / f"{scene}.py" for at in (".", near or ".")]
+                if isinstance(scene, str)
+                else []
+            )
             if any(map(os.path.isfile, files)):
-                raise BadInput(f"unknown scene {scene!r}; did you mean the file '{scene}.py'?") from None
+                raise BadInput(
+                    f"unknown scene {scene!r}; did you mean the file '{scene}.py'?"
+                ) from None
             if files and scene in ("hill", "abel", "floquet", "orbit"):
                 what = "systems of your own are files, such as 'mine.py', or come from"
-                raise BadInput(f"unknown scene {scene!r}: {what} survey.{scene}(...) in Python") from None
+                raise BadInput(
+                    f"unknown scene {scene!r}: {what} survey.{scene}(...) in Python"
+                ) from None
             raise
     path, text = _read(scene, near)
     found = _from_text(str(path), text)
@@ -388,7 +442,11 @@ def check(scene: Any, grid: Any = None) -> None:
     if not isinstance(scene, FunctionScene):
         return
     along = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
-    points = [grid.point(tuple(slice(i, i + 1) for i in index)) for index in product(*along)] if grid else []
+    points = (
+        [grid.point(tuple(slice(i, i + 1) for i in index)) for index in product(*along)]
+        if grid
+        else []
+    )
     own = scene.own
     names = [p.name for p in own]
     values = np.array([[float(np.ravel(point[name])[0]) for name in names] for point in points])
@@ -400,11 +458,14 @@ def check(scene: Any, grid: Any = None) -> None:
 def of_dataset(ds: Any) -> Any:
     """The scene of a survey's dataset, as `find` takes it.
 
-    Raises BadInput if it was a user's and has changed, Untrusted if its file has not been allowed to run.
+    Raises BadInput if it was a user's and has changed, Untrusted if its file has not been allowed
+    to run.
     """
     name, digest = ds.attrs["scene"], ds.attrs.get("scene_hash")
     if not isinstance(name, str):
-        raise BadInput(f"the attribute scene is {str(name)[:60]!r}, which is not the name of a scene")
+        raise BadInput(
+            f"the attribute scene is {str(name)[:60]!r}, which is not the name of a scene"
+        )
     if name.endswith(".py"):
         return _from_file(name, digest, Path(ds.encoding.get("source") or "").parent)
     if digest is None:
@@ -422,7 +483,9 @@ def _from_file(name: str, digest: Any, near: Path) -> FunctionScene:
     try:
         path, text = _read(name, near)
     except BadInput:
-        raise BadInput(f"scene = {name!r}: its file is missing; the attribute scene_text contains its text") from None
+        raise BadInput(
+            f"scene = {name!r}: its file is missing; the attribute scene_text contains its text"
+        ) from None
     found = hashlib.sha256(text.encode()).hexdigest()
     if found != digest:
         raise BadInput(
@@ -439,12 +502,18 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
     try:
         path = next((path for path in paths if path.is_file()), None)
     except (OSError, ValueError) as error:  # a name that the system does not allow
-        raise BadInput(f"scene = {shown(str(name), 120)}: no file can have this name ({reason_of(error)})") from None
+        raise BadInput(
+            f"scene = {shown(str(name), 120)}: no file can have this name ({reason_of(error)})"
+        ) from None
     if path is None:
         tried = " or ".join(dict.fromkeys(short(path, 120) for path in paths))
-        raise BadInput(f"scene = {shown(str(name), 120)}: there is no file {tried}; name the file of your own equation")
+        raise BadInput(
+            f"scene = {shown(str(name), 120)}: there is no file {tried}; name the file of your own equation"
+        )
     try:
-        with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)) as file:
+        with open(
+            path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)
+        ) as file:
             regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
             content = file.read(MAX_BYTES + 1) if regular else b""
         if not regular or len(content) > MAX_BYTES:
@@ -464,17 +533,27 @@ def _from_text(name: str, text: str) -> FunctionScene:
     try:
         exec(compile(text, name, "exec"), module.__dict__)
     except (Exception, SystemExit) as error:
-        raise BadInput(f"{name}: the scene file failed to run ({type(error).__name__}: {reason(error)})") from None
-    matrices = {name: getattr(module, name) for name in "AMCK" if callable(getattr(module, name, None))}
+        raise BadInput(
+            f"{name}: the scene file failed to run ({type(error).__name__}: {reason(error)})"
+        ) from None
+    matrices = {
+        name: getattr(module, name) for name in "AMCK" if callable(getattr(module, name, None))
+    }
     form = _form(name, module, matrices)
     _check_names(name, module, form)
     title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
     if form == "abel":
         about, period = module.__doc__ or inspect.getdoc(module.f), getattr(module, "PERIOD", None)
-        return _abel(module.f, module.g, period, module.PARAMETERS, name, text, title, about, references)
+        return _abel(
+            module.f, module.g, period, module.PARAMETERS, name, text, title, about, references
+        )
     if form == "floquet":
         about = module.__doc__ or inspect.getdoc(matrices.get("A", matrices.get("K")))
-        more = getattr(module, "STRUCTURE", "none"), getattr(module, "BREAKS", ()), getattr(module, "CONSERVED", None)
+        more = (
+            getattr(module, "STRUCTURE", "none"),
+            getattr(module, "BREAKS", ()),
+            getattr(module, "CONSERVED", None),
+        )
         given = module.PERIOD, module.PARAMETERS, module.STATES, *more
         return _floquet(matrices, *given, name, text, title, about, references)
     if form == "orbit":
@@ -483,9 +562,15 @@ def _from_text(name: str, text: str) -> FunctionScene:
         system = module.PERIOD, module.PARAMETERS, module.STATES, module.START
         mirror = tuple(getattr(module, key, None) for key in ("REVERSED", "HELD", "TRANSVERSE"))
         return _orbit(module.f, *system, *of_orbit, mirror, name, text, title, about, references)
-    optional = getattr(module, "EVEN", False), getattr(module, "BREAKS", ()), getattr(module, "DAMPING", 0.0)
+    optional = (
+        getattr(module, "EVEN", False),
+        getattr(module, "BREAKS", ()),
+        getattr(module, "DAMPING", 0.0),
+    )
     about = module.__doc__ or inspect.getdoc(getattr(module.z, "py_func", module.z))
-    return _hill(module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references)
+    return _hill(
+        module.z, module.PERIOD, module.PARAMETERS, *optional, name, text, title, about, references
+    )
 
 
 def _form(name: str, module: ModuleType, matrices: dict[str, Any]) -> str:
@@ -505,22 +590,32 @@ def _form(name: str, module: ModuleType, matrices: dict[str, Any]) -> str:
 
 
 def _check_names(name: str, module: ModuleType, form: str) -> None:
-    """Raise BadInput where a name is missing, or another one looks like a slip of it, which would be ignored."""
+    """Raise BadInput where a name is missing, or another one looks like a slip of it, which would
+    be ignored.
+    """
     others = [other for other in vars(module) if not other.startswith("_")]
     for key in (*FORMS[form], *OPTIONAL[form]):
         if hasattr(module, key):
             continue
         slips = [other for other in others if other != key and other.lower() == key.lower()]
-        slips += get_close_matches(key, [other for other in others if other.isupper()], cutoff=ALIKE)
+        slips += get_close_matches(
+            key, [other for other in others if other.isupper()], cutoff=ALIKE
+        )
         if slips:
             raise BadInput(f"{name}: {slips[0]} is not read; write {key}")
         if key in FORMS[form]:
-            none = ", or None if f does not depend on t" if (form, key) == ("orbit", "PERIOD") else ""
+            none = (
+                ", or None if f does not depend on t" if (form, key) == ("orbit", "PERIOD") else ""
+            )
             raise BadInput(f"{name}: {key} is missing; write {EXAMPLES[key]}{none}")
 
 
 def _function(
-    letter: str, function: Any, arguments: tuple[str, ...], what: str, refuse: Callable[[str], NoReturn]
+    letter: str,
+    function: Any,
+    arguments: tuple[str, ...],
+    what: str,
+    refuse: Callable[[str], NoReturn],
 ) -> None:
     """Refuse what is no function of these arguments, or has one of these names in another place."""
     call = f"{letter}({', '.join(arguments)})"
@@ -538,7 +633,9 @@ def _of_parameters(key: str, function: Any, refuse: Callable[[str], NoReturn]) -
         try:
             inspect.signature(getattr(function, "py_func", function)).bind(None)
         except TypeError:
-            refuse(f"{key} must be a function of one argument, the array p of the parameters, or no function")
+            refuse(
+                f"{key} must be a function of one argument, the array p of the parameters, or no function"
+            )
         except ValueError:  # its arguments cannot be known
             pass
 
@@ -560,7 +657,9 @@ def _hill(
     if not isinstance(even, (bool, np.bool_)):
         refuse(f"EVEN = {even!r}: it must be True or False")
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
-        refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
+        refuse(
+            f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one"
+        )
     breaks = _checked_breaks(breaks, period, "u", refuse)
     c, place = None, None
     if isinstance(damping, str) or damping != 0:
@@ -579,7 +678,9 @@ def _hill(
         **_described(name, text, title, about, references or REFERENCES, known),
     )  # fmt: skip
     if damped:
-        return DampedScene(damping=c, place=names.index(place) if place else None, even=bool(even), **shared)
+        return DampedScene(
+            damping=c, place=names.index(place) if place else None, even=bool(even), **shared
+        )
     return HillScene(EVEN=bool(even), **shared)
 
 
@@ -596,7 +697,9 @@ def _abel(
 
     for letter, function in (("f", f), ("g", g)):
         _function(letter, function, ("phi", "p"), "; the parameters are p[0], p[1], ...", refuse)
-    parameters = _parameters(parameters, gyrostat.OUTPUTS, ("phi0", "w0", "question", "branch"), refuse)
+    parameters = _parameters(
+        parameters, gyrostat.OUTPUTS, ("phi0", "w0", "question", "branch"), refuse
+    )
     if period is not None and not (is_number(period) and abs(period - 2 * np.pi) <= 1e-15 * period):
         refuse(f"PERIOD = {period!r}: it must be 2 pi, to which phi can be scaled, or None")
     names = ", ".join(p.name for p in parameters)
@@ -628,11 +731,17 @@ def _floquet(
     if len(names) > LARGEST:
         refuse(f"STATES names {len(names)} states; at most {LARGEST} are allowed")
     if structure not in stability.STRUCTURES:
-        refuse(f"STRUCTURE = {structure!r}: it must be one of {', '.join(map(repr, stability.STRUCTURES))}")
+        refuse(
+            f"STRUCTURE = {structure!r}: it must be one of {', '.join(map(repr, stability.STRUCTURES))}"
+        )
     if structure == "symplectic" and len(names) % 2:
-        refuse(f"STRUCTURE = 'symplectic', but STATES names {len(names)} states; it must name an even number")
+        refuse(
+            f"STRUCTURE = 'symplectic', but STATES names {len(names)} states; it must name an even number"
+        )
     if not callable(period) and not (is_number(period) and 0 < period < np.inf):
-        refuse(f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one")
+        refuse(
+            f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one"
+        )
     breaks = _checked_breaks(breaks, period, "t", refuse)
     _of_parameters("CONSERVED", conserved, refuse)
     if conserved is not None and not callable(conserved):
@@ -642,7 +751,9 @@ def _floquet(
         except (TypeError, ValueError):
             conserved = ()
         if len(conserved) != len(names):
-            refuse(f"CONSERVED = {shown(given)}: there are {len(names)} states, and each needs a number")
+            refuse(
+                f"CONSERVED = {shown(given)}: there are {len(names)} states, and each needs a number"
+            )
     if conserved is not None and (structure != "none" or len(names) < 2):
         refuse("CONSERVED is for STRUCTURE = 'none', and two states at least")
     equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
@@ -669,7 +780,13 @@ def _orbit(
     for letter, function in (("f", f), ("jacobian", jacobian)):
         if function is not None or letter == "f":
             _function(letter, function, ("t", "x", "p", "out"), ", that fills out", refuse)
-    more = ("state", "multiplier", "row", "column", *(("orbits", "branch") if continuation is not None else ()))
+    more = (
+        "state",
+        "multiplier",
+        "row",
+        "column",
+        *(("orbits", "branch") if continuation is not None else ()),
+    )
     parameters = _parameters(parameters, orbit.OUTPUTS, more, refuse)
     continued = None
     if continuation is not None:
@@ -679,8 +796,14 @@ def _orbit(
         refuse(f"STATES names {len(names)} states; at most {LARGEST} are allowed")
     if period is None and len(names) < 2:
         refuse("STATES names one state: without a PERIOD, orbits need two")
-    if period is not None and not callable(period) and not (is_number(period) and 0 < period < np.inf):
-        refuse(f"PERIOD = {period!r}: it must be a positive number, a function of p that returns one, or None")
+    if (
+        period is not None
+        and not callable(period)
+        and not (is_number(period) and 0 < period < np.inf)
+    ):
+        refuse(
+            f"PERIOD = {period!r}: it must be a positive number, a function of p that returns one, or None"
+        )
     for key, function in (("PERIOD", period), ("START", start)):
         _of_parameters(key, function, refuse)
     symmetry = _symmetry(mirror, names, period, refuse)
@@ -692,13 +815,27 @@ def _orbit(
             start = ()
         if len(start) != needed or not np.isfinite(start).all():
             guess = " and a guess of the period" if period is None else ""
-            refuse(f"START must be {needed} numbers, the states{guess}, or a function of p that returns them")
+            refuse(
+                f"START must be {needed} numbers, the states{guess}, or a function of p that returns them"
+            )
         if period is None and start[-1] <= 0.0:
-            refuse(f"START ends in {start[-1]:g}, the guess of the period, as PERIOD is None; it must be positive")
+            refuse(
+                f"START ends in {start[-1]:g}, the guess of the period, as PERIOD is None; it must be positive"
+            )
     about = inspect.cleandoc(
-        about or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
+        about
+        or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
     )
-    known = (f, period, parameters, names, start, jacobian, continued, *(() if symmetry is None else (symmetry,)))
+    known = (
+        f,
+        period,
+        parameters,
+        names,
+        start,
+        jacobian,
+        continued,
+        *(() if symmetry is None else (symmetry,)),
+    )
     return OrbitScene(
         f=f, period=period, start=start, jacobian=jacobian, states=names, continued=continued, symmetry=symmetry,
         own=parameters,
@@ -734,7 +871,9 @@ def _continued(
     except (TypeError, ValueError, IndexError, KeyError):
         good = False
     if not good:
-        refuse(f"CONTINUATION = {shown(given)}: give (name, least, greatest value) of one of {', '.join(names)}")
+        refuse(
+            f"CONTINUATION = {shown(given)}: give (name, least, greatest value) of one of {', '.join(names)}"
+        )
     index = names.index(name)
     own = parameters[index]
     if not own.holds([low, high]).all():
@@ -743,7 +882,9 @@ def _continued(
     return (*parameters[:index], own, *parameters[index + 1 :]), Range(index, low, high)
 
 
-def _symmetry(mirror: tuple[Any, ...], names: tuple[str, ...], period: Any, refuse: Callable[[str], NoReturn]) -> Any:
+def _symmetry(
+    mirror: tuple[Any, ...], names: tuple[str, ...], period: Any, refuse: Callable[[str], NoReturn]
+) -> Any:
     """The `Symmetry` of the orbits that are sought, from REVERSED, HELD and TRANSVERSE, or None."""
     from survey.measures.floquet.symmetry import Symmetry
 
@@ -751,7 +892,13 @@ def _symmetry(mirror: tuple[Any, ...], names: tuple[str, ...], period: Any, refu
     given = {"REVERSED": odd, "TRANSVERSE": transverse}
     places = {}
     for key, value in given.items():
-        some = (value,) if isinstance(value, str) else tuple(value) if isinstance(value, Iterable) else ()
+        some = (
+            (value,)
+            if isinstance(value, str)
+            else tuple(value)
+            if isinstance(value, Iterable)
+            else ()
+        )
         for one in some:
             if one not in names or some.count(one) > 1:
                 refuse(f"{key} names {one!r}; name states, each once: {', '.join(names)}")
@@ -759,28 +906,48 @@ def _symmetry(mirror: tuple[Any, ...], names: tuple[str, ...], period: Any, refu
     odd, transverse = places["REVERSED"], places["TRANSVERSE"]
     if not odd:
         if held is not None or transverse:
-            refuse(f"{'TRANSVERSE' if transverse else 'HELD'} is for orbits with REVERSED; name these states too")
+            refuse(
+                f"{'TRANSVERSE' if transverse else 'HELD'} is for orbits with REVERSED; name these states too"
+            )
         return None
     if period is not None:
         refuse("REVERSED is for orbits whose PERIOD is not known; set PERIOD = None")
     if 2 * len(odd) != len(names):
-        refuse(f"REVERSED names {len(odd)} of {len(names)} states; half of all must change their sign")
+        refuse(
+            f"REVERSED names {len(odd)} of {len(names)} states; half of all must change their sign"
+        )
     if transverse and len(transverse) == len(names):
         refuse("TRANSVERSE names all states; some must move on the orbits")
     if held not in names or names.index(held) in (*odd, *transverse):
         others = [one for k, one in enumerate(names) if k not in (*odd, *transverse)]
-        refuse(f"HELD = {held!r}: name one of {', '.join(others)}, whose value at t = 0 is that of START")
+        refuse(
+            f"HELD = {held!r}: name one of {', '.join(others)}, whose value at t = 0 is that of START"
+        )
     if 2 * len(set(odd) & set(transverse)) != len(transverse):
-        refuse("TRANSVERSE: half of these states must be REVERSED, as a coordinate and its velocity")
+        refuse(
+            "TRANSVERSE: half of these states must be REVERSED, as a coordinate and its velocity"
+        )
     if len(names) < 4 and not transverse:
-        refuse("REVERSED: in two states there is no other multiplier to judge; name four states at least")
+        refuse(
+            "REVERSED: in two states there is no other multiplier to judge; name four states at least"
+        )
     return Symmetry(len(names), odd, names.index(held), transverse)
 
 
 def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, ...]:
-    names = (states,) if isinstance(states, str) else tuple(states) if isinstance(states, Iterable) else ()
-    if not names or any(not isinstance(n, str) or not n.isidentifier() or names.count(n) > 1 for n in names):
-        refuse(f"STATES = {shown(states)}: give the names of the states, each once, as identifiers{_apart(states)}")
+    names = (
+        (states,)
+        if isinstance(states, str)
+        else tuple(states)
+        if isinstance(states, Iterable)
+        else ()
+    )
+    if not names or any(
+        not isinstance(n, str) or not n.isidentifier() or names.count(n) > 1 for n in names
+    ):
+        refuse(
+            f"STATES = {shown(states)}: give the names of the states, each once, as identifiers{_apart(states)}"
+        )
     return names
 
 
@@ -795,11 +962,17 @@ def _checked_breaks(breaks: Any, period: Any, time: str, refuse: Callable[[str],
     try:
         breaks = tuple(float(u) for u in np.atleast_1d(breaks))
     except (TypeError, ValueError):
-        refuse(f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them")
-    outside = [b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))]
+        refuse(
+            f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them"
+        )
+    outside = [
+        b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))
+    ]
     if outside:
         length = "" if callable(period) else f" = {period:g}"
-        refuse(f"BREAKS: {outside[0]:g} lies outside 0 <= {time} <= T{length}; name positions within one period")
+        refuse(
+            f"BREAKS: {outside[0]:g} lies outside 0 <= {time} <= T{length}; name positions within one period"
+        )
     return breaks
 
 
@@ -809,10 +982,14 @@ def _parameters(
     """The parameters; refused where a name is that of an output, a keyword, or one of `more`."""
     if isinstance(given, (str, Parameter)) or not isinstance(given, Iterable):
         given = (given,)
-    parameters = tuple(p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in given)
+    parameters = tuple(
+        p if isinstance(p, Parameter) else Parameter(str(p), str(p), _symbol(str(p))) for p in given
+    )
     names = [p.name for p in parameters]
     taken = {o.name for o in outputs} | {"status", "method", "rtol", "variables", "scene", *more}
-    wrong = next((n for n in names if not n.isidentifier() or n in taken or names.count(n) > 1), None)
+    wrong = next(
+        (n for n in names if not n.isidentifier() or n in taken or names.count(n) > 1), None
+    )
     if wrong is not None or not names:
         because = f"; rename {wrong!r}, which is taken" if wrong in taken else _apart(wrong)
         refuse(
@@ -825,7 +1002,11 @@ def _parameters(
 def _apart(names: Any) -> str:
     """How several names in one text are written, if `names` is such a text."""
     parts = re.split(r"[\s,;]+", names.strip()) if isinstance(names, str) else []
-    return f"; write {tuple(parts)!r}" if len(parts) > 1 and all(part.isidentifier() for part in parts) else ""
+    return (
+        f"; write {tuple(parts)!r}"
+        if len(parts) > 1 and all(part.isidentifier() for part in parts)
+        else ""
+    )
 
 
 def _symbol(name: str) -> str:

@@ -1,24 +1,28 @@
-"""The scenes: one physical system per file. `survey/scene.py` holds the words in which a scene describes itself.
+"""The scenes: one physical system per file. `survey/scene.py` holds the words in which a scene
+describes itself.
 
-A scene module holds what CONTRACT lists, and no other public name; the table is checked when the scene is loaded.
-Another package brings scenes by entry points of the group "survey.scenes": `NAME = "package.module"`.
+A scene module holds what CONTRACT lists, and no other public name; the table is checked when the
+scene is loaded. Another package brings scenes by entry points of the group "survey.scenes": `NAME =
+"package.module"`.
 
-`solve(point, request)` answers one block. `point` maps each parameter that exists to a float64 array; all have the same
-number of dimensions and broadcast to the block's shape: an axis of the block is long in the arrays that vary along it
-and 1 in the others, so that what depends on one axis is computed once (`survey.measures.rows` helps). A value outside
-the domain of its parameter arrives as NaN: such points get the status `invalid_parameters`. `request` is a
-survey.scene.Request; `request.line(name)` describes the full axis of a parameter, of which the block may be a part.
+`solve(point, request)` answers one block. `point` maps each parameter that exists to a float64
+array; all have the same number of dimensions and broadcast to the block's shape: an axis of the
+block is long in the arrays that vary along it and 1 in the others, so that what depends on one axis
+is computed once (`survey.measures.rows` helps). A value outside the domain of its parameter arrives
+as NaN: such points get the status `invalid_parameters`. `request` is a survey.scene.Request;
+`request.line(name)` describes the full axis of a parameter, of which the block may be a part.
 
-`solve` returns, in the block's shape (plus an output's extra dimensions), every output in `request.variables` (all of
-them if that is empty), `X_error` (float64), an absolute error bound, for each float output `X`, and `status` (int8: the
-codes of `survey.status`, from 16 on the scene's own in the order of STATUS). Where an output does not apply a float is
-NaN, an integer its `fill`. Where a scene gives a status of its own, the verdict is -1, and maps and counts name the
-status. `solve` is pure and thread-safe, and gives a point the same bits in any block.
+`solve` returns, in the block's shape (plus an output's extra dimensions), every output in
+`request.variables` (all of them if that is empty), `X_error` (float64), an absolute error bound,
+for each float output `X`, and `status` (int8: the codes of `survey.status`, from 16 on the scene's
+own in the order of STATUS). Where an output does not apply a float is NaN, an integer its `fill`.
+Where a scene gives a status of its own, the verdict is -1, and maps and counts name the status.
+`solve` is pure and thread-safe, and gives a point the same bits in any block.
 
-In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything that is known of one
-point, {name: array}, flags as words. `compile_ahead` runs in a process of its own at the first use of a question, and
-the solver waits for its end, or for its next `yield`, where it needs what is compiled there (see
-`survey.kernels.jit.wait_for_other_compiler`).
+In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything
+that is known of one point, {name: array}, flags as words. `compile_ahead` runs in a process of its
+own at the first use of a question, and the solver waits for its end, or for its next `yield`, where
+it needs what is compiled there (see `survey.kernels.jit.wait_for_other_compiler`).
 """
 
 import ast
@@ -37,36 +41,64 @@ GROUP = "survey.scenes"  # of entry points
 
 CONTRACT = {
     "TITLE": Value("one line", str, needed=True),
-    "PARAMETERS": Value("survey.scene.Parameter, in the order in which they are listed", tuple, needed=True),
+    "PARAMETERS": Value(
+        "survey.scene.Parameter, in the order in which they are listed", tuple, needed=True
+    ),
     "OPTIONS": Value("survey.scene.Option: switches with a few values each", tuple, needed=True),
-    "OUTPUTS": Value("survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True),
-    "FAMILY": Value("the methods whose SERVES names this family can solve the scene", str, needed=True),
-    "AUDIT": Value("methods by which `survey verify` solves points again, the first choice first", tuple, needed=True),
+    "OUTPUTS": Value(
+        "survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True
+    ),
+    "FAMILY": Value(
+        "the methods whose SERVES names this family can solve the scene", str, needed=True
+    ),
+    "AUDIT": Value(
+        "methods by which `survey verify` solves points again, the first choice first",
+        tuple,
+        needed=True,
+    ),
     "REFERENCES": Value("sources, one string each", tuple, needed=True),
     "STATUS": Value(
-        "{name: sentence}: its own reasons why a point has no answer; its own sentence for a common one", dict
+        "{name: sentence}: its own reasons why a point has no answer; its own sentence for a common one",
+        dict,
     ),
-    "RATIOS": Value("parameters without a unit, in a scene whose others are in any consistent units", tuple),
-    "DIMENSIONS": Value("{name: coordinates} of the extra dimensions that its outputs name in `dims`", dict),
-    "EVEN": Value("is the coefficient of its Hill equation even about the half period? True if not given", bool),
+    "RATIOS": Value(
+        "parameters without a unit, in a scene whose others are in any consistent units", tuple
+    ),
+    "DIMENSIONS": Value(
+        "{name: coordinates} of the extra dimensions that its outputs name in `dims`", dict
+    ),
+    "EVEN": Value(
+        "is the coefficient of its Hill equation even about the half period? True if not given",
+        bool,
+    ),
     "STARTER": Value(
         "what `survey init` asks: {parameter: number, or (start, stop) of an axis}, besides what must be given; and "
         '"figures": the output that is drawn',
         dict,
     ),
     "states": Value(
-        "names of the states of its linear periodic system; coordinates, then momenta if symplectic", tuple
+        "names of the states of its linear periodic system; coordinates, then momenta if symplectic",
+        tuple,
     ),
-    "structure": Value("of that system, as in `survey.floquet`: none, symplectic or reversible", str),
+    "structure": Value(
+        "of that system, as in `survey.floquet`: none, symplectic or reversible", str
+    ),
     "cost": Function(
         "rough seconds per point with the default method; `sizes` is {parameter: number of values}, 1 if it is fixed",
         ("options", "sizes"),
         needed=True,
     ),
-    "SECONDS": Value("{output: seconds that a point takes besides where it is named}, of outputs on request", dict),
-    "curves_seconds": Value("seconds that the curves of [boundaries] of a map take, where they are searched", float),
+    "SECONDS": Value(
+        "{output: seconds that a point takes besides where it is named}, of outputs on request",
+        dict,
+    ),
+    "curves_seconds": Value(
+        "seconds that the curves of [boundaries] of a map take, where they are searched", float
+    ),
     "solve": Function("{output: array} of a block, see above", ("point", "request"), needed=True),
-    "why": Function("a sentence: what decided the verdict, by which margin against which error bar", ("answer",)),
+    "why": Function(
+        "a sentence: what decided the verdict, by which margin against which error bar", ("answer",)
+    ),
     "trajectory": Function(
         "survey.scene.Trajectory: the motion at one point up to `time`, or as long as suits if that is None; None if "
         "these options have no motion",
@@ -88,7 +120,9 @@ class _Folder(ModuleType):
     """`survey.scenes` is this folder; called, it gives {name: title} of the scenes."""
 
     def __call__(self):
-        return {name: _title(name) for name in modules.names(self)} | {name: load(name).TITLE for name in brought()}
+        return {name: _title(name) for name in modules.names(self)} | {
+            name: load(name).TITLE for name in brought()
+        }
 
 
 def load(name):
@@ -107,8 +141,14 @@ def _title(name):
     source = next((Path(folder) / f"{name}.py" for folder in sys.modules[__name__].__path__), None)
     if f"{__name__}.{name}" not in sys.modules and source and source.is_file():
         for node in ast.parse(source.read_bytes()).body:
-            if isinstance(node, ast.Assign) and any(getattr(to, "id", "") == "TITLE" for to in node.targets):
-                return ast.literal_eval(node.value) if isinstance(node.value, ast.Constant) else load(name).TITLE
+            if isinstance(node, ast.Assign) and any(
+                getattr(to, "id", "") == "TITLE" for to in node.targets
+            ):
+                return (
+                    ast.literal_eval(node.value)
+                    if isinstance(node.value, ast.Constant)
+                    else load(name).TITLE
+                )
     return load(name).TITLE
 
 
@@ -138,7 +178,9 @@ def _check(module):
         contract.refuse(module, f"FAMILY names no family {module.FAMILY!r}", where)
     for name in module.AUDIT:
         if name not in modules.names(methods):
-            contract.refuse(module, f"AUDIT: {modules.unknown('method', name, modules.names(methods))}", where)
+            contract.refuse(
+                module, f"AUDIT: {modules.unknown('method', name, modules.names(methods))}", where
+            )
 
 
 sys.modules[__name__].__class__ = _Folder

@@ -1,13 +1,16 @@
-"""Rotation of an axisymmetric body (A = B) about its fixed centre of mass in a Newtonian field (Brun, Clebsch).
+"""Rotation of an axisymmetric body (A = B) about its fixed centre of mass in a Newtonian field
+(Brun, Clebsch).
 
-With theta the angle between the axis and the direction of the attracting centre, u = cos theta, p_psi and p_phi
-conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 + p_phi^2 (h the energy):
+With theta the angle between the axis and the direction of the attracting centre, u = cos theta,
+p_psi and p_phi conserved, k = epsilon A (A - C) and L = 2 A h - (A/C) p_phi^2 - epsilon A^2 +
+p_phi^2 (h the energy):
 
     A^2 u'^2 = (1 - u^2)(L + k u^2) - (p_phi^2 + p_psi^2 - 2 p_psi p_phi u)                            (S2)
     psi' = [(p_psi - p_phi)/(1 - u) + (p_psi + p_phi)/(1 + u)] / (2 A)                                 (S4)
 
-Model: Euler's and Poisson's equations, reduced to one quadrature by three integrals, exactly, for any A = B. Not for
-A != B, or a centre that moves; the potential is that of the gravity gradient, with errors of order 1/R.
+Model: Euler's and Poisson's equations, reduced to one quadrature by three integrals, exactly, for
+any A = B. Not for A != B, or a centre that moves; the potential is that of the gravity gradient,
+with errors of order 1/R.
 
 Parameters, in order: A > 0 and C (0 < C <= 2 A), moments of inertia; epsilon = 3 mu / R^3, any sign; an initial state:
 theta0 in [0, pi] (0 only if p_psi = p_phi), p_theta0, p_psi, p_phi; and, if wanted, t (psi = phi = 0 at t = 0). Or,
@@ -15,16 +18,18 @@ instead of all these, the scaled integrals l = L/|k|, alpha = p_phi/sqrt|k|, bet
 (of k) and ratio = C/A, which only the spin needs; then every well of the effective potential has an index, lower u
 first, and time is in units of A/sqrt|k|, action in units of sqrt|k|.
 
-Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced modulo 2 pi, nor are
-the rotation numbers, which are 1/(2 pi) of them. They jump by 2 pi (by 1) where p_psi -+ p_phi changes its sign on
-motions that pass a pole, u = +-1; on such a motion they have the mean of both limits. [boundaries] gives these lines,
-the separatrices and the regular precessions on maps of two of l, alpha, beta, or of two parameters of initial states.
+Per period of the nutation psi advances by `precession` and phi by `spin`; these are not reduced
+modulo 2 pi, nor are the rotation numbers, which are 1/(2 pi) of them. They jump by 2 pi (by 1)
+where p_psi -+ p_phi changes its sign on motions that pass a pole, u = +-1; on such a motion they
+have the mean of both limits. [boundaries] gives these lines, the separatrices and the regular
+precessions on maps of two of l, alpha, beta, or of two parameters of initial states.
 
-Known: T, precession and reduced spin are symmetric in p_psi <-> p_phi; both wells have the same T; without field
-(epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at regular precessions; near a separatrix T
-grows as the logarithm of the distance.
+Known: T, precession and reduced spin are symmetric in p_psi <-> p_phi; both wells have the same T;
+without field (epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at
+regular precessions; near a separatrix T grows as the logarithm of the distance.
 
-Source: Bekov, Shinibaev et al., on quadratures of Kobb's type, checked and corrected in `brun.md` beside this file.
+Source: Bekov, Shinibaev et al., on quadratures of Kobb's type, checked and corrected in `brun.md`
+beside this file.
 """
 
 from functools import partial
@@ -68,8 +73,10 @@ STATUS = {
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
 _HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _LARGEST = 1e290
-_BLURRED = 4e-13  # relative bars of actions of wells so narrow that turning points lose digits: see `brun.measure`
-_LARGE = {"minimum": -1e25, "maximum": 1e25}  # products of four such numbers, and of their inverses, are floats
+# relative bars of actions of wells so narrow that turning points lose digits: see `brun.measure`
+_BLURRED = 4e-13
+# products of four such numbers, and of their inverses, are floats
+_LARGE = {"minimum": -1e25, "maximum": 1e25}
 _MOTION_PERIODS, _MOTION_POINTS = 6, 3001  # of a trajectory
 DIMENSIONS = {"well": np.array([1, 2])}
 
@@ -123,9 +130,21 @@ def _extra(name, long_name, symbol, when, applies):
     return Output(name, long_name, symbol, when=when, applies=applies, on_request=True)
 
 
-_PHASED = dict.fromkeys(("beta1", "beta2"), "p_phi is not 0 and A is not C") | {"beta3": "without jumps at poles"}
-_VERDICTS = {"undecided": -1, "separatrix": 0, "regular_nutation": 1, "regular_precession": 2, "pole_passage": 3}
-_ANGLE = {"units": "rad", "when": _MOTION, "applies": f"{_MOVES}; without the jumps of pi in passing a pole"}
+_PHASED = dict.fromkeys(("beta1", "beta2"), "p_phi is not 0 and A is not C") | {
+    "beta3": "without jumps at poles"
+}
+_VERDICTS = {
+    "undecided": -1,
+    "separatrix": 0,
+    "regular_nutation": 1,
+    "regular_precession": 2,
+    "pole_passage": 3,
+}
+_ANGLE = {
+    "units": "rad",
+    "when": _MOTION,
+    "applies": f"{_MOVES}; without the jumps of pi in passing a pole",
+}
 STARTER = {
     "p_psi": (-0.99, 0.99), "p_phi": (0.05, 0.95), "A": 1.0, "C": 0.6, "epsilon": 1.0, "theta0": 1.0, "p_theta0": 0.2,
     "figures": "precession",
@@ -170,10 +189,14 @@ def solve(point, request):
         slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
         out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
-        valid &= (given["C"] <= 2.0 * given["A"]) & ((given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"]))
+        valid &= (given["C"] <= 2.0 * given["A"]) & (
+            (given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"])
+        )
         solver = multiprecision.of_state
         slowly = partial(_state, method=method, request=request, times=times)
-        out = _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
+        out = (
+            _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
+        )
     if "t" not in point:
         unsettled.settle(out, columns, solver, valid, request)
     out |= derived.solve(out, request.variables)
@@ -210,7 +233,11 @@ def _state_in_lanes(given, columns, valid, slowly, wanted):
     if "separatrix_distance" in wanted:
         out |= nutation.distance(nutation.heights(brun.heights_of_states, columns))
     out = _completed(out, given, valid, done, slowly)
-    blurred = np.flatnonzero(out["action_error"] > _BLURRED * np.abs(out["action"])) if "action" in wanted else []
+    blurred = (
+        np.flatnonzero(out["action_error"] > _BLURRED * np.abs(out["action"]))
+        if "action" in wanted
+        else []
+    )
     if len(blurred):
         part = slowly({name: values[blurred] for name, values in given.items()}, valid[blurred])
         for name in ("action", "action_error"):
@@ -229,7 +256,9 @@ def _scaled_in_lanes(given, valid, sign, slowly, wanted):
     two = np.flatnonzero(done & (wells == 2))
     upper = columns[:, two]
     upper[2] = 1.0
-    both[:, two, 1], _wells, done[two] = nutation.in_lanes(brun_lanes.of_integrals, upper, "action" in wanted)
+    both[:, two, 1], _wells, done[two] = nutation.in_lanes(
+        brun_lanes.of_integrals, upper, "action" in wanted
+    )
     out = nutation.named(both[:, :, None, :]) | {"wells": wells.astype(np.int64)}
     if "separatrix_distance" in wanted:
         out |= nutation.distance(nutation.heights(brun.heights_of_integrals, columns))
@@ -284,8 +313,12 @@ def _with_motion(out, valid, kinds, times, motions):
     good = np.isfinite(times)
     at_t = motions(np.where(good, times, 0.0))
     lost = (kinds >= nu.NUTATION)[:, None] & np.isnan(at_t["u"])
-    out = {name: np.repeat(values[:, None], times.shape[1], axis=1) for name, values in out.items()} | at_t
-    out["status"] = np.where(good, np.where(valid[:, None] & lost, NO_CONVERGENCE, out["status"]), INVALID_PARAMETERS)
+    out = {
+        name: np.repeat(values[:, None], times.shape[1], axis=1) for name, values in out.items()
+    } | at_t
+    out["status"] = np.where(
+        good, np.where(valid[:, None] & lost, NO_CONVERGENCE, out["status"]), INVALID_PARAMETERS
+    )
     return _emptied(out, out["status"] == INVALID_PARAMETERS)
 
 
@@ -299,10 +332,15 @@ def _scaled(given, valid, sign, method, rtol):
     flat = np.ascontiguousarray(rows.reshape(-1, nu.SIZE))
     periods, known = nutation.periods(method, flat, kinds.ravel(), rtol)
     out = nutation.outputs(flat, periods, 1.0, drift)
-    out, known = {name: values.reshape(-1, 1, 2) for name, values in out.items()}, known.reshape(-1, 2)
+    out, known = (
+        {name: values.reshape(-1, 1, 2) for name, values in out.items()},
+        known.reshape(-1, 2),
+    )
     lost = (known == nu.LOST).any(axis=1)
     out["verdict"] = nutation.verdicts(rows, known).max(axis=1)
-    status = np.where(lost, NO_CONVERGENCE, np.where((known == nu.NONE).all(axis=1), nutation.NO_MOTION, OK))
+    status = np.where(
+        lost, NO_CONVERGENCE, np.where((known == nu.NONE).all(axis=1), nutation.NO_MOTION, OK)
+    )
     return _finished(out, status, valid, count, heights)
 
 
@@ -336,18 +374,25 @@ def trajectory(point, answer, options, time=None):
     if not np.isfinite(period) and "l" in point and answer["verdict"] == "separatrix":
         return _homoclinic(point, int(options["sign"]), time)
     if not np.isfinite(period):
-        raise BadInput("this motion has no period (a separatrix, or no motion at all): take a point beside it")
+        raise BadInput(
+            "this motion has no period (a separatrix, or no motion at all): take a point beside it"
+        )
     state = {p.name: point[p.name] for p in PARAMETERS[:7] if p.name in point}
     if "l" in point:
         state = _state_of(point, float(np.ravel(answer["u_min"])[well]), int(options["sign"]))
     t = np.linspace(0.0, _MOTION_PERIODS * period if time is None else time, _MOTION_POINTS)
     asked = {name: np.full((1, 1), value) for name, value in state.items()} | {"t": t[None]}
-    out = {name: values[0] for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()}
+    out = {
+        name: values[0]
+        for name, values in solve(asked, Request({"motion": "at_t"}, rtol=1e-9)).items()
+    }
     return _drawn(t, out, "l" in point, _sides(out["u"], state))
 
 
 def _homoclinic(point, sign, time):
-    """The Trajectory of the motion that leaves an unstable precession and returns, furthest from it at t = 0."""
+    """The Trajectory of the motion that leaves an unstable precession and returns, furthest from it
+    at t = 0.
+    """
     drift = point["alpha"] * (1.0 - point["ratio"]) / point["ratio"]
     loop = separatrix.loop(point["alpha"], point["beta"], sign, drift)
     if loop is None:
@@ -355,7 +400,9 @@ def _homoclinic(point, sign, time):
     end = 12.0 / loop.rate if time is None else time
     t = np.linspace(0.0 if time is not None else -end, end, _MOTION_POINTS)
     found = loop.motion(t)
-    return _drawn(t, found, True, _sides(found["u"], {"p_psi": point["beta"], "p_phi": point["alpha"]}))
+    return _drawn(
+        t, found, True, _sides(found["u"], {"p_psi": point["beta"], "p_phi": point["alpha"]})
+    )
 
 
 def _drawn(t, out, scaled, sides):
@@ -365,12 +412,29 @@ def _drawn(t, out, scaled, sides):
     for o in OUTPUTS[:3]:
         meaning = {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
         data[o.name] = ("t", out[o.name], meaning)
-        data[f"{o.name}_error"] = ("t", out[f"{o.name}_error"], meaning | {"long_name": f"error bound of {o.name}"})
+        data[f"{o.name}_error"] = (
+            "t",
+            out[f"{o.name}_error"],
+            meaning | {"long_name": f"error bound of {o.name}"},
+        )
     side = np.sqrt((1.0 - out["u"]) * (1.0 + out["u"])) * sides
-    for name, values in {"x": side * np.cos(out["psi"]), "y": side * np.sin(out["psi"]), "z": out["u"]}.items():
-        data[f"axis_{name}"] = ("t", values, {"long_name": f"component {name} of the body's axis", "units": "1"})
+    for name, values in {
+        "x": side * np.cos(out["psi"]),
+        "y": side * np.sin(out["psi"]),
+        "z": out["u"],
+    }.items():
+        data[f"axis_{name}"] = (
+            "t",
+            values,
+            {"long_name": f"component {name} of the body's axis", "units": "1"},
+        )
     return Trajectory(
-        data, (("lines", "t", "u"), ("lines", "t", "psi", "phi"), ("sphere", "axis_x", "axis_y", "axis_z"))
+        data,
+        (
+            ("lines", "t", "u"),
+            ("lines", "t", "psi", "phi"),
+            ("sphere", "axis_x", "axis_y", "axis_z"),
+        ),
     )
 
 
@@ -378,18 +442,23 @@ def _state_of(point, u, sign):
     """The initial state at rest in theta at u, for scaled integrals: sqrt|k| = A = 1."""
     ratio = point["ratio"]
     if ratio == 1.0:
-        raise BadInput("ratio = 1: a sphere feels no field, so no motion has these integrals; take another ratio")
+        raise BadInput(
+            "ratio = 1: a sphere feels no field, so no motion has these integrals; take another ratio"
+        )
     return {"A": 1.0, "C": ratio, "epsilon": sign / (1.0 - ratio), "theta0": float(np.arccos(u)), "p_theta0": 0.0,
             "p_psi": point["beta"], "p_phi": point["alpha"]}  # fmt: skip
 
 
 def _sides(u, state):
-    """Which side of a pole that it passes the axis is on, -1 or 1: psi is given without its jumps of pi there."""
+    """Which side of a pole that it passes the axis is on, -1 or 1: psi is given without its jumps
+    of pi there.
+    """
     pole = 1 if state["p_psi"] == state["p_phi"] else -1 if state["p_psi"] == -state["p_phi"] else 0
     near = pole * u
     before, here, after = near[:-2], near[1:-1], near[2:]
     top = 1 + np.flatnonzero((here > before) & (here >= after) & (here > 0.9))
-    later = near[top + 1] > near[top - 1]  # the parabola through three points has its top beyond the middle one
+    # the parabola through three points has its top beyond the middle one
+    later = near[top + 1] > near[top - 1]
     passed = np.zeros(u.size, int)
     passed[top + later] = 1
     return 1 - 2 * (np.cumsum(passed) % 2)
@@ -398,9 +467,17 @@ def _sides(u, state):
 def why(answer):
     """Why a point has its verdict, in a sentence (see `survey.scenes`)."""
     distance = answer.get("separatrix_distance", np.nan)
-    apart = named(answer, "separatrix_distance") if np.isfinite(distance) else "these momenta have no separatrix"
+    apart = (
+        named(answer, "separatrix_distance")
+        if np.isfinite(distance)
+        else "these momenta have no separatrix"
+    )
     if answer["verdict"] in ("separatrix", "undecided"):
-        return f"{apart}: the error bar reaches across 0" if np.isfinite(distance) else "the error bars leave it open"
+        return (
+            f"{apart}: the error bar reaches across 0"
+            if np.isfinite(distance)
+            else "the error bars leave it open"
+        )
     if answer["verdict"] == "pole_passage":
         return f"p_psi = +-p_phi exactly, so that the axis passes a pole; {apart}"
     width = np.nanmax(answer["u_max"] - answer["u_min"])

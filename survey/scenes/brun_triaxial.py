@@ -1,19 +1,22 @@
-"""Rotation of a body with three unequal moments about its fixed centre of mass in a Newtonian field (Clebsch's case).
+"""Rotation of a body with three unequal moments about its fixed centre of mass in a Newtonian field
+(Clebsch's case).
 
     M' = M x w + epsilon nu x (I nu),  nu' = nu x w,  M = I w,  I = diag(A, B, C),  |nu| = 1               (1)
     H = (M.w + epsilon nu.I nu) / 2,  F2 = |M|^2 - epsilon nu.adj(I) nu,  F3 = M.nu                        (2)
 
-w is the angular velocity and nu the vertical, the direction of the attracting centre, in the body's principal axes.
-H, F2 and F3 are conserved.
+w is the angular velocity and nu the vertical, the direction of the attracting centre, in the body's
+principal axes. H, F2 and F3 are conserved.
 
-Model: Euler's and Poisson's equations, exact for any A, B, C (with A = B: scene `brun`, which has all motions in closed
-form). Not for a centre that moves; the potential is that of the gravity gradient, with errors of order 1/R.
+Model: Euler's and Poisson's equations, exact for any A, B, C (with A = B: scene `brun`, which has
+all motions in closed form). Not for a centre that moves; the potential is that of the gravity
+gradient, with errors of order 1/R.
 
-Parameters, in order: A, B, C > 0, principal moments of inertia, none larger than the sum of the others; epsilon =
-3 mu / R^3, any sign. For the question `trajectory` an initial state, omega1, omega2, omega3 (w) and gamma1, gamma2,
-gamma3 (nu, of which only the direction counts), and t. For `rotation` the rate Omega of a permanent rotation about a
-principal axis that is vertical: option `axis`. For `critical` sigma and p_psi, the value of F3: the motions on which
-H + sigma F2 / 2 is stationary among all with this F3; option `sense` is the sign of their rate of turn.
+Parameters, in order: A, B, C > 0, principal moments of inertia, none larger than the sum of the
+others; epsilon = 3 mu / R^3, any sign. For the question `trajectory` an initial state, omega1,
+omega2, omega3 (w) and gamma1, gamma2, gamma3 (nu, of which only the direction counts), and t. For
+`rotation` the rate Omega of a permanent rotation about a principal axis that is vertical: option
+`axis`. For `critical` sigma and p_psi, the value of F3: the motions on which H + sigma F2 / 2 is
+stationary among all with this F3; option `sense` is the sign of their rate of turn.
 
 Known. The rotation about the middle axis is unstable (but, perhaps, at Omega^2 = epsilon, where a rotation about any
 vertical axis is permanent). With epsilon > 0 that about the axis of the least moment is stable, and that about the
@@ -23,12 +26,13 @@ full motion: a combination of H, F2 and F3 has a strict extremum. Critical motio
 angular momentum, w = turn_rate (1 + sigma I)^-1 nu (9); unstable ones, and unstable rotations, carry separatrices: the
 motions with the same H, F2 and F3.
 
-Source: V. Brun; A. Clebsch, Math. Ann. 3 (1871) 238; Bekov, Shinibaev et al., whose integrals (7) are F1 to F3 as
-corrected in `brun.md`. Stability and critical motions: derived in `brun_triaxial.md` beside this file.
+Source: V. Brun; A. Clebsch, Math. Ann. 3 (1871) 238; Bekov, Shinibaev et al., whose integrals (7)
+are F1 to F3 as corrected in `brun.md`. Stability and critical motions: derived in
+`brun_triaxial.md` beside this file.
 
-Questions: `rotation` (is the rotation about a principal axis stable?), `critical` (the bifurcation diagram of the
-integrals, its motions and their stability), `trajectory` (w and nu at t, and how far H, F2 and F3 are from their first
-values).
+Questions: `rotation` (is the rotation about a principal axis stable?), `critical` (the bifurcation
+diagram of the integrals, its motions and their stability), `trajectory` (w and nu at t, and how far
+H, F2 and F3 are from their first values).
 """
 
 import numpy as np
@@ -42,7 +46,9 @@ from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, Trajectory, named
 from survey.status import INVALID_PARAMETERS, NO_CONVERGENCE, OK, OVERFLOW
 
-TITLE = "Rotation of a body with three unequal moments of inertia in a Newtonian field (Clebsch's case)"
+TITLE = (
+    "Rotation of a body with three unequal moments of inertia in a Newtonian field (Clebsch's case)"
+)
 FAMILY = "body"
 AUDIT = ("dop853",)
 RATIOS = ("gamma1", "gamma2", "gamma3")
@@ -141,9 +147,15 @@ def _rotations(given, options, status):
 
 def _critical(given, options, status):
     moments = [given[name] for name in _MOMENTS]
-    found = clebsch.critical(moments, given["epsilon"], given["sigma"], given["p_psi"], float(options["sense"]))
+    found = clebsch.critical(
+        moments, given["epsilon"], given["sigma"], given["p_psi"], float(options["sense"])
+    )
     exists, _certificate = found.pop("exists"), found.pop("certificate")
-    return found, {"verdict": found.pop("verdict")}, np.where((status == OK) & ~exists, _NO_MOTION, status)
+    return (
+        found,
+        {"verdict": found.pop("verdict")},
+        np.where((status == OK) & ~exists, _NO_MOTION, status),
+    )
 
 
 def _written(found, codes, status):
@@ -153,7 +165,9 @@ def _written(found, codes, status):
     out, good = {"status": status}, status == OK
     for name, number in found.items():
         fine = good & np.isfinite(number.bar) & np.isfinite(number.value)
-        out[name], out[f"{name}_error"] = (np.where(fine, x, np.nan) for x in (number.value, number.bar))
+        out[name], out[f"{name}_error"] = (
+            np.where(fine, x, np.nan) for x in (number.value, number.bar)
+        )
     for name, values in codes.items():
         out[name] = np.where(good, values, -1 if name == "verdict" else -2)
     return out
@@ -165,7 +179,10 @@ def _trajectories(point, request):
     shared = [point[name] for name in names]
     block = Rows(tuple(shared), point["t"])
     rows, times = dict(zip(names, block.columns(shared), strict=True)), block.per_point(point["t"])
-    moments, w, nu = (np.stack([rows[name] for name in part], axis=1) for part in (_MOMENTS, _STATE[:3], _STATE[3:]))
+    moments, w, nu = (
+        np.stack([rows[name] for name in part], axis=1)
+        for part in (_MOMENTS, _STATE[:3], _STATE[3:])
+    )
     scale = abs(nu).max(axis=1)
     nu = nu / np.where(scale > 0.0, scale, 1.0)[:, None]
     length = np.sqrt((nu * nu).sum(axis=1))
@@ -176,15 +193,26 @@ def _trajectories(point, request):
     fine = good[:, None] & np.isfinite(times)
     G = np.zeros((len(w), 14, 3))
     for i in range(3):
-        G[:, i, i], G[:, 3 + i, i], G[:, 9 + i, i] = moments[:, i], 1.0 / moments[:, i], epsilon * moments[:, i]
-    floats, status = motion.trajectories(method, G, np.hstack([w, nu]), np.where(fine, times, 0.0), request.rtol)
+        G[:, i, i], G[:, 3 + i, i], G[:, 9 + i, i] = (
+            moments[:, i],
+            1.0 / moments[:, i],
+            epsilon * moments[:, i],
+        )
+    floats, status = motion.trajectories(
+        method, G, np.hstack([w, nu]), np.where(fine, times, 0.0), request.rtol
+    )
     lost = (status == OK) & ~np.isfinite(floats).all(axis=-1)
     status = np.where(fine, np.where(lost, NO_CONVERGENCE, status), INVALID_PARAMETERS)
     floats[status != OK] = np.nan
     columns = {f"{kind}{i}": 3 * k + i - 1 for k, kind in enumerate(("w", "nu")) for i in (1, 2, 3)}
     found = {name: Bounded(floats[..., at], floats[..., 6 + at]) for name, at in columns.items()}
-    inertia, field = [bounded.of(moments[:, i, None]) for i in range(3)], bounded.of(epsilon[:, None])
-    first = [Bounded(x[:, i, None], width) for x, width in ((w, 0.0), (nu, 4e-16)) for i in range(3)]
+    inertia, field = (
+        [bounded.of(moments[:, i, None]) for i in range(3)],
+        bounded.of(epsilon[:, None]),
+    )
+    first = [
+        Bounded(x[:, i, None], width) for x, width in ((w, 0.0), (nu, 4e-16)) for i in range(3)
+    ]
     kept = clebsch.integrals(inertia, field, first[:3], first[3:])
     later = clebsch.integrals(inertia, field, *(
         [found[f"{kind}{i}"] for i in (1, 2, 3)] for kind in ("w", "nu")))  # fmt: skip
@@ -193,7 +221,9 @@ def _trajectories(point, request):
     out = {"status": block.back(status)}
     for name, number in found.items():
         for key, values in ((name, number.value), (f"{name}_error", number.bar)):
-            out[key] = block.back(np.where(status == OK, np.broadcast_to(values, status.shape), np.nan))
+            out[key] = block.back(
+                np.where(status == OK, np.broadcast_to(values, status.shape), np.nan)
+            )
     return out
 
 
@@ -213,9 +243,11 @@ def why(answer):
 
 
 def trajectory(point, answer, options, time=None):
-    """w at times, and the path of the vertical on the sphere in the body's axes (see `survey.scenes`).
+    """w at times, and the path of the vertical on the sphere in the body's axes (see
+    `survey.scenes`).
 
-    Of a permanent rotation: the motion of a body that is turned from it by 1e-3. Of a critical motion: the motion.
+    Of a permanent rotation: the motion of a body that is turned from it by 1e-3. Of a critical
+    motion: the motion.
     """
     t = np.linspace(0.0, 40.0 if time is None else float(time), 2001)
     body = {name: np.full((1, 1), float(point[name])) for name in (*_MOMENTS, "epsilon")}

@@ -1,61 +1,72 @@
-"""A gyrostat with Barnett-London effect turning about axis 1: phi' = w, w' = f(phi) w + g(phi), on the cylinder.
+"""A gyrostat with Barnett-London effect turning about axis 1: phi' = w, w' = f(phi) w + g(phi), on
+the cylinder.
 
     f = b12 cos phi - b31 sin phi,
     g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi                              (57)
 
-Model: the six equations of `gyrostat_body`, on a set that is invariant under conditions necessary and sufficient for
-it. Not for motions beside the set, which may leave it: `gyrostat_body` tells.
+Model: the six equations of `gyrostat_body`, on a set that is invariant under conditions necessary
+and sufficient for it. Not for motions beside the set, which may leave it: `gyrostat_body` tells.
 
-Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of s), up to
-1e12; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent variable and
-w w_phi = f w + g; here the system is solved in time, so turning points (w = 0) are passed.
+Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of
+s), up to 1e12; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent
+variable and w w_phi = f w + g; here the system is solved in time, so turning points (w = 0) are
+passed.
 
-What is known. H = w^2/2 + V, V' = -g: dH/dt = f w^2. K = b12 s3 - b31 s2 decides the ends w -> +-inf: both attract
-for K > 0 (spin-up, w^2 ~ K t), both repel for K < 0; at K = 0 L = (pi/2)(c23 (b12^2 - b31^2) - d b12 b31) decides.
-Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K = L = 0). Symmetries: (b, w, t) -> -(b, w, t);
-(phi, w, b31, c23, s2) -> -(...); phi -> phi + pi, (b, s) -> -(b, s); rotations of axes 2 and 3.
+What is known. H = w^2/2 + V, V' = -g: dH/dt = f w^2. K = b12 s3 - b31 s2 decides the ends w ->
++-inf: both attract for K > 0 (spin-up, w^2 ~ K t), both repel for K < 0; at K = 0 L = (pi/2)(c23
+(b12^2 - b31^2) - d b12 b31) decides. Integrable strata: I0 (g = 0), I1 (b = 0, H conserved), I2 (K
+= L = 0). Symmetries: (b, w, t) -> -(b, w, t); (phi, w, b31, c23, s2) -> -(...); phi -> phi + pi,
+(b, s) -> -(b, s); rotations of axes 2 and 3.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked and corrected in
-`gyrostat.md` beside this file (with the classification that the fates follow).
+Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), checked
+and corrected in `gyrostat.md` beside this file (with the classification that the fates follow).
 
-A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit of steps; the
-cycles are those that a lattice of return maps shows, with dips followed down to folds. b = 0 and g = 0 are taken
-exactly, K = 0 and L = 0 within the rounding of the parameters; where K is larger than that, but the return maps do not
-show their change beside rounding, verdicts are -1. `multiplier` and cycles carry error bars; verdicts near a stable
-separatrix are -1 (status `separatrix`), also those of starts at rest beside a saddle: `equilibrium_start` is given to
-exact equilibria only, and of binary64 angles none but phi0 = 0, where s2 = c23, is one (if g is not 0 throughout).
+A fate is decided by the monotone return maps and by proven regions of attraction, never by a limit
+of steps; the cycles are those that a lattice of return maps shows, with dips followed down to
+folds. b = 0 and g = 0 are taken exactly, K = 0 and L = 0 within the rounding of the parameters;
+where K is larger than that, but the return maps do not show their change beside rounding, verdicts
+are -1. `multiplier` and cycles carry error bars; verdicts near a stable separatrix are -1 (status
+`separatrix`), also those of starts at rest beside a saddle: `equilibrium_start` is given to exact
+equilibria only, and of binary64 angles none but phi0 = 0, where s2 = c23, is one (if g is not 0
+throughout).
 
-Of a map of a thousand or more initial states of one system the curves between basins are found once: stable branches of
-saddles, those by which motions enter a node fastest, unstable cycles. A start takes the fate of the region it lies in,
-which is that of two starts in it; what lies nearer to a curve than its error bar, or between windings too close to be
-told apart, is followed by itself. Fates are the same, but that some which could not be decided are.
+Of a map of a thousand or more initial states of one system the curves between basins are found
+once: stable branches of saddles, those by which motions enter a node fastest, unstable cycles. A
+start takes the fate of the region it lies in, which is that of two starts in it; what lies nearer
+to a curve than its error bar, or between windings too close to be told apart, is followed by
+itself. Fates are the same, but that some which could not be decided are.
 
-A motion is one curve through (phi0, w0), in time. As a solution w(phi) of (57) it has, where w0 = 0 and g(phi0) != 0,
-two branches, w ~ +-sqrt(2 g (phi - phi0)), both on the side of phi0 to which g points. An Abel solution is the branch
-that the motion takes at t > 0, on which w has the sign of g(phi0); `branch = "before"` takes the other, by which the
-motion came: there w has the other sign and t < 0. Where w0 != 0 there is one branch, and the option changes nothing.
+A motion is one curve through (phi0, w0), in time. As a solution w(phi) of (57) it has, where w0 = 0
+and g(phi0) != 0, two branches, w ~ +-sqrt(2 g (phi - phi0)), both on the side of phi0 to which g
+points. An Abel solution is the branch that the motion takes at t > 0, on which w has the sign of
+g(phi0); `branch = "before"` takes the other, by which the motion came: there w has the other sign
+and t < 0. Where w0 != 0 there is one branch, and the option changes nothing.
 
-With `saddle` instead of w0 the solution lies on a separatrix, exactly: on a branch of the saddle of that number (by
-angle in [0, 2 pi)), one that leaves it (`separatrix = "unstable"`) or runs into it ("stable"), on the `side` where
-phi0 is; of the saddle's copies, one a turn, that next to phi0. t = 0 where the branch, followed from the saddle,
-first passes phi0, before it turns; `w_start` is w there. Where there is no such saddle, or the branch turns before
-phi0, the status is `invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
-same energy; so are motions whose phi0 = 0 and w0 give exactly the energy of a saddle (at no other phi0 can binary64
-do that). Degenerate equilibria count as saddles: they have branches here where b = 0 and the root of g is exactly
-multiple. On a stable branch the fate is the saddle; on an unstable one it is where that branch ends.
+With `saddle` instead of w0 the solution lies on a separatrix, exactly: on a branch of the saddle of
+that number (by angle in [0, 2 pi)), one that leaves it (`separatrix = "unstable"`) or runs into it
+("stable"), on the `side` where phi0 is; of the saddle's copies, one a turn, that next to phi0. t =
+0 where the branch, followed from the saddle, first passes phi0, before it turns; `w_start` is w
+there. Where there is no such saddle, or the branch turns before phi0, the status is
+`invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
+same energy; so are motions whose phi0 = 0 and w0 give exactly the energy of a saddle (at no other
+phi0 can binary64 do that). Degenerate equilibria count as saddles: they have branches here where b
+= 0 and the root of g is exactly multiple. On a stable branch the fate is the saddle; on an unstable
+one it is where that branch ends.
 
-An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi or so near to it
-that phi lies within `phi_turning_error` of `phi_turning`.
+An Abel solution has status `ok` where it certainly reaches phi, `turning` where it turns before phi
+or so near to it that phi lies within `phi_turning_error` of `phi_turning`.
 
-`auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits (method `closed`),
-else by Taylor series, and in double-double arithmetic (some 1e-3 s each) where these miss `rtol`; fates next to
-separatrices are followed in it, too. `survey failures gyrostat` maps where each method fails.
+`auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits
+(method `closed`), else by Taylor series, and in double-double arithmetic (some 1e-3 s each) where
+these miss `rtol`; fates next to separatrices are followed in it, too. `survey failures gyrostat`
+maps where each method fails.
 
-`turnings` counts the zeros of w between 0 and t, its ends not among them; it is unknown where a zero lies so near to t
-that the error bar of w leaves it open on which side.
+`turnings` counts the zeros of w between 0 and t, its ends not among them; it is unknown where a
+zero lies so near to t that the error bar of w leaves it open on which side.
 
-The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion; `survey verify`
-holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how deviations from the set grow.
+The method `full` solves the six equations (1)-(6) of a gyrostat whose invariant set is this motion;
+`survey verify` holds trajectories against it, and `workflows/gyrostat_deviation.py` measures how
+deviations from the set grow.
 
 A portrait is what the fates of a system share: ends, equilibria, cycles, and whether small changes of the parameters
 keep them all. It is structurally stable where, by the error bars, K is off zero (L, where K = 0 exactly), no
@@ -67,12 +78,12 @@ Where an equilibrium is degenerate or a Hopf point within the rounding of binary
 double-double arithmetic, in disjoint discs that are proven to hold them; an equilibrium of the type `degenerate` stands
 for the two or three roots within its error bar, a pair of which may be complex.
 
-[boundaries] draws, over phi0 and w0, the stable manifolds of the saddles, cycles and equilibria; over two parameters of
-the system, where portraits change: folds and Hopf curves of equilibria, K = 0, saddle connections, folds of cycles (see
-`measures/cylinder/curves.py`).
+[boundaries] draws, over phi0 and w0, the stable manifolds of the saddles, cycles and equilibria;
+over two parameters of the system, where portraits change: folds and Hopf curves of equilibria, K =
+0, saddle connections, folds of cycles (see `measures/cylinder/curves.py`).
 
-Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends) and `portrait` (of
-the system, without an initial state).
+Questions: `trajectory` (phi and w at t), `abel` (w and t at phi), `fate` (where the solution ends)
+and `portrait` (of the system, without an initial state).
 """
 
 import numpy as np
@@ -242,7 +253,9 @@ OUTPUTS = (
 
 
 def cost(options, sizes):
-    """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates of a system."""
+    """Seconds per point, rough: one solution serves its dense outputs, one set of cycles all fates
+    of a system.
+    """
     if options["question"] == "portrait":
         return 9e-3
     if "separatrix" in options and options["question"] == "fate":
@@ -300,7 +313,9 @@ def _why_portrait(answer):
     off = np.abs(answer["cycle_multiplier"] - 1.0)
     if np.isfinite(off).any():
         nearest = np.nanargmin(off)
-        near = plus_minus(answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest])
+        near = plus_minus(
+            answer["cycle_multiplier"][nearest], answer["cycle_multiplier_error"][nearest]
+        )
         margins.append(f"the multiplier nearest to 1 is {near}")
     words = {
         "structurally_stable": "no margin is within its error bar",
@@ -332,14 +347,18 @@ def trajectory(point, answer, options, time=None):
 def _separatrix(point, request, question):
     """The questions `trajectory` and `abel`, of solutions that start on a separatrix."""
     in_time = question == "trajectory"
-    rows, columns, back = blocks.dense(point, (*_SYSTEM, "phi0", "saddle"), "t" if in_time else "phi")
+    rows, columns, back = blocks.dense(
+        point, (*_SYSTEM, "phi0", "saddle"), "t" if in_time else "phi"
+    )
     rows, columns, good = blocks.valid(rows, columns)
     method = None if request.method == "auto" else load(methods, request.method, "method")
     stable, left = request.options["separatrix"] == "stable", request.options["side"] == "left"
     measure = separatrix.trajectories if in_time else separatrix.abel
     *results, heads = measure(method, rows, columns, request.rtol, stable, left)
     results = (blocks.at_times if in_time else blocks.at_angles)(results, good, back)
-    return results | _heads(heads, lambda column: back(np.broadcast_to(column[:, None], columns.shape)))
+    return results | _heads(
+        heads, lambda column: back(np.broadcast_to(column[:, None], columns.shape))
+    )
 
 
 def _heads(heads, back):
@@ -354,7 +373,9 @@ def _heads(heads, back):
 
 def _fates_on_separatrices(point, request, method):
     """The question `fate`, of solutions that start on a separatrix."""
-    given = np.broadcast_arrays(*(np.asarray(point[name], dtype=float) for name in (*_SYSTEM, "phi0", "saddle")))
+    given = np.broadcast_arrays(
+        *(np.asarray(point[name], dtype=float) for name in (*_SYSTEM, "phi0", "saddle"))
+    )
     rows, shape = np.stack([array.ravel() for array in given], axis=-1), given[0].shape
     good = np.isfinite(rows).all(axis=1)
     stable, left = request.options["separatrix"] == "stable", request.options["side"] == "left"

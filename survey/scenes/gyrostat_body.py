@@ -1,41 +1,48 @@
-"""A whole gyrostat with Barnett-London effect: is its rotation about an axis a motion of the paper's, and observable?
+"""A whole gyrostat with Barnett-London effect: is its rotation about an axis a motion of the
+paper's, and observable?
 
     A w' = (A w + lambda) x w + (B w) x nu + nu x (C nu) + s x nu,   nu' = nu x w                     (1)-(6)
 
-Parameters, in order, in axes fixed in the body: A11, A22, A33, A12, A23, A31, the inertia tensor A (positive definite);
-B11, B22, B33, B12, B23, B31, the tensor B; C11, C22, C33, C12, C23, C31, the tensor C; lambda1, lambda2,
-lambda3, the gyrostatic moment; s1, s2, s3, the centre of mass vector; the initial state omega1, omega2, omega3 (w) and
-gamma1, gamma2, gamma3 (nu, of which only the direction counts); and t.
+Parameters, in order, in axes fixed in the body: A11, A22, A33, A12, A23, A31, the inertia tensor A
+(positive definite); B11, B22, B33, B12, B23, B31, the tensor B; C11, C22, C33, C12, C23, C31, the
+tensor C; lambda1, lambda2, lambda3, the gyrostatic moment; s1, s2, s3, the centre of mass vector;
+the initial state omega1, omega2, omega3 (w) and gamma1, gamma2, gamma3 (nu, of which only the
+direction counts); and t.
 
-Under the conditions (26)-(36) rotation about one axis, w = (phi', 0, 0) with nu = (cos theta, sin theta sin phi,
-sin theta cos phi) at a constant theta, fills an invariant set, which carries the flow of the scene `gyrostat`. The axis
-may have any direction in the body: it is that of omega, or where omega = 0 that of omega', or at rest a principal axis
-of A. In the frame of that axis `residual` lists how far each condition is from being met, over A11, and `case` which of
-the paper's cases it is: about the vertical (sin theta = 0), A (B11 = A12 = A31 = 0, (44)-(48)) or B (theta = pi/2,
-(53), (54)). Conditions count as met within the rounding of a tensor that was turned into other axes (8e-15 of its
-largest entry). Off the set there is no reduced flow, and the status is `off_set`.
+Under the conditions (26)-(36) rotation about one axis, w = (phi', 0, 0) with nu = (cos theta, sin
+theta sin phi, sin theta cos phi) at a constant theta, fills an invariant set, which carries the
+flow of the scene `gyrostat`. The axis may have any direction in the body: it is that of omega, or
+where omega = 0 that of omega', or at rest a principal axis of A. In the frame of that axis
+`residual` lists how far each condition is from being met, over A11, and `case` which of the paper's
+cases it is: about the vertical (sin theta = 0), A (B11 = A12 = A31 = 0, (44)-(48)) or B (theta =
+pi/2, (53), (54)). Conditions count as met within the rounding of a tensor that was turned into
+other axes (8e-15 of its largest entry). Off the set there is no reduced flow, and the status is
+`off_set`.
 
 A fate of the reduced flow can be seen in the whole body only if deviations from the set do not grow. `reduced_stable`
 tells whether the limit is stable on the set, `observable` whether it is beside it: by the eigenvalues of the linearised
 equations at an equilibrium, by the multipliers along a cycle. Those that belong to the integrals k (7) and |nu| (8)
 are trivial and taken out; two remain in case B, three in case A, where k varies along the set, four about the vertical.
 
-Model: all six equations; fates on the invariant set by its flow on the cylinder, and beside it by the linear equations
-of deviations, exact to first order. Not for finite deviations, but by the question `trajectory`.
+Model: all six equations; fates on the invariant set by its flow on the cylinder, and beside it by
+the linear equations of deviations, exact to first order. Not for finite deviations, but by the
+question `trajectory`.
 
-What is known. In case B the divergence of deviations is (B12, B31) S^-1 (-cos phi, sin phi), S = (A22 A23; A23 A33),
-whatever the other parameters. If S = a 1 it is -(A11 / a) f, f that of the scene `gyrostat`: where the reduced flow
-contracts, deviations from the set grow, so that no attracting equilibrium or cycle of a body with A22 = A33, A23 = 0 is
-observable. Where B12 = B31 = 0 it is 0, and what does not grow does not decay either: such limits count as observable
-where the exponents are purely imaginary. A spin-up is not observable if axis 1 is that of the middle moment of inertia;
-else it is left open.
+What is known. In case B the divergence of deviations is (B12, B31) S^-1 (-cos phi, sin phi), S =
+(A22 A23; A23 A33), whatever the other parameters. If S = a 1 it is -(A11 / a) f, f that of the
+scene `gyrostat`: where the reduced flow contracts, deviations from the set grow, so that no
+attracting equilibrium or cycle of a body with A22 = A33, A23 = 0 is observable. Where B12 = B31 = 0
+it is 0, and what does not grow does not decay either: such limits count as observable where the
+exponents are purely imaginary. A spin-up is not observable if axis 1 is that of the middle moment
+of inertia; else it is left open.
 
-Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`;
-`gyrostat_body.md` beside this file derives the conditions again, and the equations of the deviations.
+Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected
+in `gyrostat.md`; `gyrostat_body.md` beside this file derives the conditions again, and the
+equations of the deviations.
 
-Questions: `fate` (where the motion on the set ends, and what is beside that), `portrait` (equilibria and cycles on the
-set, and the positions of rest of the whole body, whether it is on the set or not), `trajectory` (w and nu of any body
-at t).
+Questions: `fate` (where the motion on the set ends, and what is beside that), `portrait`
+(equilibria and cycles on the set, and the positions of rest of the whole body, whether it is on the
+set or not), `trajectory` (w and nu of any body at t).
 """
 
 import numpy as np
@@ -87,7 +94,14 @@ def _parameter(name):
 
 PARAMETERS = (
     *(_parameter(name) for name in NAMES),
-    Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, uncut=True, **_LARGE),
+    Parameter(
+        "t",
+        "time from the initial state (negative: before it)",
+        "t",
+        when=_TIME,
+        uncut=True,
+        **_LARGE,
+    ),
 )
 OPTIONS = (Option("question", _QUESTIONS, "what is asked of the body"),)
 STATUS = {
@@ -95,11 +109,17 @@ STATUS = {
     "`survey scenes gyrostat_body`",
     "off_set": "the body does not rotate about a fixed axis on the invariant set of the paper: residual says which "
     "conditions it misses, and by how much",
-    **{name: gyrostat.STATUS[name] for name in ("separatrix", "too_many_cycles", "degenerate_equilibrium")},
+    **{
+        name: gyrostat.STATUS[name]
+        for name in ("separatrix", "too_many_cycles", "degenerate_equilibrium")
+    },
 }
 _OFF_SET = 16
-# the reduced flow's own codes, in the order of the STATUS of the scene gyrostat, in that of this one
-_CODES = {16 + list(gyrostat.STATUS).index(name): 16 + i for i, name in enumerate([*STATUS][1:]) if i}
+# the reduced flow's own codes, in the order of the STATUS of the scene gyrostat, in that of this
+# one
+_CODES = {
+    16 + list(gyrostat.STATUS).index(name): 16 + i for i, name in enumerate([*STATUS][1:]) if i
+}
 DIMENSIONS = {
     "condition": np.array(CONDITIONS),
     "component": np.array([1, 2, 3]),
@@ -195,7 +215,9 @@ def cost(options, sizes):
     """Seconds per point, rough: bodies with the same reduced flow share its cycles."""
     if options["question"] == "trajectory":
         return 6e-4 / sizes.get("t", 1) + 4e-6
-    flows = any(sizes.get(name, 1) > 1 for name in ("A11", "B12", "B31", "C22", "C33", "C23", "s2", "s3"))
+    flows = any(
+        sizes.get(name, 1) > 1 for name in ("A11", "B12", "B31", "C22", "C33", "C23", "s2", "s3")
+    )
     return (8e-3 if flows else 0.0) + (6e-3 if options["question"] == "portrait" else 2e-3)
 
 
@@ -223,7 +245,9 @@ def solve(point, request):
         elif not np.abs(placed.six).max() <= _MOST or not abs(placed.w0) <= _MOST:
             out["status"][i] = OVERFLOW
         else:
-            {"fate": _write_fate, "portrait": _write_portrait}[question](method, placed, request.rtol, out, i)
+            {"fate": _write_fate, "portrait": _write_portrait}[question](
+                method, placed, request.rtol, out, i
+            )
             out["status"][i] = _CODES.get(int(out["status"][i]), out["status"][i])
         if out["status"][i] != OK:
             out["verdict"][i] = -1
@@ -282,7 +306,13 @@ def _write_fate(method, placed, rtol, out, i):
     if np.isfinite(beside.growth) and np.isfinite(beside.growth_bar):
         _put(out, "growth", i, beside.growth, beside.growth_bar)
     where = (i, slice(0, len(beside.values)))
-    _put_complex(out, "transversal_multiplier" if periodic else "transversal", where, beside.values, beside.bars)
+    _put_complex(
+        out,
+        "transversal_multiplier" if periodic else "transversal",
+        where,
+        beside.values,
+        beside.bars,
+    )
 
 
 def _write_portrait(method, placed, rtol, out, i):
@@ -290,7 +320,14 @@ def _write_portrait(method, placed, rtol, out, i):
         return
     result, at_rest, cycles = limits.of_portrait(method, placed, rtol)
     out["status"][i] = result["status"][0]
-    for name in ("equilibria", "rotations_plus", "rotations_minus", "librations", "equilibrium_type", "cycle_kind"):
+    for name in (
+        "equilibria",
+        "rotations_plus",
+        "rotations_minus",
+        "librations",
+        "equilibrium_type",
+        "cycle_kind",
+    ):
         out[name][i] = result[name][0]
     for name in ("equilibrium_phi", "cycle_w", "cycle_multiplier", "cycle_period"):
         _put(out, name, i, result[name][0], result[f"{name}_error"][0])
@@ -303,7 +340,13 @@ def _write_portrait(method, placed, rtol, out, i):
     for j, (reduced, beside) in enumerate(cycles):
         verdicts.append(limits.verdict(reduced, beside.stable))
         out["cycle_verdict"][i, j] = verdicts[-1]
-        _put_complex(out, "cycle_transversal", (i, j, slice(0, len(beside.values))), beside.values, beside.bars)
+        _put_complex(
+            out,
+            "cycle_transversal",
+            (i, j, slice(0, len(beside.values))),
+            beside.values,
+            beside.bars,
+        )
     known = result["verdict"][0] == reduced_portrait.STABLE and -1 not in verdicts
     out["verdict"][i] = 1 if 2 in verdicts else 0 if known else -1
 
@@ -316,7 +359,9 @@ def _write_rests(placed, out, i):
     for j, (nu, bar, beside) in enumerate(found):
         _put(out, "rest_nu", (i, j), placed.turn @ nu, bar + 8e-15)
         out["rest_stable"][i, j] = beside.stable
-        _put_complex(out, "rest_exponent", (i, j, slice(0, len(beside.values))), beside.values, beside.bars)
+        _put_complex(
+            out, "rest_exponent", (i, j, slice(0, len(beside.values))), beside.values, beside.bars
+        )
 
 
 def _trajectories(point, method, rtol):
@@ -365,5 +410,9 @@ def trajectory(point, answer, options, time=None):
     for o in OUTPUTS[-6:]:
         meaning = {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
         data[o.name] = ("t", out[o.name][0], meaning)
-        data[f"{o.name}_error"] = ("t", out[f"{o.name}_error"][0], meaning | {"long_name": f"error bound of {o.name}"})
+        data[f"{o.name}_error"] = (
+            "t",
+            out[f"{o.name}_error"][0],
+            meaning | {"long_name": f"error bound of {o.name}"},
+        )
     return Trajectory(data, (("lines", "t", "w1", "w2", "w3"), ("sphere", "nu1", "nu2", "nu3")))

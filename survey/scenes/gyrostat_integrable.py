@@ -1,4 +1,5 @@
-"""The integrable cases of the gyrostat with Barnett-London effect, each by the paper's own constants.
+"""The integrable cases of the gyrostat with Barnett-London effect, each by the paper's own
+constants.
 
 Option case:
 
@@ -7,22 +8,25 @@ trigonometric  (58)-(61): A11 phi' = mu (B12 sin phi + B31 cos phi - S2 B31 / C2
 elliptic       (62)-(68): A11 phi'^2 = n + (C22 - C33) cos 2phi / 2 - C23 sin 2phi + 2 S2 sin phi + 2 S3 cos phi
 quartic        (64)-(68): u'^2 = P4(u) / 4 of u = tan(phi / 2), P4 = a0 u^4 + 4 a1 u^3 + 6 a2 u^2 + 4 a3 u + a4
 
-Model: the flow of the scene `gyrostat`, itself a reduction of the whole body, where further conditions on the constants
-give closed forms. Without these conditions: `gyrostat`.
+Model: the flow of the scene `gyrostat`, itself a reduction of the whole body, where further
+conditions on the constants give closed forms. Without these conditions: `gyrostat`.
 
-Parameters, in order: A11; B12, B31; theta0, the angle between the axis of rotation and the vertical; n, or instead of
-it k, the constant of (7), which with lambda1 gives n = k / cos theta0 - lambda1; C22, C33, C23; S2, S3; the quartic's
-a0, a1, a2, a3, a4; phi0; w0, where the energy leaves it free; t. At phi0 the constants give phi' but, where its square
-is given (a0 to a4), for its sign: option direction.
+Parameters, in order: A11; B12, B31; theta0, the angle between the axis of rotation and the
+vertical; n, or instead of it k, the constant of (7), which with lambda1 gives n = k / cos theta0 -
+lambda1; C22, C33, C23; S2, S3; the quartic's a0, a1, a2, a3, a4; phi0; w0, where the energy leaves
+it free; t. At phi0 the constants give phi' but, where its square is given (a0 to a4), for its sign:
+option direction.
 
-Of the two solutions (61), `root` takes mu >= 1/2 (upper) or mu <= 1/2 (lower). It exists where A11 C23 / (B12 B31) <=
-1/4, and it demands C22 - C33 = C23 (B12^2 - B31^2) / (B12 B31) and S3 = S2 B31 / B12, which are outputs here.
+Of the two solutions (61), `root` takes mu >= 1/2 (upper) or mu <= 1/2 (lower). It exists where A11
+C23 / (B12 B31) <= 1/4, and it demands C22 - C33 = C23 (B12^2 - B31^2) / (B12 B31) and S3 = S2 B31 /
+B12, which are outputs here.
 
-What is known. In the first two cases phi' depends on phi alone: with Delta^2 = n^2 - P^2 - Q^2 > 0 the body turns with
-the period 2 pi A11 / Delta, else it comes to rest at an angle. In the others phi is an elliptic function of t with
-the invariants g2, g3; the discriminant of P4 is 256 G. G < 0: two real roots; G > 0: none (rotation) or four; G = 0 is
-a separatrix, or a degenerate rest. Where the constants make G exactly 0 (all a0 to a4, or the others at phi0 = 0) the
-solution is that on the separatrix, (66), exactly.
+What is known. In the first two cases phi' depends on phi alone: with Delta^2 = n^2 - P^2 - Q^2 > 0
+the body turns with the period 2 pi A11 / Delta, else it comes to rest at an angle. In the others
+phi is an elliptic function of t with the invariants g2, g3; the discriminant of P4 is 256 G. G < 0:
+two real roots; G > 0: none (rotation) or four; G = 0 is a separatrix, or a degenerate rest. Where
+the constants make G exactly 0 (all a0 to a4, or the others at phi0 = 0) the solution is that on the
+separatrix, (66), exactly.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`;
 `gyrostat_integrable.md` beside this file.
@@ -134,7 +138,11 @@ def solve(point, request):
     given = dict(zip(names, rows.T, strict=True))
     with np.errstate(all="ignore"):
         heads, flows, slack = _REDUCTIONS[case](given, request.options)
-        real = np.isfinite(flows).all(axis=1) & (np.abs(flows[:, :6]) <= 1e12).all(axis=1) & good.any(axis=1)
+        real = (
+            np.isfinite(flows).all(axis=1)
+            & (np.abs(flows[:, :6]) <= 1e12).all(axis=1)
+            & good.any(axis=1)
+        )
         flows, slack = np.where(real[:, None], flows, 0.0), np.where(real[:, None], slack, 0.0)
         motions = _Motions(case, given, flows, slack, request)
         found = _carried(lambda rows: motions.at(rows, times), flows, slack)
@@ -145,7 +153,9 @@ def solve(point, request):
     for name, (value, bar) in heads.items():
         for key, column in ((name, value), (f"{name}_error", bar)):
             column = np.where(real.reshape(-1, *[1] * (column.ndim - 1)), column, np.nan)
-            whole = [back(np.broadcast_to(c[:, None], times.shape)) for c in np.atleast_2d(column.T)]
+            whole = [
+                back(np.broadcast_to(c[:, None], times.shape)) for c in np.atleast_2d(column.T)
+            ]
             results[key] = np.stack(whole, axis=-1) if column.ndim > 1 else whole[0]
     verdict = back(np.broadcast_to(motions.verdict[:, None], times.shape))
     results["verdict"] = np.where(solved, verdict, _MOTIONS["undecided"])
@@ -185,7 +195,9 @@ def _inclined(given, _options):
 def _trigonometric(given, options):
     A11, B12, B31, C23, S2 = (given[name] for name in ("A11", "B12", "B31", "C23", "S2"))
     product = A11 * C23 / (B12 * B31)
-    inner = np.array([_under_root(*constants) for constants in zip(A11, C23, B12, B31, strict=True)])
+    inner = np.array(
+        [_under_root(*constants) for constants in zip(A11, C23, B12, B31, strict=True)]
+    )
     upper = 0.5 + np.sqrt(np.where((inner < 0.0) & (inner >= -_SAME), 0.0, inner))
     mu = upper if options.get("root", "upper") == "upper" else product / upper
     d_mu = 8 * _ULP * np.abs(mu) + np.sqrt(np.maximum(-inner, 0.0))
@@ -196,7 +208,11 @@ def _trigonometric(given, options):
     )
     difference, S3 = C23 * (B12 / B31 - B31 / B12), S2 * B31 / B12
     d_difference = 5 * _ULP * np.abs(C23) * (np.abs(B12 / B31) + np.abs(B31 / B12))
-    heads |= {"mu": (mu, d_mu), "n_star": (n_star, share * np.abs(n_star)), "S3": (S3, 3 * _ULP * np.abs(S3))}
+    heads |= {
+        "mu": (mu, d_mu),
+        "n_star": (n_star, share * np.abs(n_star)),
+        "S3": (S3, 3 * _ULP * np.abs(S3)),
+    }
     heads["C22_minus_C33"] = difference, d_difference
     return heads, rows, slack
 
@@ -231,7 +247,10 @@ def _of_first_order(phi0, b12, b31, n, d_b, d_n):
 
 def _elliptic(given, _options):
     A11, phi0, w0 = given["A11"], given["phi0"], given["w0"]
-    potential = [(given["C22"] - given["C33"]) / A11, *(given[name] / A11 for name in ("C23", "S2", "S3"))]
+    potential = [
+        (given["C22"] - given["C33"]) / A11,
+        *(given[name] / A11 for name in ("C23", "S2", "S3")),
+    ]
     moved, size = quartic.square_of_w(*potential, phi0)
     n, d_n = w0 * w0 - moved, 6 * _ULP * (size + w0 * w0)
     a, bars = quartic.coefficients(*potential, n, d_n)
@@ -251,10 +270,21 @@ def _of_quartic(given, options):
     w0 = np.sqrt(np.where(square < -d_square, np.nan, np.maximum(square, 0.0)))
     w0 = np.where(np.abs(square) <= d_square, 0.0, w0) * float(options.get("direction", "1"))
     zero = np.zeros_like(w0)
-    slack = [_ULP * outer, _ULP * inner, _ULP * inner, _ULP * outer, zero, d_square / np.maximum(np.abs(w0), 1e-300)]
+    slack = [
+        _ULP * outer,
+        _ULP * inner,
+        _ULP * inner,
+        _ULP * outer,
+        zero,
+        d_square / np.maximum(np.abs(w0), 1e-300),
+    ]
     slack[-1] = np.where(w0 == 0.0, 0.0, slack[-1])
     heads = _heads_of_quartic(n, 2 * _ULP * outer, a, 0.0 * a)
-    return heads, np.column_stack([zero, zero, *potential, phi0, w0]), np.column_stack([zero, zero, *slack])
+    return (
+        heads,
+        np.column_stack([zero, zero, *potential, phi0, w0]),
+        np.column_stack([zero, zero, *slack]),
+    )
 
 
 def _heads_of_quartic(n, d_n, a, bars):
@@ -264,22 +294,35 @@ def _heads_of_quartic(n, d_n, a, bars):
             "root_im": (roots.imag, np.where(roots.imag == 0.0, 0.0, radii))}  # fmt: skip
 
 
-_REDUCTIONS = {"inclined": _inclined, "trigonometric": _trigonometric, "elliptic": _elliptic, "quartic": _of_quartic}
+_REDUCTIONS = {
+    "inclined": _inclined,
+    "trigonometric": _trigonometric,
+    "elliptic": _elliptic,
+    "quartic": _of_quartic,
+}
 
 
 class _Motions:
-    """The motions of a block, on separatrices where the constants are exactly those of one; verdict and period."""
+    """The motions of a block, on separatrices where the constants are exactly those of one; verdict
+    and period.
+    """
 
     def __init__(self, case, given, flows, slack, request):
         self.case, self.flows, self.slack, self.rtol = case, flows, slack, request.rtol
-        self.method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
+        self.method = load(
+            methods, "taylor" if request.method == "auto" else request.method, "method"
+        )
         self.measure = auto if request.method == "auto" else solution
         self.verdict = np.full(len(flows), _MOTIONS["undecided"])
         self.branches = [self._branch(i, given) for i in range(len(flows))]
 
     def _branch(self, i, given):
         row = self.flows[i]
-        if self.case in _CASES[:2] or row[rc.W0] == 0.0 or (self.case == "elliptic" and given["phi0"][i] != 0.0):
+        if (
+            self.case in _CASES[:2]
+            or row[rc.W0] == 0.0
+            or (self.case == "elliptic" and given["phi0"][i] != 0.0)
+        ):
             return None
         exact = {name: Fraction(float(values[i])) for name, values in given.items()}
         if self.case == "quartic":
@@ -298,7 +341,9 @@ class _Motions:
         results = self.measure.trajectories(self.method, rows, times, self.rtol)
         own = [i for i, branch in enumerate(self.branches) if branch]
         if own:
-            found = separatrix.through(rows[own], times[own], self.rtol, [self.branches[i] for i in own])
+            found = separatrix.through(
+                rows[own], times[own], self.rtol, [self.branches[i] for i in own]
+            )
             for result, new in zip(results, found, strict=True):
                 result[own] = new
         return results
@@ -312,7 +357,10 @@ class _Motions:
             self.verdict[moves & (delta2 < -bar)] = _MOTIONS["comes_to_rest"]
             return
         floats, kinds, _ = _carried(self._turn, self.flows, slack)
-        (period, _, bar, _), on = floats[:, 0].T, np.array([branch is not None for branch in self.branches])
+        (period, _, bar, _), on = (
+            floats[:, 0].T,
+            np.array([branch is not None for branch in self.branches]),
+        )
         found = (bar < TRUST * (1.0 + period)) & ~on
         heads["period"] = np.where(found, period, np.nan), np.where(found, bar, np.nan)
         self.verdict[found], self.verdict[on] = kinds[found], _MOTIONS["comes_to_rest"]
@@ -332,7 +380,9 @@ class _Motions:
 
 
 def _carried(solve, rows, slack):
-    """`solve(rows)`, its bars widened by what rows that are off by `slack` change, as solutions beside them show."""
+    """`solve(rows)`, its bars widened by what rows that are off by `slack` change, as solutions
+    beside them show.
+    """
     floats, turnings, status = solve(rows)
     for column in np.flatnonzero(slack.any(axis=0)):
         beside = rows.copy()
@@ -343,6 +393,8 @@ def _carried(solve, rows, slack):
             turnings[counts != turnings] = UNDETERMINED
             status[(status == OK) & (codes != OK)] = NO_CONVERGENCE
     if status is not None:
-        lost = ~(floats[..., 2:] < TRUST * (1.0 + np.abs(floats[..., :2]))).all(axis=-1) & (status == OK)
+        lost = ~(floats[..., 2:] < TRUST * (1.0 + np.abs(floats[..., :2]))).all(axis=-1) & (
+            status == OK
+        )
         floats[lost], status[lost] = np.nan, NO_CONVERGENCE
     return floats, turnings, status

@@ -1,20 +1,23 @@
-"""Formal stability of the triangular libration points of the spatial circular restricted three-body problem.
+"""Formal stability of the triangular libration points of the spatial circular restricted three-body
+problem.
 
     H = L + N + M + ...,  L = omega1 r1 - omega2 r2 + r3,  N = sum c_ijk r1^i r2^j r3^k (i+j+k = 2),  M likewise (3.13)
 
-is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the actions of the motions
-in the plane of the primaries, r3 that across it.
+is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates; r1, r2 are the
+actions of the motions in the plane of the primaries, r3 that across it.
 
-Model: the spatial restricted three-body problem, six-dimensional, as a formal series in three actions. Not where its
-remainder counts (`workflows/libration_effective.py`), and no proof of Lyapunov stability.
+Model: the spatial restricted three-body problem, six-dimensional, as a formal series in three
+actions. Not where its remainder counts (`workflows/libration_effective.py`), and no proof of
+Lyapunov stability.
 
-Parameter: mu (mass of the smaller primary over that of both, 1e-100 <= mu <= 1/2), taken as the float64 it is. Unit of
-time: the primaries turn by one radian.
+Parameter: mu (mass of the smaller primary over that of both, 1e-100 <= mu <= 1/2), taken as the
+float64 it is. Unit of time: the primaries turn by one radian.
 
-What is known. Linearly stable for mu < mu_R = (1 - sqrt(23/27))/2 = 0.0385208965... The c_ijk have closed forms,
-singular only at mu_R, at omega1 = 2 omega2 (mu1 = 0.0242938971...) and, for two of order 6, at omega1 = 3 omega2
-(mu2 = 0.0135160160...); at mu1 and mu2 L4 is unstable. By order 4 it is formally stable outside mu_c <= mu <= mu_d =
-0.0109136676..., 0.0163767553...; there M decides on the one ray of L = N = 0 with r >= 0, and M is not 0 on it.
+What is known. Linearly stable for mu < mu_R = (1 - sqrt(23/27))/2 = 0.0385208965... The c_ijk have
+closed forms, singular only at mu_R, at omega1 = 2 omega2 (mu1 = 0.0242938971...) and, for two of
+order 6, at omega1 = 3 omega2 (mu2 = 0.0135160160...); at mu1 and mu2 L4 is unstable. By order 4 it
+is formally stable outside mu_c <= mu <= mu_d = 0.0109136676..., 0.0163767553...; there M decides on
+the one ray of L = N = 0 with r >= 0, and M is not 0 on it.
 
 What is proved, and what is not. Verdict 1 is proved for every such mu: L and H - L are formal integrals whatever the
 frequencies, and L^4 + (H - L)^2 is definite. Verdict 2 is proved where omega1, omega2, 1 satisfy at most one
@@ -25,19 +28,21 @@ is proved for the very number given, and not for all real mu beside it.
 The closed forms of order 6 were found by exact rational reconstruction and hold at 110 rational points and against
 Lie series to 90 digits; they are not derived symbolically. Formal stability is not Lyapunov stability.
 
-The discriminant of (3.11) is positive and Arnold's bordered determinant not 0 for every mu < mu_R: by KAM theory most
-motions near L4 stay on tori, on every level of energy. In three degrees of freedom tori do not separate the others, so
-that this is no proof of Lyapunov stability. With the option `order` = 8 or 10 the coefficients go further (Lie
-series), and `effective_radius` says within which distance motions stay for `periods` periods of the primaries.
+The discriminant of (3.11) is positive and Arnold's bordered determinant not 0 for every mu < mu_R:
+by KAM theory most motions near L4 stay on tori, on every level of energy. In three degrees of
+freedom tori do not separate the others, so that this is no proof of Lyapunov stability. With the
+option `order` = 8 or 10 the coefficients go further (Lie series), and `effective_radius` says
+within which distance motions stay for `periods` periods of the primaries.
 
 Verdict 3 means that the half-ulp interval of mu contains mu1 or mu2, 4 that it contains mu_R.
 
-Source: A. P. Markeev, Libration Points in Celestial Mechanics and Cosmodynamics (1978), chapter 8, section 3, checked
-and corrected in `libration.md` beside this file, whose equation numbers are used; planar coefficients: A. Deprit, A.
-Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K. R. Meyer, D. S. Schmidt, J. Differential Equations 62 (1986).
+Source: A. P. Markeev, Libration Points in Celestial Mechanics and Cosmodynamics (1978), chapter 8,
+section 3, checked and corrected in `libration.md` beside this file, whose equation numbers are
+used; planar coefficients: A. Deprit, A. Deprit-Bartholome, Astronomical Journal 72 (1967) 173; K.
+R. Meyer, D. S. Schmidt, J. Differential Equations 62 (1986).
 
-`auto` takes closed forms in float64, and in double-double where `rtol` is missed or the verdict is left open; orders 8
-and 10 by Lie series in float64, and in double-double where `rtol` is missed.
+`auto` takes closed forms in float64, and in double-double where `rtol` is missed or the verdict is
+left open; orders 8 and 10 by Lie series in float64, and in double-double where `rtol` is missed.
 """
 
 import numpy as np
@@ -51,7 +56,11 @@ TITLE = "Formal stability of the triangular libration points"
 FAMILY = "normal_form"
 AUDIT = ("rational_double", "lie")
 OPTIONS = (
-    Option("order", ("6", "8", "10"), "order of the normal form; beyond 6 by Lie series, with effective stability"),
+    Option(
+        "order",
+        ("6", "8", "10"),
+        "order of the normal form; beyond 6 by Lie series, with effective stability",
+    ),
 )
 STATUS = {
     "overflow": "the method lost every digit, so near a resonance or an end of the interval: try rational_double",
@@ -78,7 +87,10 @@ _VERDICTS = {
     "boundary": normal_form.BOUNDARY,
 }
 _BELOW = "at mu < mu_R = 0.0385208965..."
-_SERIES = _BELOW + ", where the series keep digits: not at mu -> 0, next to mu_R, or with a divisor below 1e-20"
+_SERIES = (
+    _BELOW
+    + ", where the series keep digits: not at mu -> 0, next to mu_R, or with a divisor below 1e-20"
+)
 STARTER = {"mu": (0.001, 0.05)}
 OUTPUTS = (
     Output("omega1", "greater frequency in the plane", r"\omega_1", applies=_BELOW),
@@ -137,11 +149,15 @@ def solve(point, request):
     order = int(request.options["order"])
     if order in higher.ORDERS:
         periods = np.broadcast_to(point["periods"], shape).ravel()
-        more = higher.solve(mu, np.where(periods >= 1.0, periods, 1.0), order, request.method, request.rtol)
+        more = higher.solve(
+            mu, np.where(periods >= 1.0, periods, 1.0), order, request.method, request.rtol
+        )
         good = (answer["status"] == status.OK) & np.isfinite(periods)
         for name, values in more.items():
             none = -1 if values.dtype.kind == "i" else np.nan
-            answer[name] = np.where(good.reshape(-1, *[1] * (values.ndim - 1)), values, none).astype(values.dtype)
+            answer[name] = np.where(
+                good.reshape(-1, *[1] * (values.ndim - 1)), values, none
+            ).astype(values.dtype)
     return {name: values.reshape(shape + values.shape[1:]) for name, values in answer.items()}
 
 
@@ -159,11 +175,16 @@ def why(answer):
     if verdict == "linearly_unstable":
         return "mu > mu_R = 0.0385208965...: the frequencies omega1 and omega2 are not real"
     if verdict in ("boundary", "unstable_by_resonance"):
-        return "the half-ulp interval of mu contains " + ("mu_R" if verdict == "boundary" else "mu1 or mu2")
+        return "the half-ulp interval of mu contains " + (
+            "mu_R" if verdict == "boundary" else "mu1 or mu2"
+        )
     if verdict == "formally_stable_by_order_6":
-        return f"{named(answer, 'D4')} < 0 < {named(answer, 'a02')}: N vanishes on one ray of L = 0, where " + (
-            f"{named(answer, 'M_ray')} is not 0"
+        return (
+            f"{named(answer, 'D4')} < 0 < {named(answer, 'a02')}: N vanishes on one ray of L = 0, where "
+            + (f"{named(answer, 'M_ray')} is not 0")
         )
     if verdict == "formally_stable_by_order_4":
         return f"{named(answer, 'D4')} and {named(answer, 'a02')} have one sign: N is definite where L = 0, r >= 0"
-    return "an error bar reaches across 0: " + ", ".join(named(answer, name) for name in ("D4", "a02"))
+    return "an error bar reaches across 0: " + ", ".join(
+        named(answer, name) for name in ("D4", "a02")
+    )

@@ -1,37 +1,42 @@
-"""Triangular libration points of the elliptic restricted three-body problem: Danby's map of linear stability.
+"""Triangular libration points of the elliptic restricted three-body problem: Danby's map of linear
+stability.
 
     xi'' - 2 eta' = d1 r xi,   eta'' + 2 xi' = d2 r eta,   r = 1 / (1 + e cos f),
     d1, d2 = (3/2)(1 +- s),   s = sqrt(1 - 3 mu (1 - mu))
 
-in the true anomaly f, period 2 pi, in pulsating axes along the principal directions of the potential; out of the plane
-zeta'' + zeta = 0, which is stable.
+in the true anomaly f, period 2 pi, in pulsating axes along the principal directions of the
+potential; out of the plane zeta'' + zeta = 0, which is stable.
 
-Model: the elliptic restricted problem, six-dimensional, linearised about the point, which is at rest in these axes;
-half a period suffices, by symmetry. Not for displacements that are not small.
+Model: the elliptic restricted problem, six-dimensional, linearised about the point, which is at
+rest in these axes; half a period suffices, by symmetry. Not for displacements that are not small.
 
-Parameters, in order: mu (mass ratio of the lesser primary, 0 to 1/2) and e (eccentricity, 0 <= e < 1), without units.
+Parameters, in order: mu (mass ratio of the lesser primary, 0 to 1/2) and e (eccentricity, 0 <= e <
+1), without units.
 
-Outputs: a and b, the coefficients of the monodromy's characteristic polynomial l^4 - a l^3 + b l^2 - a l + 1; the
-verdict; and `collision`. The motion is stable below the curve B(e) and, for e < 0.31450715975493514, between the curves
-A(e) and KC(e), a strip that narrows to nothing at the tip mu = 0.04699080701821065, where A and KC are tangent. On A
-and B two multipliers meet at -1, on KC two pairs of unlike Krein sign meet on the circle.
+Outputs: a and b, the coefficients of the monodromy's characteristic polynomial l^4 - a l^3 + b l^2
+- a l + 1; the verdict; and `collision`. The motion is stable below the curve B(e) and, for e <
+0.31450715975493514, between the curves A(e) and KC(e), a strip that narrows to nothing at the tip
+mu = 0.04699080701821065, where A and KC are tangent. On A and B two multipliers meet at -1, on KC
+two pairs of unlike Krein sign meet on the circle.
 
-`collision` says how stability is lost nearest. Where it is lost: 1 if a pair of multipliers is real and negative, 2 if
-the four are complex and off the circle, 0 (none of the two) if real positive ones alone are off it, or at mu = 0. At a
-stable point the multipliers exp(+-i theta1), exp(+-i theta2), theta1 < theta2, lose it by the meeting whose arc is the
-shorter: 2 (pi - theta2), at -1, or theta2 - theta1, between the pairs; pairs of like Krein sign (B D > 0) may
-meet without harm, so there it is 1. It is -1 where the error bars leave it open.
+`collision` says how stability is lost nearest. Where it is lost: 1 if a pair of multipliers is real
+and negative, 2 if the four are complex and off the circle, 0 (none of the two) if real positive
+ones alone are off it, or at mu = 0. At a stable point the multipliers exp(+-i theta1), exp(+-i
+theta2), theta1 < theta2, lose it by the meeting whose arc is the shorter: 2 (pi - theta2), at -1,
+or theta2 - theta1, between the pairs; pairs of like Krein sign (B D > 0) may meet without harm, so
+there it is 1. It is -1 where the error bars leave it open.
 
-What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1 - mu) < 1 (Routh).
-mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are even in e, and the same at 1 - mu.
-As e -> 1 the multipliers grow like (1 - e)^-5 and more: values are given, as accurate as asked, to about 1 - e = 1e-13
-(then `overflow`, as their bars leave the range of float32). For mu below about 1e-26, e > 0, all is too near Kepler's
-problem for a verdict.
+What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1
+- mu) < 1 (Routh). mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are
+even in e, and the same at 1 - mu. As e -> 1 the multipliers grow like (1 - e)^-5 and more: values
+are given, as accurate as asked, to about 1 - e = 1e-13 (then `overflow`, as their bars leave the
+range of float32). For mu below about 1e-26, e > 0, all is too near Kepler's problem for a verdict.
 
-`auto` takes Taylor series in float64 and, where these leave the verdict or `collision` open or miss `rtol`, in
-double-double; the other methods are float64 alone.
+`auto` takes Taylor series in float64 and, where these leave the verdict or `collision` open or miss
+`rtol`, in double-double; the other methods are float64 alone.
 
-Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md` beside this file.
+Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md`
+beside this file.
 """
 
 import numpy as np
@@ -52,7 +57,14 @@ REFERENCES = (
 )
 PARAMETERS = (
     Parameter("mu", "mass ratio of the lesser primary", r"\mu", minimum=0.0, maximum=0.5),
-    Parameter("e", "eccentricity of the primaries' orbits", "e", minimum=0.0, maximum=1.0, open_maximum=True),
+    Parameter(
+        "e",
+        "eccentricity of the primaries' orbits",
+        "e",
+        minimum=0.0,
+        maximum=1.0,
+        open_maximum=True,
+    ),
 )
 OPTIONS = ()
 STARTER = {"mu": (0.0005, 0.06), "e": (0.0, 0.7)}
@@ -79,12 +91,18 @@ def equation(names, ends, options):
     """The equation (3) of `libration_elliptic.md` in formulas (see `survey.scenes`)."""
     mu, e = names["mu"], names["e"]
     s, r = f"sqrt(1 - 3*{mu}*(1 - {mu}))", f"(1/(1 + {e}*cos(u)))"
-    return "reversible", [("pi", "1", "-1", f"1 - 3*(1 - {s})/2*{r}", f"3*(1 + {s})/2*{r} - 1", "1", "-1")]
+    return "reversible", [
+        ("pi", "1", "-1", f"1 - 3*(1 - {s})/2*{r}", f"3*(1 + {s})/2*{r} - 1", "1", "-1")
+    ]
 
 
 def trajectory(point, answer, options, time=None):
-    """A planar orbit of the linear equations, from rest beside L4, and the multipliers (see `survey.scenes`)."""
-    found, bars = motion.multipliers(*(float(answer[name]) for name in ("a", "a_error", "b", "b_error")))
+    """A planar orbit of the linear equations, from rest beside L4, and the multipliers (see
+    `survey.scenes`).
+    """
+    found, bars = motion.multipliers(
+        *(float(answer[name]) for name in ("a", "a_error", "b", "b_error"))
+    )
     growth = np.log(abs(found).max())
     turns = np.clip(motion.GROWTH / growth if growth > 1e-6 else 6, 1, 6) // 1
     data = motion.orbit(point["mu"], point["e"], 2 * np.pi * turns if time is None else time)

@@ -1,17 +1,19 @@
-"""Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T = pi.
+"""Mathieu's equation, the yardstick of parametric resonance: y'' + (a - 2 q cos 2t) y = 0, period T
+= pi.
 
-Model: a pendulum's equation, linearised about its rest, or one coordinate of an ion in a quadrupole trap, which is
-linear as it stands. Not for a pendulum's finite angles, or for several ions.
+Model: a pendulum's equation, linearised about its rest, or one coordinate of an ion in a quadrupole
+trap, which is linear as it stands. Not for a pendulum's finite angles, or for several ions.
 
-Parameters, in order: a (characteristic value) and q (parametric excitation), up to 1e12, without units, in the
-notation of DLMF 28.2.1.
+Parameters, in order: a (characteristic value) and q (parametric excitation), up to 1e12, without
+units, in the notation of DLMF 28.2.1.
 
-Known: the edges of the tongues are the characteristic values a_n(q), b_n(q) (DLMF 28.2(v)); D is even in q (DLMF
-28.2.16); at q = 0 every gap is closed and D = 2 cos(pi sqrt a), marginal at a = n^2; for q != 0 no gap is closed (DLMF
-28.2(vi): a_n and b_n are distinct). Tongue n opens as q^n (DLMF 28.6.15).
+Known: the edges of the tongues are the characteristic values a_n(q), b_n(q) (DLMF 28.2(v)); D is
+even in q (DLMF 28.2.16); at q = 0 every gap is closed and D = 2 cos(pi sqrt a), marginal at a =
+n^2; for q != 0 no gap is closed (DLMF 28.2(vi): a_n and b_n are distinct). Tongue n opens as q^n
+(DLMF 28.6.15).
 
-Source: DLMF chapter 28, https://dlmf.nist.gov/28; E. Mathieu, J. Math. Pures Appl. 13 (1868) 137. Conventions, and how
-it is decided: `mathieu.md` beside this file.
+Source: DLMF chapter 28, https://dlmf.nist.gov/28; E. Mathieu, J. Math. Pures Appl. 13 (1868) 137.
+Conventions, and how it is decided: `mathieu.md` beside this file.
 """
 
 from math import cos, pi
@@ -55,14 +57,24 @@ def solve(point, request):
     """All outputs of a block that the request wants (see `survey.scenes`)."""
     block, box = Rows((point["q"],), point["a"]), _box(request)
     if box is None:
-        problem = _problem(block.per_row(point["q"]), block.per_point(point["a"]), request.line("a"), request.line("q"))
+        problem = _problem(
+            block.per_row(point["q"]),
+            block.per_point(point["a"]),
+            request.line("a"),
+            request.line("q"),
+        )
         out = monodromy.solve(problem, request.method, request.rtol, request.variables)
     else:
         block = Rows((point["q"], point["a"]))
         q, a = block.per_row(point["q"]), block.per_row(point["a"])
         position = np.where(q == 0, np.nan, q)  # there exact rules decide
         out = monodromy.solve_scattered(
-            box, position, a, lambda points: _problem(q[points], a[points, None]), request.rtol, request.variables
+            box,
+            position,
+            a,
+            lambda points: _problem(q[points], a[points, None]),
+            request.rtol,
+            request.variables,
         )
     out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
     out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
@@ -103,7 +115,9 @@ def _problem(q, a, line=None, ends=None):
 
 
 def _row_axis(number, low, high):
-    return monodromy.RowAxis("mathieu", number, low, high, at=lambda q: _problem(q, np.zeros((q.size, 0))))
+    return monodromy.RowAxis(
+        "mathieu", number, low, high, at=lambda q: _problem(q, np.zeros((q.size, 0)))
+    )
 
 
 def _box(request):
@@ -135,7 +149,9 @@ def _excitation(t, q):
 
 @kernel
 def _sample(q, nodes, out):
-    """c0 = -2 q cos 2t and c1 = 1 at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node]."""
+    """c0 = -2 q cos 2t and c1 = 1 at the `nodes` (fractions) of the steps of the half period:
+    out[r, step, c, node].
+    """
     steps = out.shape[1]
     for n in range(steps):
         for i in range(len(nodes)):
@@ -156,7 +172,9 @@ def _potential(t, a, row, table):
 def _walk_points(q, a, tolerance, out, reached):
     """Points of their own, by DOP853."""
     for i in range(len(a)):
-        reached[i] = dop853.hill_walk(_potential, a[i], q[i], 0.0, _HALF_PERIOD, tolerance[i], out[i])
+        reached[i] = dop853.hill_walk(
+            _potential, a[i], q[i], 0.0, _HALF_PERIOD, tolerance[i], out[i]
+        )
 
 
 @inline
@@ -196,5 +214,16 @@ def _solve_points(q, a, low, steps, out):
     work, chain = taylor_double.workspace(2), np.empty((steps.max(), taylor_double.STEP))
     for i in range(len(a)):
         taylor_double.hill_walk(
-            _start, _circular, _coefficient, _missed, q[i], (a[i], low[i]), dd.HALF_PI, 0, steps[i], work, chain, out[i]
+            _start,
+            _circular,
+            _coefficient,
+            _missed,
+            q[i],
+            (a[i], low[i]),
+            dd.HALF_PI,
+            0,
+            steps[i],
+            work,
+            chain,
+            out[i],
         )

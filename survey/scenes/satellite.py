@@ -8,8 +8,9 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
     c = 1 - k^2   prolate, alpha = Iz/I < 1   (printed + k^2 in Astakhova's eq. 3: see the errata in satellite.md)
     c = -k^2      oblate,  alpha > 1;         T = 4 K(k), or 2 K(1/k) / k for rotations
 
-Model: the body's rotation in three dimensions. Without spin the plane of the orbit is invariant, and linear motion
-across it is this equation, exactly. Not for spin, finite tilts, eccentric orbits, bodies without axis of symmetry.
+Model: the body's rotation in three dimensions. Without spin the plane of the orbit is invariant,
+and linear motion across it is this equation, exactly. Not for spin, finite tilts, eccentric orbits,
+bodies without axis of symmetry.
 
 Parameters, in order: k >= 0, where k = 1 has the outputs separatrix_* alone; or one_minus_k = 1 - k <= 1 where that is
 small (negative: rotations); or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so
@@ -64,8 +65,18 @@ PARAMETERS = (
               minimum=0.0, maximum=2.0, excluded=(1.0,), instead_of="rho"),
 )  # fmt: skip
 OPTIONS = (
-    Option("body", ("prolate", "oblate"), "shape of the body: Iz < I or Iz > I", replaced_by="inertia_ratio"),
-    Option("direction", ("1", "-1"), "sense of a rotation: 1 as the orbit, -1 against it", only_with="inertia_ratio"),
+    Option(
+        "body",
+        ("prolate", "oblate"),
+        "shape of the body: Iz < I or Iz > I",
+        replaced_by="inertia_ratio",
+    ),
+    Option(
+        "direction",
+        ("1", "-1"),
+        "sense of a rotation: 1 as the orbit, -1 against it",
+        only_with="inertia_ratio",
+    ),
 )
 why = hill_why.why
 _CRITERION = {"silent": 0, "certifies_stability": 1}
@@ -88,7 +99,8 @@ OUTPUTS = (
 
 _OF_PERIOD = {"period", "exponent_per_orbit", "lyapunov", "lyapunov_integral", "zhukovskii"}
 
-# K by the arithmetic-geometric mean, as it is where a machine has no longer floats than float64, and k' from k.
+# K by the arithmetic-geometric mean, as it is where a machine has no longer floats than float64,
+# and k' from k.
 _PERIOD_ULPS = 6
 
 
@@ -114,12 +126,16 @@ def solve(point, request):
     shared = moduli(point)
     if "rho" in point:
         oblate = request.options["body"] == "oblate"
-        return _solve(shared, point["rho"], oblate, request, line=request.line("rho"), ends=_ends(request))
+        return _solve(
+            shared, point["rho"], oblate, request, line=request.line("rho"), ends=_ends(request)
+        )
     alpha = np.asarray(point["inertia_ratio"], dtype=float)
     rho, low = rates(alpha, request.options["direction"])
     line, ends = _line_of_rho(request), _ends(request)
     bodies = [
-        _solve(shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low, line, ends)
+        _solve(
+            shared, np.where((alpha > 1) == oblate, rho, np.nan), oblate, request, low, line, ends
+        )
         for oblate in np.unique(alpha > 1)
     ]
     if len(bodies) == 1:
@@ -128,10 +144,12 @@ def solve(point, request):
 
 
 def equation(names, ends, options):
-    """The equation in formulas (see `survey.scenes`), in the angle u = am of a libration, u = x of a rotation.
+    """The equation in formulas (see `survey.scenes`), in the angle u = am of a libration, u = x of
+    a rotation.
 
-    As a function of u, y has an equation with a first derivative, which y = A^(-1/4) v removes; at u = 0 and at the
-    half period A > 0 and A' = 0, so that the factors of v have the signs of those of y.
+    As a function of u, y has an equation with a first derivative, which y = A^(-1/4) v removes; at
+    u = 0 and at the half period A > 0 and A' = 0, so that the factors of v have the signs of those
+    of y.
     """
     k = next(
         text.format(names[name])
@@ -152,13 +170,17 @@ def equation(names, ends, options):
 
 
 def _body(names, ends, options):
-    """(rho as a formula, is the body oblate?); raises BadInput if the map contains bodies without a preferred axis."""
+    """(rho as a formula, is the body oblate?); raises BadInput if the map contains bodies without a
+    preferred axis.
+    """
     if "rho" in names:
         return names["rho"], options["body"] == "oblate"
     alpha = names["inertia_ratio"]
     low, high = ends["inertia_ratio"]
     if low <= 1 <= high:
-        raise BadInput("prove: the axis inertia_ratio contains 1, where rho is infinite; end it before, or begin after")
+        raise BadInput(
+            "prove: the axis inertia_ratio contains 1, where rho is infinite; end it before, or begin after"
+        )
     rho = f"sqrt(3*({alpha} - 1))" if low > 1 else f"sqrt(3*(1 - {alpha}))"
     return f"({'-' if str(options['direction']) == '-1' else ''}1/{rho})", low > 1
 
@@ -169,7 +191,9 @@ def _rotates(names, ends):
     edge = {"k": 1.0, "one_minus_k": 0.0, "amplitude": pi / 2}[name]
     low, high = ends[name]
     if low <= edge <= high:
-        raise BadInput(f"prove: the axis {name} contains {edge:g}, the separatrix; end it before, or begin after")
+        raise BadInput(
+            f"prove: the axis {name} contains {edge:g}, the separatrix; end it before, or begin after"
+        )
     return low < edge if name == "one_minus_k" else low > edge
 
 
@@ -186,7 +210,9 @@ def trajectory(point, answer, options, time=None):
         rho, _ = rates(point["inertia_ratio"], options["direction"])
         oblate = point["inertia_ratio"] > 1
     shared = moduli({name: np.array([value]) for name, value in point.items()})
-    found = hill_motion.solve(_problem(Motion(*shared, bool(oblate)), np.array([[rho]])), answer, time, "u")
+    found = hill_motion.solve(
+        _problem(Motion(*shared, bool(oblate)), np.array([[rho]])), answer, time, "u"
+    )
     (k,), (kc,) = shared[:2]
     x, off = planar_angle(found.data["u"][1], float(k), float(kc))
     words = "angle of the planar motion in radians"
@@ -195,13 +221,17 @@ def trajectory(point, answer, options, time=None):
 
 
 def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
-    """The outputs for one kind of body; points not of it have rho = NaN. `low` is what float64 took from rho."""
+    """The outputs for one kind of body; points not of it have rho = NaN. `low` is what float64 took
+    from rho.
+    """
     box = None if low is not None else _box(request, oblate)
     if box is not None:
         return _solve_scattered(box, shared, rho, oblate, request)
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
-    problem = _problem(row, block.per_point(rho), None if low is None else block.per_point(low), line, ends)
+    problem = _problem(
+        row, block.per_point(rho), None if low is None else block.per_point(low), line, ends
+    )
     out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
     return _derived(out, row, problem.p, block, request, row.period)
 
@@ -215,10 +245,14 @@ def _passages(point, request):
         oblate = point["inertia_ratio"] > 1
     name = next(name for name in ("k", "one_minus_k", "amplitude") if name in point)
     rotates = {"k": point[name] > 1, "one_minus_k": point[name] < 0}.get(name, np.array(False))
-    known, rho, oblate, rotates = np.broadcast_arrays(np.isfinite(point[name]) & np.isfinite(rho), rho, oblate, rotates)
+    known, rho, oblate, rotates = np.broadcast_arrays(
+        np.isfinite(point[name]) & np.isfinite(rho), rho, oblate, rotates
+    )
     out = {"status": np.where(known, status.OK, status.INVALID_PARAMETERS)}
     for which in np.unique(oblate):
-        found = scattering.solve(np.where(known & (oblate == which), rho, np.nan), rotates, which, request.variables)
+        found = scattering.solve(
+            np.where(known & (oblate == which), rho, np.nan), rotates, which, request.variables
+        )
         for key, pair in found.items():
             for output, values in zip((key, f"{key}_error"), pair, strict=True):
                 out[output] = np.where(oblate == which, values, out.get(output, np.nan))
@@ -233,7 +267,9 @@ def _wanted(request):
 
 
 def _derived(out, row, rho, block, request, period):
-    """The outputs in the block's shape, with those that follow from the others, the rows' motions and `rho`."""
+    """The outputs in the block's shape, with those that follow from the others, the rows' motions
+    and `rho`.
+    """
     wanted, ok = _wanted(request), out["status"] == status.OK
     if "period" in wanted:
         out["period"] = np.where(ok, period[:, None], np.nan)
@@ -255,7 +291,9 @@ def _criteria(out, row, rho, period, wanted, ok):
         least, _, bar = row.range_of_z(rho)
         found["least_z"] = least, bar
     if not wanted.isdisjoint(scattering.NAMES):
-        found |= scattering.solve(np.broadcast_to(rho, ok.shape), row.rotates[:, None], row.oblate, wanted)
+        found |= scattering.solve(
+            np.broadcast_to(rho, ok.shape), row.rotates[:, None], row.oblate, wanted
+        )
     for name, (values, bars) in found.items():
         out[name], out[f"{name}_error"] = np.where(ok, values, np.nan), np.where(ok, bars, np.nan)
     if not wanted.isdisjoint(nonlinear.NAMES):
@@ -273,7 +311,9 @@ def _solve_scattered(box, shared, rho, oblate, request):
     position = np.where((row.k == 0) | (rho == 0), np.nan, -2 * np.log(row.kc))
 
     def problem_of(points):
-        return _problem(Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None])
+        return _problem(
+            Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None]
+        )
 
     out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
     period = None
@@ -284,7 +324,9 @@ def _solve_scattered(box, shared, rho, oblate, request):
 
 
 def _box(request, oblate):
-    """Where the points of a survey lie whose rho shares an axis with k; None if there are few, or of both kinds."""
+    """Where the points of a survey lie whose rho shares an axis with k; None if there are few, or
+    of both kinds.
+    """
     rho = request.ranges.get("rho")
     for name in ("k", "one_minus_k", "amplitude"):
         given = request.ranges.get(name)
@@ -294,12 +336,16 @@ def _box(request, oblate):
         ends = _ends_of(name, number, *given[1:]) if number else None
         if ends and ends[2] > ends[1] and rho[2] > rho[1]:
             librates = bool((moduli({name: np.array(given[1:])})[0] < 1).all())
-            return monodromy.Box(_row_axis(oblate, not librates, ends), (number, *rho[1:]), even=librates)
+            return monodromy.Box(
+                _row_axis(oblate, not librates, ends), (number, *rho[1:]), even=librates
+            )
     return None
 
 
 def _per_orbit(out, orbits):
-    """Add the exponent per orbital revolution, `orbits` of which make a period; it does not apply where none do."""
+    """Add the exponent per orbital revolution, `orbits` of which make a period; it does not apply
+    where none do.
+    """
     orbits = np.where(orbits > 0, orbits, np.nan)
     out["exponent_per_orbit"] = out["exponent"] / orbits
     out["exponent_per_orbit_error"] = (
@@ -318,7 +364,9 @@ def _line_of_rho(request):
 
 
 def _ends(request):
-    """(number, least and greatest s = -log |1 - k^2| or -log(1 - 1/k^2)) of an axis of one family of motions."""
+    """(number, least and greatest s = -log |1 - k^2| or -log(1 - 1/k^2)) of an axis of one family
+    of motions.
+    """
     for name in ("k", "one_minus_k", "amplitude"):
         line = request.line(name)
         if line is not None:
@@ -332,7 +380,9 @@ def _ends_of(name, number, low, high):
 
 
 def _at(s, oblate, rotates):
-    """The rows at positions s of the axis: nodes of series, never solved in double-double, as k is not exact."""
+    """The rows at positions s of the axis: nodes of series, never solved in double-double, as k is
+    not exact.
+    """
     k, kc = np.sqrt(-np.expm1(-s)), np.exp(-s / 2)
     k = 1 / k if rotates else k
     return _problem(Motion(k, kc, k, np.full_like(k, motion.K), oblate), np.zeros((s.size, 0)))
@@ -347,7 +397,9 @@ def _row_axis(oblate, rotates, ends):
 
 def _problem(row, rho, low=None, line=None, ends=None):
     half, half_low = row.half
-    rows = np.column_stack([row.k, row.kc, half, np.full(row.k.size, float(row.oblate)), row.given, row.which])
+    rows = np.column_stack(
+        [row.k, row.kc, half, np.full(row.k.size, float(row.oblate)), row.given, row.which]
+    )
     rule, constant = _rules(row, rho, low)
     return monodromy.Problem(
         p=rho,
@@ -393,7 +445,9 @@ def _walk_points(rows, rho, tolerance, out, reached):
     table = np.empty((2, MEANS + 1))
     for i in range(len(rho)):
         tabulate(rows[i], table)
-        reached[i] = dop853.hill_walk(potential, rho[i], rows[i], table, rows[i, 2], tolerance[i], out[i])
+        reached[i] = dop853.hill_walk(
+            potential, rho[i], rows[i], table, rows[i, 2], tolerance[i], out[i]
+        )
 
 
 @kernel

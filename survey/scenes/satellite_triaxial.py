@@ -1,9 +1,11 @@
-"""Out-of-plane stability of the planar motions of a satellite with three unequal moments on a circular orbit.
+"""Out-of-plane stability of the planar motions of a satellite with three unequal moments on a
+circular orbit.
 
-Principal moments A < B in the orbital plane (A about the axis that hangs down at rest: yaw; B about the one along the
-flight: roll) and C across it (pitch). The satellite librates in the plane of the orbit by x, sin x = k sn(u, k), k < 1,
-or rotates, k > 1: u = omega_p t, omega_p^2 = 3 omega_0^2 (B - A) / C, rho = omega_0 / omega_p, w = dx/du, q = rho + w.
-Small tilts e1, e2 about the axes of A and B, with their momenta P1, P2, obey, a = A/C, b = B/C,
+Principal moments A < B in the orbital plane (A about the axis that hangs down at rest: yaw; B about
+the one along the flight: roll) and C across it (pitch). The satellite librates in the plane of the
+orbit by x, sin x = k sn(u, k), k < 1, or rotates, k > 1: u = omega_p t, omega_p^2 = 3 omega_0^2 (B
+- A) / C, rho = omega_0 / omega_p, w = dx/du, q = rho + w. Small tilts e1, e2 about the axes of A
+and B, with their momenta P1, P2, obey, a = A/C, b = B/C,
 
     e1' = P1 / a + (1 - 1/2a) q e2,     P1' =  (1 - 1/2b) q P2 - (q^2/4b + (1-b)/(b-a) sin^2 x) e1 - g sin x cos x e2
     e2' = P2 / b - (1 - 1/2b) q e1,     P2' = -(1 - 1/2a) q P1 - (q^2/4a + (1-a)/(b-a) cos^2 x) e2 - g sin x cos x e1
@@ -11,18 +13,22 @@ Small tilts e1, e2 about the axes of A and B, with their momenta P1, P2, obey, a
 
 a canonical system of period T = 4 K(k), or 2 K(1/k) / k for rotations.
 
-Model: a rigid body, gravity to the order of the torque, a circular orbit. Linear motion across the plane of an exact
-motion in it. Not for large tilts, eccentric orbits, flexible or damped satellites.
+Model: a rigid body, gravity to the order of the torque, a circular orbit. Linear motion across the
+plane of an exact motion in it. Not for large tilts, eccentric orbits, flexible or damped
+satellites.
 
-Parameters, in order: A, B, C, of any one unit, A < B, none larger than the sum of the others; instead of A roll_ratio =
-(C - A)/B, instead of B yaw_ratio = (C - B)/A, both from -1 to 1. k >= 0, k != 1; or one_minus_k = 1 - k where that is
-small (negative: rotations); or amplitude = asin k (rad), a libration's. Option `direction`: their sense.
+Parameters, in order: A, B, C, of any one unit, A < B, none larger than the sum of the others;
+instead of A roll_ratio = (C - A)/B, instead of B yaw_ratio = (C - B)/A, both from -1 to 1. k >= 0,
+k != 1; or one_minus_k = 1 - k where that is small (negative: rotations); or amplitude = asin k
+(rad), a libration's. Option `direction`: their sense.
 
-Known: at k = 0 s^4 + (1 + 3 r + r y) s^2 + 4 r y = 0 with r, y = roll_ratio, yaw_ratio, s in orbital rates; B = C and
-A = C are bodies with an axis of symmetry: two multipliers 1 and those of the scene `satellite` (`marginal` if these
-are on the circle). At A = B nothing turns the satellite back, and k = 1 takes for ever: neither has a verdict.
+Known: at k = 0 s^4 + (1 + 3 r + r y) s^2 + 4 r y = 0 with r, y = roll_ratio, yaw_ratio, s in
+orbital rates; B = C and A = C are bodies with an axis of symmetry: two multipliers 1 and those of
+the scene `satellite` (`marginal` if these are on the circle). At A = B nothing turns the satellite
+back, and k = 1 takes for ever: neither has a verdict.
 
-Source: derived, and checked against the body in three dimensions, in `satellite_triaxial.md` beside this file.
+Source: derived, and checked against the body in three dimensions, in `satellite_triaxial.md` beside
+this file.
 """
 
 from functools import cache
@@ -79,7 +85,11 @@ STARTER = {"A": (0.05, 0.7), "B": (0.75, 1.0)}
 OUTPUTS = (
     *_SHARED,
     Output("exponent", "growth of the logarithm of the amplitude per period", r"\mu T"),
-    Output("exponent_per_orbit", "growth of the logarithm of the amplitude per orbital revolution", r"\mu"),
+    Output(
+        "exponent_per_orbit",
+        "growth of the logarithm of the amplitude per orbital revolution",
+        r"\mu",
+    ),
     Output("period", "period of the coefficients, in u", "T"),
     _MATRIX,
 )
@@ -115,7 +125,9 @@ def solve(point, request):
         symmetric = (found["status"] == status.OK) & (verdict == UNDECIDED) & _axial(names, columns)
         if symmetric.any():
             some = [values[symmetric] for values in columns]
-            verdict[symmetric] = _by_symmetry(_one_by_one(names, some, k[symmetric] > 1, request, _MULTIPLIERS))
+            verdict[symmetric] = _by_symmetry(
+                _one_by_one(names, some, k[symmetric] > 1, request, _MULTIPLIERS)
+            )
     return _derived(found, wanted, names, columns, k, kc)
 
 
@@ -128,7 +140,8 @@ def why(answer):
         return "all multipliers are on the unit circle, simple or, where error bars meet, of one Krein sign"
     if answer["verdict"] == "marginal":
         return (
-            "the body has an axis of symmetry: two multipliers are 1, the other two are simple and on the unit circle"
+            "the body has an axis of symmetry: two multipliers are 1, "
+            "the other two are simple and on the unit circle"
         )
     return f"{radius}: the error bar allows multipliers outside the unit circle, and on it"
 
@@ -152,7 +165,9 @@ def trajectory(point, answer, options, time=None):
     data = dict(found.data)
     data["t"] = ("t", t, {"long_name": "time, in orbital revolutions", "symbol": "t", "units": "1"})
     off = 64 * EPS / kc * (1.0 + abs(am))  # mostly that of t
-    data |= linear_motion.value("t", "x", "x", "angle of pitch from the vertical, in radians", pitch, off)
+    data |= linear_motion.value(
+        "t", "x", "x", "angle of pitch from the vertical, in radians", pitch, off
+    )
     if time is not None:
         kept = t <= time * (1 + 1e-12)
         data = {name: (dims, values[kept], *rest) if dims == "t" else (dims, values, *rest)
@@ -180,16 +195,24 @@ def _one_by_one(names, columns, rotates, request, asked):
 
 
 def _lines(names, columns, request):
-    """(the axes of a map on which series may serve as all its points are motions of one kind, do these rotate?)."""
+    """(the axes of a map on which series may serve as all its points are motions of one kind, do
+    these rotate?).
+    """
     lines = {i: request.line(name) for i, name in enumerate(names) if request.line(name)}
-    if not lines or any(name not in request.fixed and i not in lines for i, name in enumerate(names)):
+    if not lines or any(
+        name not in request.fixed and i not in lines for i, name in enumerate(names)
+    ):
         return {}, False
     ends = (lines[i][1:] if i in lines else values.flat[:1] for i, values in enumerate(columns))
     corners = np.meshgrid(*(np.array(one, float) for one in ends), indexing="ij")
     k = moduli({names[3]: corners[3]})[0]
     # what is possible is told by inequalities that are linear in each parameter: corners suffice
     one_kind = (k > 1).all() or (k < 1).all()
-    return (lines, bool((k > 1).all())) if one_kind and _possible(names, corners).all() else ({}, False)
+    return (
+        (lines, bool((k > 1).all()))
+        if one_kind and _possible(names, corners).all()
+        else ({}, False)
+    )
 
 
 def _ratios(names, p):
@@ -225,7 +248,8 @@ def _axial(names, columns):
 def _system(names, rotates, direction):
     """The canonical system in the angle theta, with these parameters; `direction` of rotations.
 
-    tan am = tan theta / sqrt k': in theta the singularities of a libration are sqrt k' away, not k'.
+    tan am = tan theta / sqrt k': in theta the singularities of a libration are sqrt k' away, not
+    k'.
     """
 
     def modulus(p):
@@ -269,7 +293,9 @@ def _derived(out, wanted, names, columns, k, kc):
         period = np.where(ok, 2 * half_periods(*rows)[0].reshape(k.shape), np.nan)
         orbits = period / (2 * pi * np.sqrt(3.0 * _ratios(names, columns)[2]))
         noise = 4 * EPS / np.where(ok, abs(_ratios(names, columns)[2]), 1.0)  # of B - A, relative
-        value, bar = (out.get(name, np.nan) for name in ("spectral_radius", "spectral_radius_error"))
+        value, bar = (
+            out.get(name, np.nan) for name in ("spectral_radius", "spectral_radius_error")
+        )
         growth = np.log(value)
         off = np.where(bar < value, -np.log1p(-bar / value), np.inf) + 4 * EPS * abs(growth)
     out["exponent"], out["exponent_error"] = growth, off
@@ -285,5 +311,6 @@ def _by_symmetry(out):
     value = out["multiplier_re"] + 1j * out["multiplier_im"]
     clear = abs(value - 1.0) > out["multiplier_re_error"] + out["multiplier_im_error"]
     pair = clear.sum(axis=-1) == 2
-    upper = clear & (value.imag > out["multiplier_im_error"])  # a pair off the real line, and alone, is on the circle
+    # a pair off the real line, and alone, is on the circle
+    upper = clear & (value.imag > out["multiplier_im_error"])
     return np.where(pair & (upper.sum(axis=-1) == 1), MARGINAL, UNDECIDED)

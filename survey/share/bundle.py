@@ -1,8 +1,11 @@
-"""A survey as a folder or zip for an archive: data, workflow, scene, pictures, versions, and an RO-Crate description.
+"""A survey as a folder or zip for an archive: data, workflow, scene, pictures, versions, and an
+RO-Crate description.
 
-`unpacked` and `complaints` are the other way: what `survey verify` checks of a bundle before it verifies the data.
+`unpacked` and `complaints` are the other way: what `survey verify` checks of a bundle before it
+verifies the data.
 
-Source: RO-Crate Metadata Specification 1.1 (https://w3id.org/ro/crate/1.1), with a CreateAction as provenance.
+Source: RO-Crate Metadata Specification 1.1 (https://w3id.org/ro/crate/1.1), with a CreateAction as
+provenance.
 """
 
 import contextlib
@@ -28,14 +31,34 @@ KINDS = {
     ".pdf": "application/pdf", ".md": "text/markdown", ".txt": "text/plain", ".sha256": "text/plain",
     ".cert": "application/json",
 }  # fmt: skip
-PACKAGES = {"survey": "stability-survey", "numba": "numba", "llvmlite": "llvmlite", "numpy": "numpy"}
-OTHERS = {".7z", ".bz2", ".gz", ".html", ".json", ".nc", ".pdf", ".png", ".rar", ".tar", ".tgz", ".toml", ".xz"}
+PACKAGES = {
+    "survey": "stability-survey",
+    "numba": "numba",
+    "llvmlite": "llvmlite",
+    "numpy": "numpy",
+}
+OTHERS = {
+    ".7z",
+    ".bz2",
+    ".gz",
+    ".html",
+    ".json",
+    ".nc",
+    ".pdf",
+    ".png",
+    ".rar",
+    ".tar",
+    ".tgz",
+    ".toml",
+    ".xz",
+}
 FILES, RATIO, SPARE = 1000, 1032, 2**20  # of a bundle; the largest compression ratio of deflate
 MOST = 2**26  # characters of the description
 
 
 def write(path, output, author="", license_url=""):
-    """Write the bundle of the survey in the file `path` to `output`, a zip or else a folder; returns its files' names.
+    """Write the bundle of the survey in the file `path` to `output`, a zip or else a folder;
+    returns its files' names.
 
     Raises BadInput if `output` exists.
     """
@@ -44,7 +67,9 @@ def write(path, output, author="", license_url=""):
         raise BadInput(f"{output}: it exists; name another folder or .zip file with -o")
     check_folder(output)
     if output.suffix.lower() in OTHERS:
-        raise BadInput(f"{output}: a bundle is a .zip file or a folder; name one, such as {output.with_suffix('.zip')}")
+        raise BadInput(
+            f"{output}: a bundle is a .zip file or a folder; name one, such as {output.with_suffix('.zip')}"
+        )
     if license_url and "://" not in license_url:
         raise BadInput(f"--license {license_url!r}: give the address of the licence, such as "
                        "https://creativecommons.org/licenses/by/4.0/")  # fmt: skip
@@ -77,7 +102,9 @@ def _fill(folder, path, ds):
     if "proof_certificate" in ds.attrs:
         certificate = path.parent / Path(str(ds.attrs["proof_certificate"])).name
         if not certificate.is_file():
-            raise BadInput(f"bundle: {certificate.name}, the proof's certificate, is not beside {path}; copy it there")
+            raise BadInput(
+                f"bundle: {certificate.name}, the proof's certificate, is not beside {path}; copy it there"
+            )
         with open(certificate, "rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() != str(ds.attrs.get("proof_sha256")):
                 raise BadInput(f"bundle: {short(certificate.name)} beside {path} is not the certificate of its proof "
@@ -99,9 +126,13 @@ def _with_scene(folder, text, ds):
     given = str(tomllib.loads(text).get("scene", name))
     if given == name:
         return text
-    found = re.sub(r"(?m)^scene\s*=\s*(?:\"[^\"\n]*\"|'[^'\n]*')", f'scene = "{name}"', text, count=1)
+    found = re.sub(
+        r"(?m)^scene\s*=\s*(?:\"[^\"\n]*\"|'[^'\n]*')", f'scene = "{name}"', text, count=1
+    )
     if tomllib.loads(found).get("scene") != name:
-        raise BadInput('bundle: the workflow names its scene in an unusual way; write it as scene = "FILE.py"')
+        raise BadInput(
+            'bundle: the workflow names its scene in an unusual way; write it as scene = "FILE.py"'
+        )
     return found
 
 
@@ -116,7 +147,9 @@ def _pictures(folder, path, ds):
     from survey.show import figures
 
     output = tomllib.loads(str(ds.attrs.get("workflow", ""))).get("output", {})
-    wanted = [name for name in output.get("figures", ()) if name in ds] or [name for name in ("verdict",) if name in ds]
+    wanted = [name for name in output.get("figures", ()) if name in ds] or [
+        name for name in ("verdict",) if name in ds
+    ]
     drawn = []
     for name in wanted:
         target = folder / f"{path.stem}_{name}.png"
@@ -157,7 +190,10 @@ def _readme(name, ds, pictures):
 def _described(folder, files, ds, data, author, license_url):
     """The RO-Crate's description of the folder."""
     attrs = ds.attrs
-    title, date = plain(str(attrs.get("title", data)), 300), plain(str(attrs.get("date_created", "")), 40)
+    title, date = (
+        plain(str(attrs.get("title", data)), 300),
+        plain(str(attrs.get("date_created", "")), 40),
+    )
     entities = []
     for name in files:
         with open(folder / name, "rb") as file:
@@ -191,7 +227,12 @@ def _described(folder, files, ds, data, author, license_url):
         further.append({"@id": "#author", "@type": "Person", "name": author})
     if license_url:
         further.append({"@id": license_url, "@type": "CreativeWork", "name": license_url})
-    head = {"@id": CRATE, "@type": "CreativeWork", "conformsTo": {"@id": PROFILE}, "about": {"@id": "./"}}
+    head = {
+        "@id": CRATE,
+        "@type": "CreativeWork",
+        "conformsTo": {"@id": PROFILE},
+        "about": {"@id": "./"},
+    }
     return {"@context": CONTEXT, "@graph": [head, root, *entities, action, program, *further]}
 
 
@@ -201,19 +242,26 @@ def _zipped(folder, files, file):
         for name in files:
             member = zipfile.ZipInfo(f"{folder.name}/{name}", (1980, 1, 1, 0, 0, 0))
             member.compress_type, member.external_attr = zipfile.ZIP_DEFLATED, 0o644 << 16
-            with open(folder / name, "rb") as source, archive.open(member, "w", force_zip64=True) as target:
+            with (
+                open(folder / name, "rb") as source,
+                archive.open(member, "w", force_zip64=True) as target,
+            ):
                 shutil.copyfileobj(source, target, 2**20)
 
 
 def is_bundle(path):
     """Is there a bundle at `path`: a folder with a description, or a zip?"""
     path = Path(path)
-    return (path / CRATE).is_file() if path.is_dir() else path.is_file() and zipfile.is_zipfile(path)
+    return (
+        (path / CRATE).is_file() if path.is_dir() else path.is_file() and zipfile.is_zipfile(path)
+    )
 
 
 @contextlib.contextmanager
 def unpacked(path):
-    """The folder of the bundle at `path`; a zip is unpacked beside nothing, and removed again. Raises Damaged."""
+    """The folder of the bundle at `path`; a zip is unpacked beside nothing, and removed again.
+    Raises Damaged.
+    """
     path = Path(path)
     if path.is_dir():
         yield path
@@ -223,7 +271,9 @@ def unpacked(path):
             with zipfile.ZipFile(path) as archive:
                 _extract(archive, Path(folder), path)
         except (zipfile.BadZipFile, EOFError, OSError, NotImplementedError, RuntimeError) as error:
-            raise Damaged(f"{path}: cannot be unpacked ({error}); ask its author for an intact copy") from None
+            raise Damaged(
+                f"{path}: cannot be unpacked ({error}); ask its author for an intact copy"
+            ) from None
         yield Path(folder)
 
 
@@ -243,7 +293,9 @@ def _extract(archive, folder, path):
 
 
 def complaints(folder):
-    """(sentences on what is wrong with the bundle, the path of its data); raises Damaged without a description."""
+    """(sentences on what is wrong with the bundle, the path of its data); raises Damaged without a
+    description.
+    """
     folder, described = Path(folder), folder / CRATE
     try:
         if described.stat().st_size > MOST:
@@ -257,10 +309,20 @@ def complaints(folder):
         raise Damaged(
             f"{CRATE}: it does not describe the bundle ({error!r}); ask its author for an intact copy"
         ) from None
-    wrong = [] if context == PROFILE else [f"{CRATE}: it conforms to {short(context)}, not to {PROFILE}"]
+    wrong = (
+        []
+        if context == PROFILE
+        else [f"{CRATE}: it conforms to {short(context)}, not to {PROFILE}"]
+    )
     there = {entry.name for entry in folder.iterdir()} - {CRATE}
-    wrong += [f"{short(name)}: the bundle lists this file, but it is missing" for name in parts if name not in there]
-    wrong += [f"{short(name)}: the bundle does not list this file" for name in sorted(there - set(parts))]
+    wrong += [
+        f"{short(name)}: the bundle lists this file, but it is missing"
+        for name in parts
+        if name not in there
+    ]
+    wrong += [
+        f"{short(name)}: the bundle does not list this file" for name in sorted(there - set(parts))
+    ]
     for name in sorted(there & set(parts)):
         with open(folder / name, "rb") as file:
             if hashlib.file_digest(file, "sha256").hexdigest() != digests[name]:

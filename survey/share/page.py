@@ -1,7 +1,8 @@
-"""A survey's dataset -> one HTML file: its series where it has some, else its points; scripts, and nothing from a net.
+"""A survey's dataset -> one HTML file: its series where it has some, else its points; scripts, and
+nothing from a net.
 
-What comes from the file is text: it stands in HTML escaped, or in JSON, and the page puts it into text nodes alone. The
-page's policy lets no script run but its own, and nothing be fetched.
+What comes from the file is text: it stands in HTML escaped, or in JSON, and the page puts it into
+text nodes alone. The page's policy lets no script run but its own, and nothing be fetched.
 """
 
 import base64
@@ -50,7 +51,11 @@ EDGES = (
 )  # fmt: skip
 OTHER_EDGES = {  # by rule, in the order of `edgesOf` in engine.js
     "trace": ("D = 2", "D = -2"),
-    "danby": ("two multipliers meet at -1 (A B = 0)", "two multipliers meet at 1 (C D = 0)", "two pairs meet (K = 0)"),
+    "danby": (
+        "two multipliers meet at -1 (A B = 0)",
+        "two multipliers meet at 1 (C D = 0)",
+        "two pairs meet (K = 0)",
+    ),
     "reciprocal 1": ("two multipliers meet at -1", "two multipliers meet at 1"),
     "reciprocal": ("two pairs meet", "two multipliers meet at 1", "two multipliers meet at -1"),
     "schur": ("a multiplier passes the unit circle",),
@@ -63,7 +68,9 @@ HINT = (
 
 
 def write(ds, path, at=None, progress=None):
-    """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?, "why": else why not}."""
+    """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?,
+    "why": else why not}.
+    """
     check_folder(path, ".html", ".htm")
     ds = point.plane(ds, at or {})
     content, why = made(ds, progress)
@@ -75,7 +82,9 @@ def made(ds, progress=None):
     """(the page as text, why it holds no series: "" where it does)."""
     axes = [dim for dim in ds.status.dims if ds.sizes[dim] > 1]
     if len(axes) != 2 or any(ds[dim].dtype.kind not in "fi" for dim in axes):
-        raise BadInput(f"share: a page shows a map of two numeric axes, and this file has {', '.join(axes) or 'none'}")
+        raise BadInput(
+            f"share: a page shows a map of two numeric axes, and this file has {', '.join(axes) or 'none'}"
+        )
     ds = boundaries.in_plane(ds, ds.status.squeeze())
     ds = ds.squeeze([dim for dim in ds.status.dims if ds.sizes[dim] == 1]).sortby(axes)
     proof = proved.of(ds)
@@ -90,7 +99,9 @@ def _series(ds, proof, progress):
     """(the model file, ""), or (None, why there is none)."""
     try:
         checked = workflow.check(zoom.workflow_of(ds))
-        checked = replace(checked, request=replace(checked.request, rtol=min(checked.request.rtol, RTOL)))
+        checked = replace(
+            checked, request=replace(checked.request, rtol=min(checked.request.rtol, RTOL))
+        )
         return build.packed(checked, proof, BUDGET, LARGEST, progress), ""
     except Untrusted:
         raise
@@ -104,7 +115,14 @@ def _common(ds, axes):
     for dim in axes:
         values, log = ds[dim].values.astype(float), logarithmic(ds[dim].values)
         ends = [float(end) for end in (np.log(values[[0, -1]]) if log else values[[0, -1]])]
-        described.append({"name": plain(str(dim), 40), "log": log, "ends": ends, "label": _glyphs(label_of(ds[dim]))})
+        described.append(
+            {
+                "name": plain(str(dim), 40),
+                "log": log,
+                "ends": ends,
+                "label": _glyphs(label_of(ds[dim])),
+            }
+        )
     file = "".join(c if c.isalnum() else "_" for c in str(ds.attrs.get("title", "map"))[:60])
     return {"axes": described, "hint": HINT, "file": file, "edges": [], "curves": []}
 
@@ -114,7 +132,10 @@ def _glyphs(text):
     drawn, parts = TextPath((0, 0), " ".join(text.split()), size=15), []
     letters = {1: "M", 2: "L", 3: "Q", 4: "C", 79: "Z"}
     for points, code in drawn.iter_segments(curves=True, simplify=False):
-        parts.append(letters[int(code)] + ("" if code == 79 else " ".join(f"{value:.1f}" for value in points)))
+        parts.append(
+            letters[int(code)]
+            + ("" if code == 79 else " ".join(f"{value:.1f}" for value in points))
+        )
     return {"path": "".join(parts), "width": round(float(drawn.get_extents().x1), 1)}
 
 
@@ -128,17 +149,25 @@ def _of_model(ds, packed):
         "name": "verdict", "text": "stability", "colours": {code: _rgb(colours[name]) for name, code in KINDS.items()},
         "kinds": [{"text": name, "colour": _rgb(colours[name])} for name in KINDS],
     }]  # fmt: skip
-    lattice = [np.linspace(low, high, SAMPLES) for low, high in zip(model.low, model.high, strict=True)]
+    lattice = [
+        np.linspace(low, high, SAMPLES) for low, high in zip(model.low, model.high, strict=True)
+    ]
     found = model.grid(*lattice, model.outputs, gradient=False)
     words = {f["name"]: f["long_name"] for f in model.about["functions"]}
     for name in model.outputs:
         said = str(ds[name].attrs.get("long_name", "")) if name in ds else words.get(name, "")
-        shown.append({"name": name, "text": f"{name}: {plain(said)}" if said else name} | _scale(found[name]))
+        shown.append(
+            {"name": name, "text": f"{name}: {plain(said)}" if said else name} | _scale(found[name])
+        )
     rule, given = model.rule, {}
     if rule != "hill" and "curve_count" in ds:
         given = _curves(ds, model.names)
     others = OTHER_EDGES.get(f"{rule} {len(model.functions)}") or OTHER_EDGES.get(rule, ())
-    drawn = EDGES if rule == "hill" else [(text, *style) for text, style in zip(others, STYLES, strict=False)]
+    drawn = (
+        EDGES
+        if rule == "hill"
+        else [(text, *style) for text, style in zip(others, STYLES, strict=False)]
+    )
     edges = [{"text": text, "colour": colour, "dash": dash} for text, colour, dash in drawn]
     described = _common(ds, list(model.names))["axes"]
     sides = zip(described, model.low, model.high, strict=True)
@@ -153,14 +182,22 @@ def _of_points(ds, axes):
         raise BadInput(f"share: the map has {ds.status.size:,} points; a page without series holds at most {POINTS:,}: "
                        "take a part with ds.survey.zoom()")  # fmt: skip
     ds = _separated(ds, axes)
-    names = [name for name, v in ds.data_vars.items() if set(v.dims) == set(axes) and name != "status"]
+    names = [
+        name for name, v in ds.data_vars.items() if set(v.dims) == set(axes) and name != "status"
+    ]
     flags = [name for name in names if "flag_values" in ds[name].attrs]
     flags.sort(key=lambda name: name != "verdict")
     floats = [
-        name for name in names if ds[name].dtype.kind in "fi" and name not in flags and not name.endswith("_error")
+        name
+        for name in names
+        if ds[name].dtype.kind in "fi" and name not in flags and not name.endswith("_error")
     ]
     figures = _figures(ds)
-    floats.sort(key=lambda name: figures.index(named) if (named := name.split(" ")[0]) in figures else len(figures))
+    floats.sort(
+        key=lambda name: (
+            figures.index(named) if (named := name.split(" ")[0]) in figures else len(figures)
+        )
+    )
     state, shown, variables = ds.status.transpose(*axes), [], {}
     for name in flags + floats[:FLOATS]:
         variable = ds[name].transpose(*axes)
@@ -178,9 +215,17 @@ def _of_points(ds, axes):
             words = {code: plain(other) for other, code in codes.items()}
             variables[name] = {"flags": words, "values": _packed(variable.values, kind)}
         else:
-            answered = np.where(np.isin(state.values, list(status.UNANSWERED)), np.nan, variable.values.astype(float))
+            answered = np.where(
+                np.isin(state.values, list(status.UNANSWERED)),
+                np.nan,
+                variable.values.astype(float),
+            )
             shown.append({"name": name, "text": f"{name}: {text}"} | _scale(answered))
-            variables[name] = {"flags": None, "values": _packed(answered, "f8"), "bars": _bars(ds, name, axes)}
+            variables[name] = {
+                "flags": None,
+                "values": _packed(answered, "f8"),
+                "bars": _bars(ds, name, axes),
+            }
     if not shown:
         raise BadInput("share: the file holds no variable over both axes")
     codes, own = flag_codes(ds.status.attrs), scene_statuses(ds)
@@ -191,12 +236,21 @@ def _of_points(ds, axes):
         "greys": {own[name]: _rgb(grey) for name, grey in palette.greys(ds).items() if (state == own[name]).any()},
     }  # fmt: skip
     widened = []
-    for own, dim in zip(_common(ds, axes)["axes"], axes, strict=True):  # half a step more at the ends: whole pixels
+    # half a step more at the ends: whole pixels
+    for own, dim in zip(_common(ds, axes)["axes"], axes, strict=True):
         values = np.log(ds[dim].values) if own["log"] else ds[dim].values.astype(float)
-        ends = [values[0] - 0.5 * (values[1] - values[0]), values[-1] + 0.5 * (values[-1] - values[-2])]
+        ends = [
+            values[0] - 0.5 * (values[1] - values[0]),
+            values[-1] + 0.5 * (values[-1] - values[-2]),
+        ]
         widened.append({**own, "ends": [float(end) for end in ends]})
     curves = _curves(ds, axes) if "curve_count" in ds else {}
-    return {"grid": grid, "shown": shown, "axes": widened, "hatched": "outside the domain; crossed: failed"} | curves
+    return {
+        "grid": grid,
+        "shown": shown,
+        "axes": widened,
+        "hatched": "outside the domain; crossed: failed",
+    } | curves
 
 
 def _separated(ds, axes):
@@ -212,7 +266,9 @@ def _separated(ds, axes):
         for i, label in enumerate(labels):
             place = f"({plain(str(dim), 40)} {plain(str(label), 40)})"
             words = f"{variable.attrs.get('long_name', name)} {place}"
-            more[f"{name} {place}"] = variable.isel({dim: i}, drop=True).assign_attrs(long_name=words)
+            more[f"{name} {place}"] = variable.isel({dim: i}, drop=True).assign_attrs(
+                long_name=words
+            )
             if bar in ds:
                 more[f"{name} {place}_error"] = ds[bar].isel({dim: i}, drop=True)
     return ds.assign(more)
@@ -258,7 +314,10 @@ def _scale(values):
         low, high = -max(-low, high), max(-low, high)
     name = maps.DIVERGING if low < 0.0 < high else maps.SEQUENTIAL
     table = np.rint(255 * colormaps[name](np.linspace(0, 1, 256))[:, :3]).astype(int)
-    return {"table": table.reshape(-1).tolist(), "range": [float(low), float(high if high > low else low + 1.0)]}
+    return {
+        "table": table.reshape(-1).tolist(),
+        "range": [float(low), float(high if high > low else low + 1.0)],
+    }
 
 
 def _rgb(colour):
@@ -307,14 +366,20 @@ def _about(ds, proof, why):
     """Proof, provenance, and how to cite, as HTML."""
     attrs, out = ds.attrs, []
     if proof:
-        areas = "; ".join(f"{plain(name)}: area {a:.9g} to {b:.9g}" for name, (a, b) in proof["areas"].items())
+        areas = "; ".join(
+            f"{plain(name)}: area {a:.9g} to {b:.9g}" for name, (a, b) in proof["areas"].items()
+        )
         certificate = html.escape(plain(proof["certificate"]))
-        digest, theorem = html.escape(plain(proof["sha256"])), html.escape(plain(proof["statement"], 10_000, True))
+        digest, theorem = (
+            html.escape(plain(proof["sha256"])),
+            html.escape(plain(proof["statement"], 10_000, True)),
+        )
         out.append(f'<div class="proof"><strong>Proved</strong> ({html.escape(areas)}) by the certificate '
                    f"{certificate}, sha256 {digest}: survey-check {certificate} verifies it"
                    f"<details><summary>the theorem</summary><pre>{theorem}</pre></details></div>")  # fmt: skip
     if why:
-        reason = html.escape(plain(why.partition("; ")[0]))  # without what to do: the reader has the page alone
+        # without what to do: the reader has the page alone
+        reason = html.escape(plain(why.partition("; ")[0]))
         out.append(f"<p>The page shows the points that were solved, no series: {reason}.</p>")
     sources = plain(str(attrs.get("references", "")), 2000)
     cite = (
@@ -322,8 +387,12 @@ def _about(ds, proof, why):
         f"{attrs.get('version_survey', survey.__version__)}, scene {attrs['scene']}, commit "
         f"{str(attrs.get('commit', 'unknown'))[:12]}. Equations: {sources}"
     )
-    out.append(f"<details open><summary>how to cite</summary><p>{html.escape(plain(cite, 3000))}</p></details>")
-    rows = "\n".join(f"{name}: {plain(str(attrs[name]), 2000)}" for name in ATTRIBUTES if name in attrs)
+    out.append(
+        f"<details open><summary>how to cite</summary><p>{html.escape(plain(cite, 3000))}</p></details>"
+    )
+    rows = "\n".join(
+        f"{name}: {plain(str(attrs[name]), 2000)}" for name in ATTRIBUTES if name in attrs
+    )
     out.append(f"<details><summary>provenance</summary><pre>{html.escape(rows)}</pre></details>")
     text = plain(str(attrs.get("workflow", "")), 20_000, True)
     out.append(f"<details><summary>the workflow</summary><pre>{html.escape(text)}</pre></details>")

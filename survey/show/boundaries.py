@@ -22,15 +22,30 @@ CURVES = {
     "odd_antiperiodic": (_EDGES, {"color": "#707070", "ls": (0, (5, 2)), "lw": 0.8}),
     "plus_one": ("a multiplier passes 1", {"color": "#000000", "ls": "-", "lw": 1.0}),
     "minus_one": ("a multiplier passes -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0}),
-    "neimark_sacker": ("a complex pair passes the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
-    "collision": ("multipliers collide on the circle", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
+    "neimark_sacker": (
+        "a complex pair passes the circle",
+        {"color": "#D40000", "ls": "-", "lw": 1.2},
+    ),
+    "collision": (
+        "multipliers collide on the circle",
+        {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2},
+    ),
     "A": ("A: multipliers meet at -1", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "B": ("B: multipliers meet at -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2}),
     "KC": ("KC: two pairs meet on the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "critical_rate": ("critical rate of the rotation", {"ls": "-"} | _PALE),
-    "equal_moments": ("equal moments of inertia", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2}),
-    "critical_motion": ("the critical motion becomes stable", {"color": "#D40000", "ls": "-", "lw": 1.2}),
-    "pole_passage": ("pole passages", {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]}),
+    "equal_moments": (
+        "equal moments of inertia",
+        {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2},
+    ),
+    "critical_motion": (
+        "the critical motion becomes stable",
+        {"color": "#D40000", "ls": "-", "lw": 1.2},
+    ),
+    "pole_passage": (
+        "pole passages",
+        {"color": "#FFFFFF", "ls": (0, (4, 2)), "lw": 1.0, "path_effects": [_RIM]},
+    ),
     "stable_precession": ("stable regular precessions", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "separatrix": ("separatrices", {"color": "#D55E00", "ls": "-", "lw": 1.4}),
     "stable_manifold": (
@@ -41,7 +56,10 @@ CURVES = {
     "unstable_cycle": ("unstable cycles", {"color": "#000000", "ls": (0, (4, 1.5)), "lw": 2.0}),
     "ends": ("K = 0 (or L = 0): ends", {"color": "#000000", "ls": (0, (1, 1.5)), "lw": 1.6}),
     "homoclinic": ("homoclinic connections", {"color": "#D40000", "ls": "-", "lw": 1.2}),
-    "heteroclinic": ("heteroclinic connections", {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2}),
+    "heteroclinic": (
+        "heteroclinic connections",
+        {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2},
+    ),
     "cycle_fold": ("folds of cycles", {"color": "#0050A0", "ls": "-", "lw": 1.4}),
     "fold": ("folds of equilibria", {"color": "#000000", "ls": "-", "lw": 1.2}),
     "supercritical_hopf": ("supercritical Hopf", {"ls": "-"} | _PALE),
@@ -56,8 +74,14 @@ CURVES = {
     "centre": ("centres", {"marker": "o", "ms": 6, "mfc": "#999999"} | _POINT),
     "source": ("repelling equilibria", {"marker": "o", "ms": 6, "mfc": "#FFFFFF"} | _POINT),
     "cusp": ("cusps", {"marker": "D", "ms": 5, "mfc": "#FFFFFF"} | _POINT),
-    "stable_upright": ("stable upright rotations", {"marker": "o", "ms": 5, "mfc": "#000000"} | _POINT),
-    "unstable_upright": ("unstable upright rotations", {"marker": "o", "ms": 6, "mfc": "#D55E00"} | _POINT),
+    "stable_upright": (
+        "stable upright rotations",
+        {"marker": "o", "ms": 5, "mfc": "#000000"} | _POINT,
+    ),
+    "unstable_upright": (
+        "unstable upright rotations",
+        {"marker": "o", "ms": 6, "mfc": "#D55E00"} | _POINT,
+    ),
 }
 
 
@@ -66,7 +90,11 @@ def in_plane(ds, variable):
 
     Curves found on planes that cross it are left out: they meet it in points.
     """
-    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds]
+    fixed = [
+        c
+        for c in variable.coords.values()
+        if c.ndim == 0 and c.name in ds.dims and f"curve_{c.name}" in ds
+    ]
     if not fixed:
         return ds
     here = np.repeat(True, ds.sizes["curve_point"])
@@ -78,7 +106,9 @@ def in_plane(ds, variable):
 
 
 def curves_of(ds):
-    """{class: slices of its curves in `curve_point`}, in the order in which they are drawn; raises Damaged."""
+    """{class: slices of its curves in `curve_point`}, in the order in which they are drawn; raises
+    Damaged.
+    """
     schema.curves(ds)
     names = {code: name for name, code in flag_codes(ds.curve_class.attrs).items()}
     kinds, ends = ds.curve_class.values, np.cumsum(ds.curve_count.values)
@@ -89,7 +119,9 @@ def curves_of(ds):
 
 
 def draw_edges(axes, ds, x):
-    """Draw the boundaries on the axis `x`, where a survey has no other, as lines across the figure, with labels."""
+    """Draw the boundaries on the axis `x`, where a survey has no other, as lines across the figure,
+    with labels.
+    """
     if "edge_count" not in ds or ds.edge_count.ndim or ds.attrs.get("boundaries") != x.name:
         return
     names, told = {code: name for name, code in flag_codes(ds.edge_class.attrs).items()}, set()
@@ -108,7 +140,8 @@ def draw_edges(axes, ds, x):
 def draw_boundaries(axes, ds, x, y, gaps=None):
     """Draw the boundaries over the map, points above lines; returns their legend handles.
 
-    `gaps`: the colour between the dashes of edges of tongues, which are lines themselves where they are narrow.
+    `gaps`: the colour between the dashes of edges of tongues, which are lines themselves where they
+    are narrow.
     """
     handles = {}
     for name, parts in curves_of(ds).items():

@@ -1,4 +1,6 @@
-"""Points that lie on no grid, such as samples: scattered over the first two parameters that vary along them."""
+"""Points that lie on no grid, such as samples: scattered over the first two parameters that vary
+along them.
+"""
 
 import numpy as np
 from matplotlib.patches import Patch
@@ -15,7 +17,9 @@ SIZE = 14.0  # of a mark, in points^2
 
 def is_ensemble(ds):
     """Are these points along one dimension without a coordinate, along which two parameters or more vary?"""
-    return len(ds.status.dims) == 1 and ds.status.dims[0] not in ds.coords and len(_parameters(ds)) > 1
+    return (
+        len(ds.status.dims) == 1 and ds.status.dims[0] not in ds.coords and len(_parameters(ds)) > 1
+    )
 
 
 def _parameters(ds):
@@ -24,7 +28,9 @@ def _parameters(ds):
 
 
 def draw_ensemble(axes, ds, name, paper, asked):
-    """Scatter a variable over two parameters: a colour for each verdict, or a colour bar; `asked` as in `draw_map`."""
+    """Scatter a variable over two parameters: a colour for each verdict, or a colour bar; `asked`
+    as in `draw_map`.
+    """
     x, y = _parameters(ds)[:2]
     variable, state = masked(ds[name].load()), ds.status.load()
     if "flag_values" in variable.attrs:
@@ -33,9 +39,18 @@ def draw_ensemble(axes, ds, name, paper, asked):
         for kind, code in table.items():
             here = (shown == code).filled(False)
             if here.any():
-                axes.scatter(x.values[here], y.values[here], SIZE, palette[kind], edgecolors="black", linewidths=0.3)
+                axes.scatter(
+                    x.values[here],
+                    y.values[here],
+                    SIZE,
+                    palette[kind],
+                    edgecolors="black",
+                    linewidths=0.3,
+                )
                 label = spaced(kind) if paper else f"{spaced(kind)} ({int(here.sum()):,})"
-                handles.append(Patch(facecolor=palette[kind], edgecolor="black", lw=0.5, label=label))
+                handles.append(
+                    Patch(facecolor=palette[kind], edgecolor="black", lw=0.5, label=label)
+                )
     else:
         lost = np.isin(state.values, list(status.UNANSWERED))
         words, values = words_of(variable), variable.values.astype(float)
@@ -46,8 +61,12 @@ def draw_ensemble(axes, ds, name, paper, asked):
         handles = []
         for code, text in words.items():
             here = (values == code) & ~lost
-            axes.scatter(x.values[here], y.values[here], SIZE, IN_WORDS, edgecolors="black", linewidths=0.3)
-            handles += [Patch(color=IN_WORDS, label=f"{text} ({int(here.sum()):,})")] if here.any() else []
+            axes.scatter(
+                x.values[here], y.values[here], SIZE, IN_WORDS, edgecolors="black", linewidths=0.3
+            )
+            handles += (
+                [Patch(color=IN_WORDS, label=f"{text} ({int(here.sum()):,})")] if here.any() else []
+            )
     bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():
         axes.plot(x.values[bad], y.values[bad], "x", color="#999999", ms=4)

@@ -1,4 +1,6 @@
-"""Abel solutions over their angle: a family of curves, coloured by a parameter, that end in their turning points."""
+"""Abel solutions over their angle: a family of curves, coloured by a parameter, that end in their
+turning points.
+"""
 
 import numpy as np
 from matplotlib.collections import LineCollection
@@ -14,7 +16,8 @@ from survey.show.palette import greys
 from survey.show.text import WIDE, label_of, spaced
 
 ANGLE = "phi"
-AT_TURNING = {"w": None, "t": "t_turning"}  # what is drawn as curves, and its value at a turning point (None: 0)
+# what is drawn as curves, and its value at a turning point (None: 0)
+AT_TURNING = {"w": None, "t": "t_turning"}
 MOST = 200  # curves that are drawn, chosen evenly
 LEFT = np.linspace(1, 0, 10)[1:]  # of the way to a turning point, from the last angle before it
 VISIBLE = 0.005  # of the height: narrower error bars lie within the lines
@@ -25,16 +28,24 @@ _START = {"color": "#D55E00", "lw": 1.0, "ls": (0, (4, 2)), "zorder": 1}
 
 def over_angles(ds):
     """Does the survey hold Abel solutions of several parameter sets at several angles?"""
-    return options_of(ds).get("question") == "abel" and ds.sizes.get(ANGLE, 1) > 1 and len(ds.status.dims) > 1
+    return (
+        options_of(ds).get("question") == "abel"
+        and ds.sizes.get(ANGLE, 1) > 1
+        and len(ds.status.dims) > 1
+    )
 
 
 def draw_family(axes, ds, variable, paper):
-    """Draw a variable over the angle, its last dimension, as one curve for each value along its first.
+    """Draw a variable over the angle, its last dimension, as one curve for each value along its
+    first.
 
-    `ds` holds the variable on these dimensions, its error bars, the status, and the turning points if asked for.
+    `ds` holds the variable on these dimensions, its error bars, the status, and the turning points
+    if asked for.
     """
     parameter, phi = (variable[dim] for dim in variable.dims)
-    chosen = np.unique(np.linspace(0, parameter.size - 1, min(MOST, parameter.size)).round().astype(int))
+    chosen = np.unique(
+        np.linspace(0, parameter.size - 1, min(MOST, parameter.size)).round().astype(int)
+    )
     upwards = np.argsort(phi.values)
 
     part = dict(zip(variable.dims, (chosen, upwards), strict=True))
@@ -45,7 +56,9 @@ def draw_family(axes, ds, variable, paper):
         return ds[name].isel(part).transpose(*variable.dims).values
 
     angles = phi.values[upwards]
-    values, bars, states, turning = map(rows, (variable.name, f"{variable.name}_error", "status", "phi_turning"))
+    values, bars, states, turning = map(
+        rows, (variable.name, f"{variable.name}_error", "status", "phi_turning")
+    )
     there = rows(AT_TURNING[variable.name]) if AT_TURNING[variable.name] else np.zeros(values.shape)
     ends = [_ends(*row) for row in zip(states, values, strict=True)]
     lines = [_line(angles, *row) for row in zip(values, turning, there, ends, strict=True)]
@@ -57,7 +70,11 @@ def draw_family(axes, ds, variable, paper):
     axes.autoscale_view()
     axes.set_xlim(angles[[0, -1]])
     axes.figure.colorbar(drawn, ax=axes, label=label_of(parameter))
-    number = f"{len(lines):,} of {parameter.size:,} solutions" if len(lines) < parameter.size else "solutions"
+    number = (
+        f"{len(lines):,} of {parameter.size:,} solutions"
+        if len(lines) < parameter.size
+        else "solutions"
+    )
     handles = [Line2D([], [], color=drawn.cmap(0.4), label=number)]
     handles += _bars(axes, angles, values, bars, drawn.to_rgba(colours))
     handles += _start(axes, variable)
@@ -74,11 +91,16 @@ def _ends(state, value):
     known = np.flatnonzero((state == status.OK) & np.isfinite(value))
     if not known.size:
         return (-1, 0), (-1, state.size - 1)
-    return (known[0], known[0] - 1), (known[-1], known[-1] + 1 if known[-1] + 1 < state.size else -1)
+    return (known[0], known[0] - 1), (
+        known[-1],
+        known[-1] + 1 if known[-1] + 1 < state.size else -1,
+    )
 
 
 def _line(angles, value, turning, there, ends):
-    """The points of a curve up to its turning points, where the square of the distance is linear in the angle."""
+    """The points of a curve up to its turning points, where the square of the distance is linear in
+    the angle.
+    """
     (first, _), (last, _) = ends
     if first < 0:
         return np.empty((0, 2))
@@ -86,7 +108,10 @@ def _line(angles, value, turning, there, ends):
     for known, beyond in ends:
         if beyond >= 0 and np.isfinite(turning[beyond] + there[beyond]):
             angle, end = turning[beyond], there[beyond]
-            way = np.stack([angle + (angles[known] - angle) * LEFT**2, end + (value[known] - end) * LEFT], axis=-1)
+            way = np.stack(
+                [angle + (angles[known] - angle) * LEFT**2, end + (value[known] - end) * LEFT],
+                axis=-1,
+            )
             parts = [way[::-1], *parts] if beyond < known else [*parts, way]
     return np.concatenate(parts)
 
@@ -96,7 +121,9 @@ def _bars(axes, angles, values, bars, colours):
     low, high = axes.get_ylim()
     wide = np.flatnonzero((bars > VISIBLE * (high - low)).any(axis=1))
     for i in wide:
-        band = axes.fill_between(angles, values[i] - bars[i], values[i] + bars[i], color=colours[i], alpha=0.3, lw=0)
+        band = axes.fill_between(
+            angles, values[i] - bars[i], values[i] + bars[i], color=colours[i], alpha=0.3, lw=0
+        )
         band.set_label("error bars")
     return [band] if wide.size else []
 
@@ -122,10 +149,15 @@ def _turning_points(axes, turning, there, ends):
 
 
 def _unknown_ends(axes, ds, states, lines, ends, paper):
-    """Ring the ends of curves that stop for another reason than a turning point; returns the legend handles."""
+    """Ring the ends of curves that stop for another reason than a turning point; returns the legend
+    handles.
+    """
     codes = scene_statuses(ds)
     kinds = {name: ([codes[name]], grey) for name, grey in greys(ds).items() if name != "turning"}
-    kinds |= {"failed": (list(status.FAILURES), "white"), "outside the domain": ([status.INVALID_PARAMETERS], "white")}
+    kinds |= {
+        "failed": (list(status.FAILURES), "white"),
+        "outside the domain": ([status.INVALID_PARAMETERS], "white"),
+    }
     handles = []
     for name, (codes, colour) in kinds.items():
         found = [(i, side) for i, row in enumerate(ends) for side, (_, beyond) in enumerate(row)
@@ -143,7 +175,9 @@ def _ticks(axes, angles):
         return
     halves = next(step for step in (1, 2, 4, 8) if np.ptp(angles) <= 5 * step * np.pi)
     axes.xaxis.set_major_locator(MultipleLocator(halves * np.pi / 2))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda angle, _: _multiple_of_pi(round(angle / (np.pi / 2)))))
+    axes.xaxis.set_major_formatter(
+        FuncFormatter(lambda angle, _: _multiple_of_pi(round(angle / (np.pi / 2))))
+    )
 
 
 def _multiple_of_pi(halves):

@@ -1,7 +1,8 @@
-"""Dataset -> figure: the stability map, a variable with its colour bar, a curve with its error band, or many curves.
+"""Dataset -> figure: the stability map, a variable with its colour bar, a curve with its error
+band, or many curves.
 
-Pictures are for the screen (`style` "screen") or for papers ("paper": column widths, no title, and hatching, so that
-verdicts can be told apart in grey print too).
+Pictures are for the screen (`style` "screen") or for papers ("paper": column widths, no title, and
+hatching, so that verdicts can be told apart in grey print too).
 """
 
 import matplotlib
@@ -26,7 +27,8 @@ MOST_LABELS = 30  # on an axis
 
 def save(ds, path, name=None, style=None, width="single"):
     """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
-    with matplotlib.rc_context(style_named(style).rc), np.errstate(over="ignore"):  # of ticks, near the largest number
+    # of ticks, near the largest number
+    with matplotlib.rc_context(style_named(style).rc), np.errstate(over="ignore"):
         try:
             draw(ds, name, style, width).savefig(path, dpi=style_named(style).dpi)
         except OverflowError:  # of ticks, before Matplotlib 3.11
@@ -36,7 +38,9 @@ def save(ds, path, name=None, style=None, width="single"):
 
 
 def draw(ds, name=None, style=None, width="single"):
-    """The figure of one variable over the survey's axes; not a figure of pyplot, which would show it in notebooks."""
+    """The figure of one variable over the survey's axes; not a figure of pyplot, which would show
+    it in notebooks.
+    """
     with matplotlib.rc_context(style_named(style).rc):
         figure = Figure(figsize=figure_size(style, width), layout="constrained")
         onto(figure.subplots(subplot_kw={"projection": projection_of(name)}), ds, name, style=style)
@@ -49,9 +53,11 @@ def projection_of(name):
 
 
 def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), colours=None):
-    """Draw one variable (the verdict, or the first output) onto matplotlib axes; raises BadInput for an unknown one.
+    """Draw one variable (the verdict, or the first output) onto matplotlib axes; raises BadInput
+    for an unknown one.
 
-    `across`: the axes that are drawn, or None; `colours`: cmap, vmin, vmax, robust of a variable of numbers, or None.
+    `across`: the axes that are drawn, or None; `colours`: cmap, vmin, vmax, robust of a variable of
+    numbers, or None.
     """
     paper = style_named(style).paper
     _check_colours(colours or {})
@@ -103,7 +109,9 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
 
 
 def _check_colours(asked):
-    """Raise BadInput unless the limits are numbers, the lower one first, and the colour map is one of matplotlib's."""
+    """Raise BadInput unless the limits are numbers, the lower one first, and the colour map is one
+    of matplotlib's.
+    """
     limits = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
     for key, value in limits.items():
         if np.ndim(value) or np.asarray(value).dtype.kind not in "iuf" or not np.isfinite(value):
@@ -120,8 +128,8 @@ def _check_colours(asked):
 
 
 def _without_single(ds, across):
-    """The survey without those axes of a single value, fixed parameters then, that would be drawn without being asked
-    for.
+    """The survey without those axes of a single value, fixed parameters then, that would be drawn
+    without being asked for.
     """
     single = [dim for dim in ds.status.dims[:2] if ds.sizes[dim] == 1 and dim not in across]
     kept = len(single) == ds.status.ndim or family.over_angles(ds)
@@ -143,21 +151,28 @@ def _chosen(ds, across):
     if x is None:
         # with two other axes or more, curves lie in planes of this one and the first
         along = ds.attrs.get("boundaries")
-        return [known[0], along] if len(known) > 2 and "edge_count" in ds and along in known[2:] else None
+        return (
+            [known[0], along]
+            if len(known) > 2 and "edge_count" in ds and along in known[2:]
+            else None
+        )
     return [x, *[name for name in known if name != x][:1]]
 
 
 def _flat(ds, name, chosen=None):
     """The survey, the variable and the status on at most two of the survey's dimensions.
 
-    The first position along any other, but the last angle of Abel solutions, of which w and t are curves over it.
+    The first position along any other, but the last angle of Abel solutions, of which w and t are
+    curves over it.
     """
     keep, at = list(ds.status.dims)[:2], {}
     if family.over_angles(ds):
         others, at = [dim for dim in ds.status.dims if dim != family.ANGLE], {family.ANGLE: -1}
         keep = [others[0], family.ANGLE] if name in family.AT_TURNING else others[:2]
     keep = chosen or keep
-    part = ds.isel({dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep})
+    part = ds.isel(
+        {dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep}
+    )
     unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
     part = part.sortby(unsorted) if unsorted else part
     return part, masked(part[name].transpose(*keep)), part.status.transpose(*keep)

@@ -16,14 +16,23 @@ LAST = r"(?<=,) \$[^$]*\$( \([^)]*\))?$"  # the symbol and the unit of a label
 def fit(axes):
     """Wrap the title and the labels that would not fit, as the figure is laid out now."""
     axes.figure.figure.draw_without_rendering()
-    for panel in [axes, *(other for other in axes.figure.axes if other.get_label() == "<colorbar>")]:
+    for panel in [
+        axes,
+        *(other for other in axes.figure.axes if other.get_label() == "<colorbar>"),
+    ]:
         width, height = _space(panel, inf if alone(axes) else OVERHANG)
-        for text, space in ((panel.title, width), (panel.xaxis.label, width), (panel.yaxis.label, height)):
+        for text, space in (
+            (panel.title, width),
+            (panel.xaxis.label, width),
+            (panel.yaxis.label, height),
+        ):
             wrap(text, space)
 
 
 def _space(axes, most):
-    """Width and height for a text centred on a side of the axes: within the figure, and `most` times the axes' own."""
+    """Width and height for a text centred on a side of the axes: within the figure, and `most`
+    times the axes' own.
+    """
     own, figure = axes.get_window_extent(), axes.figure.bbox
     x, y = 0.5 * (own.x0 + own.x1), 0.5 * (own.y0 + own.y1)
     width, height = 2 * min(x - figure.x0, figure.x1 - x), 2 * min(y - figure.y0, figure.y1 - y)
@@ -43,7 +52,10 @@ def wrap(text, space):
         joined = re.sub(LAST, lambda end: end[0].replace(" ", "\0"), original)
         joined = re.sub(r"\$[^$]*\$", lambda formula: formula[0].replace(" ", "\0"), joined)
         lines = joined.split("\n")
-        wrapped = [textwrap.fill(line, length, break_long_words=False, break_on_hyphens=False) for line in lines]
+        wrapped = [
+            textwrap.fill(line, length, break_long_words=False, break_on_hyphens=False)
+            for line in lines
+        ]
         text.set_text("\n".join(wrapped).replace("\0", " "))
 
 
@@ -57,7 +69,8 @@ def add_legend(axes, handles):
     fills = alone(axes) and axes.figure.get_constrained_layout()
     space = 0.98 * axes.figure.bbox.width if fills else OVERHANG * axes.get_window_extent().width
     settings = {"handles": handles, "frameon": False, "fontsize": 8}
-    below = axes.transAxes + ScaledTranslation(0, -0.5, axes.figure.dpi_scale_trans)  # inches: ticks and label
+    # inches: ticks and label
+    below = axes.transAxes + ScaledTranslation(0, -0.5, axes.figure.dpi_scale_trans)
     for columns in range(min(4, len(handles)), 0, -1):
         if fills:
             legend = axes.figure.legend(loc="outside lower center", ncols=columns, **settings)

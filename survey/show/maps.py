@@ -19,7 +19,8 @@ from survey.show.style import style_named
 from survey.show.surfaces import section
 from survey.show.text import WIDE, label_of, spaced
 
-MAX_DRAWN = 2000  # points along an axis: in a picture of a larger map a cell stands for several points
+# points along an axis: in a picture of a larger map a cell stands for several points
+MAX_DRAWN = 2000
 MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
 EDGED, EDGES = "discriminant", (-2.0, 2.0)  # whose lines at these values are the edges of stability
@@ -29,14 +30,17 @@ CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
 
 
 def draw_map(axes, ds, variable, state, boundaries, paper, asked):
-    """Draw a variable over its two axes, `state` being the status; with colour bar, boundaries and legend.
+    """Draw a variable over its two axes, `state` being the status; with colour bar, boundaries and
+    legend.
 
     `asked`: cmap, vmin, vmax, robust of its colours, None where they are not given.
     """
     scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
     words = words_of(variable)
     ticks = MaxNLocator(integer=True) if fill_of(variable) is not None else None
-    variable, state, number = _shown(axes, ds, variable, state, style_named("paper" if paper else None).dpi)
+    variable, state, number = _shown(
+        axes, ds, variable, state, style_named("paper" if paper else None).dpi
+    )
     x, y = (variable[dim] for dim in variable.dims)
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
@@ -48,14 +52,18 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
     else:
         values = variable.values.astype(float)
         worded = {text: (values == code) & ~(failed | outside) for code, text in words.items()}
-        shown = np.ma.masked_invalid(np.where(failed | outside | np.isin(values, list(words)), np.nan, values))
+        shown = np.ma.masked_invalid(
+            np.where(failed | outside | np.isin(values, list(words)), np.nan, values)
+        )
         colours = colours_of_numbers(shown, variable, asked, ticks is not None)
         drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
             few = isinstance(colours.get("norm"), BoundaryNorm)
             ticks = np.unique(shown.compressed()) if few else ticks
             extend = "neither" if few else clipped(shown, *drawn.get_clim())
-            axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend)
+            axes.figure.colorbar(
+                drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend
+            )
         if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
             axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
@@ -68,7 +76,11 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
         handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
     if boundaries and ("curve_count" in ds or "surface_vertices" in ds):
-        gaps = colours_of(flag_codes(variable.attrs)).get("unstable") if "flag_values" in variable.attrs else None
+        gaps = (
+            colours_of(flag_codes(variable.attrs)).get("unstable")
+            if "flag_values" in variable.attrs
+            else None
+        )
         plane = in_plane(ds, variable) if "curve_count" in ds else section(ds, variable)
         handles += draw_boundaries(axes, plane, x, y, gaps)
     if handles:
@@ -80,33 +92,50 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
 
 
 def _shown(axes, ds, variable, state, dpi):
-    """(variable, status, {}) in memory; for a large map those of the picture's cells, and {kind: number of points}."""
+    """(variable, status, {}) in memory; for a large map those of the picture's cells, and {kind:
+    number of points}.
+    """
     if max(variable.shape) <= MAX_DRAWN:
         return variable.compute(), state.compute(), {}
-    box, points = axes.get_window_extent(), Points(variable, state, scene_statuses(ds), with_statuses=True)
+    box, points = (
+        axes.get_window_extent(),
+        Points(variable, state, scene_statuses(ds), with_statuses=True),
+    )
     pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
-    overview = Overview(points, np.clip(CELLS_PER_PIXEL * pixels, 1, MAX_CELLS).astype(int)).complete
+    overview = Overview(
+        points, np.clip(CELLS_PER_PIXEL * pixels, 1, MAX_CELLS).astype(int)
+    ).complete
     values, states = points.cells(overview)
     for dim, starts in zip(variable.dims, overview.starts, strict=True):
         ends = np.append(starts[1:], variable.sizes[dim]) - 1
         middles = 0.5 * (variable[dim].values[starts] + variable[dim].values[ends])
         variable, state = (
-            v.isel({dim: starts}).assign_coords({dim: (dim, middles, v[dim].attrs)}) for v in (variable, state)
+            v.isel({dim: starts}).assign_coords({dim: (dim, middles, v[dim].attrs)})
+            for v in (variable, state)
         )
     return variable.copy(data=values), state.copy(data=states), overview.number
 
 
 def _verdicts(axes, x, y, ds, variable, state, number, paper):
-    """Draw a colour per kind, rare points ringed; what failed or lies outside stays white. Returns legend handles."""
+    """Draw a colour per kind, rare points ringed; what failed or lies outside stays white. Returns
+    legend handles.
+    """
     shown, table, palette = kinds_of(ds, variable, state)
     flags = flag_codes(variable.attrs)
     codes = sorted(table.values())
     names = {code: name for name, code in table.items()}
     cmap = ListedColormap([palette[names[code]] for code in codes])
     edges = np.append(np.array(codes) - 0.5, codes[-1] + 0.5)
-    settings = {"cmap": cmap, "norm": BoundaryNorm(edges, cmap.N), "shading": "nearest", "rasterized": True}
+    settings = {
+        "cmap": cmap,
+        "norm": BoundaryNorm(edges, cmap.N),
+        "shading": "nearest",
+        "rasterized": True,
+    }
     axes.pcolormesh(x, y, shown.T, **settings)
-    number = number or {name: int((shown == code).filled(False).sum()) for name, code in table.items()}
+    number = number or {
+        name: int((shown == code).filled(False).sum()) for name, code in table.items()
+    }
     handles = [
         Patch(
             facecolor=palette[names[code]],
@@ -127,11 +156,15 @@ def _verdicts(axes, x, y, ds, variable, state, number, paper):
 
 
 def _undefined(axes, x, y, ds, state, missing, number, paper):
-    """Draw the points without a value in the grey of their status, where the scene names one; returns handles."""
+    """Draw the points without a value in the grey of their status, where the scene names one;
+    returns handles.
+    """
     handles = []
     codes = scene_statuses(ds)
     for name, grey in greys(ds).items():
-        handles += _area(axes, x, y, missing & (state.values == codes[name]), grey, spaced(name), number, paper)
+        handles += _area(
+            axes, x, y, missing & (state.values == codes[name]), grey, spaced(name), number, paper
+        )
     return handles
 
 
@@ -140,7 +173,9 @@ def _area(axes, x, y, here, colour, label, number, paper):
     if not here.any():
         return []
     cells = np.ma.masked_array(here, ~here)
-    axes.pcolormesh(x, y, cells.T, cmap=ListedColormap([colour]), shading="nearest", rasterized=True)
+    axes.pcolormesh(
+        x, y, cells.T, cmap=ListedColormap([colour]), shading="nearest", rasterized=True
+    )
     return marks(axes, x, y, here, label, number, paper, colour)
 
 
@@ -150,7 +185,10 @@ def counts(shown):
     if values.size == 0 or np.ptp(values) >= MOST_COUNTS:
         return None
     edges = np.arange(values.min() - 0.5, values.max() + 1.0)
-    return {"cmap": colormaps["viridis"].resampled(len(edges) - 1), "norm": BoundaryNorm(edges, len(edges) - 1)}
+    return {
+        "cmap": colormaps["viridis"].resampled(len(edges) - 1),
+        "norm": BoundaryNorm(edges, len(edges) - 1),
+    }
 
 
 def colours_of_numbers(shown, variable, asked, whole):
@@ -158,7 +196,9 @@ def colours_of_numbers(shown, variable, asked, whole):
 
     Quantities of both signs have a diverging map about 0.
     """
-    if str(variable.name).endswith("_error") and not any(asked.get(key) is not None for key in ("vmin", "vmax")):
+    if str(variable.name).endswith("_error") and not any(
+        asked.get(key) is not None for key in ("vmin", "vmax")
+    ):
         low, high = _positive(shown)
         if high > 100.0 * low > 0.0:
             return {"cmap": asked.get("cmap") or SEQUENTIAL, "norm": LogNorm(low, high)}
@@ -191,7 +231,11 @@ def _positive(shown):
 
 def _full(shown):
     values = shown.compressed()
-    return {"vmin": float(values.min()), "vmax": float(values.max())} if values.size and np.ptp(values) > 0 else {}
+    return (
+        {"vmin": float(values.min()), "vmax": float(values.max())}
+        if values.size and np.ptp(values) > 0
+        else {}
+    )
 
 
 def colour_limits(shown):

@@ -19,13 +19,25 @@ def marks(axes, x, y, where, label, number, paper=False, colour="white"):
         return []
     if total <= RARE * where.size:
         i, j = np.nonzero(where)
-        ring = {"marker": "o", "markeredgecolor": "#D40000", "markerfacecolor": colour, "linestyle": "none"}
+        ring = {
+            "marker": "o",
+            "markeredgecolor": "#D40000",
+            "markerfacecolor": colour,
+            "linestyle": "none",
+        }
         axes.plot(x.values[i], y.values[j], markersize=4, **ring)
         return [Line2D([], [], markersize=6, label=label, **ring)]
     if colour == "white":
         # one more cell all round, or the hatching would end at the centres of the outermost cells
         wide = np.pad(where.T.astype(float), 1, mode="edge")
-        axes.contourf(widened(x.values), widened(y.values), wide, levels=[0.5, 1.5], colors="none", hatches=["xxx"])
+        axes.contourf(
+            widened(x.values),
+            widened(y.values),
+            wide,
+            levels=[0.5, 1.5],
+            colors="none",
+            hatches=["xxx"],
+        )
         return [Patch(facecolor="white", edgecolor="grey", hatch="xxx", label=label)]
     return [Patch(facecolor=colour, label=label)]
 

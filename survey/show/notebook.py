@@ -16,7 +16,11 @@ def of_survey(ds):
     for dim in ds.status.dims:
         values = f"{ds[dim].values[0]} to {ds[dim].values[-1]}, " if dim in ds.coords else ""
         rows.append((str(dim), f"{values}{ds.sizes[dim]:,} values"))
-    rows += [(str(name), f"{float(c):.6g}") for name, c in ds.coords.items() if c.ndim == 0 and c.dtype.kind in "fi"]
+    rows += [
+        (str(name), f"{float(c):.6g}")
+        for name, c in ds.coords.items()
+        if c.ndim == 0 and c.dtype.kind in "fi"
+    ]
     if ds.status.size <= MOST_COUNTED:
         rows += [(what, ", ".join(f"{name}: {n:,}" for name, n in number.items() if n))
                  for what, number in counts(ds).items()]  # fmt: skip

@@ -14,16 +14,20 @@ MARGINAL = COLOURS[2]
 OTHERS = tuple(COLOURS[i] for i in (11, 4, 5, 3, 9, 8, 10, 12, 6, 13, 7))
 UNDECIDED = "#000000"
 NOTHING = "#EDEDED"  # the flag "none"
-# where the outputs are undefined, by the scene's own statuses: in print between unstable, stable and black
+# where the outputs are undefined, by the scene's own statuses: in print between unstable, stable
+# and black
 GREYS = ("#808080", "#B3B3B3", "#5E5E5E")
 LIGHT_GREYS = ("#C6C6C6", "#A6A6A6", "#868686")  # the same in a map with a colour bar
-HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")  # of the COLOURS, in papers
+# of the COLOURS, in papers
+HATCHES = ("//////", "", "....", "\\\\\\\\", "xxxx", "----", "||||", "++++", "oo", "**")
 
 
 def kinds_of(ds, variable, state):
-    """(codes, {kind: code}, {kind: colour}) of a flag variable; masked where the point failed or lies outside.
+    """(codes, {kind: code}, {kind: colour}) of a flag variable; masked where the point failed or
+    lies outside.
 
-    The kinds are its flags, followed by the scene's own statuses, under which points are undefined, not undecided.
+    The kinds are its flags, followed by the scene's own statuses, under which points are undefined,
+    not undecided.
     """
     table, shown = flag_codes(variable.attrs), variable.values.astype(np.int32)
     colours = dict.fromkeys(table, "#444444") | colours_of(table) | greys_of(ds, table)
@@ -34,7 +38,9 @@ def kinds_of(ds, variable, state):
 
 
 def colours_of(table):
-    """A colour per meaning: orange is unstable and nothing else, light blue stable or "ok"; "none" stays pale."""
+    """A colour per meaning: orange is unstable and nothing else, light blue stable or "ok"; "none"
+    stays pale.
+    """
     found = {"undecided": UNDECIDED, "ok": COLOURS[1], "none": NOTHING, "marginal": MARGINAL}
     meant = [name for name in table if name not in found]
     unstable = [name for name in meant if "unstable" in name]
@@ -56,6 +62,8 @@ def greys(ds, shades=LIGHT_GREYS):
 
 
 def hatch_of(table, name):
-    """The hatching of a meaning in papers; none for undecided, which is black, nor for undefined, which is grey."""
+    """The hatching of a meaning in papers; none for undecided, which is black, nor for undefined,
+    which is grey.
+    """
     meant = [other for other in table if other != "undecided"]
     return HATCHES[meant.index(name) % len(HATCHES)] if name in meant and "ok" not in table else ""

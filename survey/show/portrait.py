@@ -1,8 +1,8 @@
 """A trajectory -> its picture: panels side by side, each of a kind that the scene names.
 
-Kinds: `lines t y1 y2`, values against time; `multipliers`, on the unit circle; `cylinder phi w`, an orbit on the
-cylinder among its neighbours, with equilibria, cycles and separatrices if the data hold them; `plane x y`, a path;
-`sphere x y z`, a path on the unit sphere.
+Kinds: `lines t y1 y2`, values against time; `multipliers`, on the unit circle; `cylinder phi w`, an
+orbit on the cylinder among its neighbours, with equilibria, cycles and separatrices if the data
+hold them; `plane x y`, a path; `sphere x y z`, a path on the unit sphere.
 """
 
 import numpy as np
@@ -35,7 +35,8 @@ def draw(ds, figure):
         settings = {"projection": "3d"} if kind == "sphere" else {}
         KINDS[kind](figure.add_subplot(1, len(panels), i + 1, **settings), ds, *names)
     title = figure.suptitle(
-        "\n".join(part for part in (literal(ds.attrs["title"]), ds.attrs["where"]) if part), fontsize=10
+        "\n".join(part for part in (literal(ds.attrs["title"]), ds.attrs["where"]) if part),
+        fontsize=10,
     )
     wrap(title, figure.bbox.width)
 
@@ -82,7 +83,9 @@ def _cylinder(axes, ds, x, y):
         axes.plot(*_wrapped(orbit, speed), lw=0.6, color=GREY)
     handles = _parting(axes, ds, x, y)
     axes.plot(*_wrapped(ds[x].values, ds[y].values), lw=1.8, color=LINES[0], zorder=2.5)
-    axes.plot(np.mod(ds[x].values[0], 2 * np.pi), ds[y].values[0], "o", color=LINES[1], mec="black", ms=6)
+    axes.plot(
+        np.mod(ds[x].values[0], 2 * np.pi), ds[y].values[0], "o", color=LINES[1], mec="black", ms=6
+    )
     axes.set_xlim(0, 2 * np.pi)
     size = 1.3 * max(1.0, np.nanmax(np.abs(ds[y].values), initial=0))
     if "line_kind" in ds:  # cycles are shown too, unless they are far
@@ -97,7 +100,9 @@ def _cylinder(axes, ds, x, y):
 
 
 def _parting(axes, ds, x, y):
-    """What parts the motions on a cylinder, where it is known: branches of the saddles, cycles and equilibria."""
+    """What parts the motions on a cylinder, where it is known: branches of the saddles, cycles and
+    equilibria.
+    """
     handles = {}
     if "line_kind" in ds:
         names = ds.line_kind.attrs["flag_meanings"].split()
@@ -107,9 +112,14 @@ def _parting(axes, ds, x, y):
             axes.plot(*_wrapped(orbit, speed), **style)
             handles[names[kind]] = Line2D([], [], label=names[kind].replace("_", " "), **style)
     if f"equilibrium_{x}" in ds:
-        rests = (ds[name].values for name in (f"equilibrium_{x}", "equilibrium_saddle", "equilibrium_stable"))
+        rests = (
+            ds[name].values
+            for name in (f"equilibrium_{x}", "equilibrium_saddle", "equilibrium_stable")
+        )
         for angle, saddle, stable in zip(*rests, strict=True):
-            name = "saddle" if saddle else "attracting equilibrium" if stable else "other equilibrium"
+            name = (
+                "saddle" if saddle else "attracting equilibrium" if stable else "other equilibrium"
+            )
             style = RESTS[name] | {"ls": "none", "mec": "black", "ms": 6, "zorder": 3}
             axes.plot(angle, 0.0, clip_on=False, **style)
             handles[name] = Line2D([], [], label=name, **style)
@@ -139,7 +149,13 @@ def _sphere(axes, ds, x, y, z):
         ring = np.sqrt(1 - height**2)
         axes.plot(ring * np.cos(angle), ring * np.sin(angle), height, lw=0.4, color=GREY)
     for turn in np.radians(np.arange(0, 180, 30)):
-        axes.plot(np.cos(turn) * np.sin(angle), np.sin(turn) * np.sin(angle), np.cos(angle), lw=0.4, color=GREY)
+        axes.plot(
+            np.cos(turn) * np.sin(angle),
+            np.sin(turn) * np.sin(angle),
+            np.cos(angle),
+            lw=0.4,
+            color=GREY,
+        )
     axes.plot(ds[x], ds[y], ds[z], lw=1.2, color=LINES[0])
     axes.plot(*([float(ds[name][0])] for name in (x, y, z)), "o", color=LINES[1], mec="black", ms=6)
     axes.set_box_aspect((1, 1, 1), zoom=1.4)
@@ -147,4 +163,10 @@ def _sphere(axes, ds, x, y, z):
     axes.set_axis_off()
 
 
-KINDS = {"lines": _lines, "multipliers": _multipliers, "cylinder": _cylinder, "plane": _plane, "sphere": _sphere}
+KINDS = {
+    "lines": _lines,
+    "multipliers": _multipliers,
+    "cylinder": _cylinder,
+    "plane": _plane,
+    "sphere": _sphere,
+}

@@ -12,27 +12,41 @@ from survey.show.palette import kinds_of
 from survey.show.text import WIDE, formula, label_of, spaced
 
 RING = "#D40000"
-MOST_RINGS, RARE = 12, 50  # isolated points that are ringed; points from which on one among them is hard to see
+# isolated points that are ringed; points from which on one among them is hard to see
+MOST_RINGS, RARE = 12, 50
 STEEP = 30.0  # times the median: where a quantity that changes sign has a pole, not a zero
-WIDE_RANGE = 1e3  # of a quantity with poles from which on its axis is linear about 0 and logarithmic beyond
+# of a quantity with poles from which on its axis is linear about 0 and logarithmic beyond
+WIDE_RANGE = 1e3
 
 
 def draw_profile(axes, ds, variable, state, paper, named=False):
-    """Draw a variable along its one axis, `state` being the status, with the boundaries on it; points alone where the
-    axis is one of names.
+    """Draw a variable along its one axis, `state` being the status, with the boundaries on it;
+    points alone where the axis is one of names.
     """
     x = variable[variable.dims[0]]
     if "flag_values" in variable.attrs:
         shown, table, palette = kinds_of(ds, variable, state)
         # all flags, but only those statuses that occur
-        names = [name for name, code in table.items() if name in flag_codes(variable.attrs) or (shown == code).any()]
+        names = [
+            name
+            for name, code in table.items()
+            if name in flag_codes(variable.attrs) or (shown == code).any()
+        ]
         for height, name in enumerate(names):
             where = (shown == table[name]).filled(False)
             here = x.values[where]
             axes.plot(here, np.full(here.size, height), "s", markersize=4, color=palette[name])
-            alone = x.values[_isolated(where)]  # as at a resonance that is one value: nobody would see it
+            # as at a resonance that is one value: nobody would see it
+            alone = x.values[_isolated(where)]
             if 0 < alone.size <= MOST_RINGS and shown.size > RARE:
-                ring = {"marker": "o", "ms": 9, "mfc": "none", "mec": RING, "mew": 1.4, "ls": "none"}
+                ring = {
+                    "marker": "o",
+                    "ms": 9,
+                    "mfc": "none",
+                    "mec": RING,
+                    "mew": 1.4,
+                    "ls": "none",
+                }
                 axes.plot(alone, np.full(alone.size, height), **ring)
                 for value in alone:
                     axes.annotate(f"{value:.9g}", (value, height), xytext=(0, 8), textcoords="offset points",
@@ -47,25 +61,54 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
             axes.set_yscale("symlog", linthresh=linear)
         for i in poles:
             axes.axvline(
-                0.5 * float(x[i] + x[i + 1]), color="grey", lw=0.8, ls="--", label="pole" if i == poles[0] else None
+                0.5 * float(x[i] + x[i + 1]),
+                color="grey",
+                lw=0.8,
+                ls="--",
+                label="pole" if i == poles[0] else None,
             )
         for code, text in words.items():
             here = x.values[variable.values == code]
             if here.size:
-                axes.plot(here, np.full(here.size, axes.get_ylim()[1]), "^", color=IN_WORDS, ms=4, label=text)
+                axes.plot(
+                    here,
+                    np.full(here.size, axes.get_ylim()[1]),
+                    "^",
+                    color=IN_WORDS,
+                    ms=4,
+                    label=text,
+                )
         if variable.name == "discriminant":
             for edge in (-2.0, 2.0):
                 axes.axhline(edge, color="black", lw=0.6, ls=(0, (5, 2)))
     if f"{variable.name}_error" in ds:
-        bar = ds[f"{variable.name}_error"].isel({d: 0 for d in ds[variable.name].dims if d not in variable.dims})
+        bar = ds[f"{variable.name}_error"].isel(
+            {d: 0 for d in ds[variable.name].dims if d not in variable.dims}
+        )
         if named:
-            axes.errorbar(x, variable, bar, fmt="none", color="#56B4E9", capsize=4, label="error bar")
+            axes.errorbar(
+                x, variable, bar, fmt="none", color="#56B4E9", capsize=4, label="error bar"
+            )
         else:
-            axes.fill_between(x, variable - bar, variable + bar, color="#56B4E9", alpha=0.5, lw=0, label="error bar")
+            axes.fill_between(
+                x,
+                variable - bar,
+                variable + bar,
+                color="#56B4E9",
+                alpha=0.5,
+                lw=0,
+                label="error bar",
+            )
     draw_edges(axes, ds, x)
     bad = np.isin(state.values, list(status.UNANSWERED))
     if bad.any():
-        axes.plot(x.values[bad], np.full(bad.sum(), axes.get_ylim()[0]), "x", color="#D55E00", label="no answer")
+        axes.plot(
+            x.values[bad],
+            np.full(bad.sum(), axes.get_ylim()[0]),
+            "x",
+            color="#D55E00",
+            label="no answer",
+        )
     axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(variable))
     handles = axes.get_legend_handles_labels()[0]
     if handles and paper:
@@ -83,7 +126,8 @@ def _isolated(where):
 
 
 def _without_poles(variable):
-    """(the values with gaps at poles, the places i of poles between i and i + 1, where its axis is linear, or None).
+    """(the values with gaps at poles, the places i of poles between i and i + 1, where its axis is
+    linear, or None).
 
     A pole is a change of sign between neighbours that are both large, and larger than theirs.
     """

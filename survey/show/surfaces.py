@@ -1,4 +1,6 @@
-"""The surfaces of [boundaries] of a survey of three parameters: in perspective, and where they meet a plane."""
+"""The surfaces of [boundaries] of a survey of three parameters: in perspective, and where they meet
+a plane.
+"""
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -28,21 +30,31 @@ LIGHT = np.array([0.76, -0.42, 0.5])  # of length 1, nearly: from the right of t
 
 
 def draw_surfaces(axes, ds):
-    """Draw the surfaces onto three-dimensional axes, those alone that may bound stability where there are any.
+    """Draw the surfaces onto three-dimensional axes, those alone that may bound stability where
+    there are any.
 
     Raises BadInput where the file has none, or the axes are flat.
     """
     if "surface_vertices" not in ds:
-        raise BadInput(f"{NAME}: the file contains none; run the workflow with surfaces = true under [boundaries]")
+        raise BadInput(
+            f"{NAME}: the file contains none; run the workflow with surfaces = true under [boundaries]"
+        )
     flat = [dim for dim in ds.status.dims if ds.sizes[dim] < 2]
     if flat:
-        raise BadInput(f"{NAME}: {flat[0]} has one value here; they are drawn in all three axes, so leave --at out")
+        raise BadInput(
+            f"{NAME}: {flat[0]} has one value here; they are drawn in all three axes, so leave --at out"
+        )
     if axes.name != "3d":
-        raise BadInput(f"{NAME}: they are drawn onto axes made with projection='3d'; leave ax out for new ones")
+        raise BadInput(
+            f"{NAME}: they are drawn onto axes made with projection='3d'; leave ax out for new ones"
+        )
     schema.surfaces(ds)
     dims = list(ds.status.dims)
     logs = [logarithmic(ds[dim].values) for dim in dims]
-    places = np.stack([_scaled(ds[f"surface_{dim}"].values, log) for dim, log in zip(dims, logs, strict=True)], axis=1)
+    places = np.stack(
+        [_scaled(ds[f"surface_{dim}"].values, log) for dim, log in zip(dims, logs, strict=True)],
+        axis=1,
+    )
     ends = np.array([_scaled(np.sort(ds[dim].values.astype(float))[[0, -1]], log)
                      for dim, log in zip(dims, logs, strict=True)])  # fmt: skip
     corners, kinds, shown = ds.surface_corners.values, _kinds(ds), _bounds_stability(ds)
@@ -53,7 +65,9 @@ def draw_surfaces(axes, ds):
     faces = np.array([colours[code] for code in kinds]).reshape(-1, 3)
     faces *= _shade((places[corners] - ends[:, 0]) / (ends[:, 1] - ends[:, 0]))[:, None]
     # edges of the faces' colours: else the background shows between them
-    drawn = Poly3DCollection(places[corners], facecolors=faces, edgecolors=faces, linewidths=0.2, zsort="average")
+    drawn = Poly3DCollection(
+        places[corners], facecolors=faces, edgecolors=faces, linewidths=0.2, zsort="average"
+    )
     drawn.set_rasterized(True)
     axes.add_collection(drawn, autolim=False)  # that of 3d takes no autolim before Matplotlib 3.10
     axes.set(xlim=ends[0], ylim=ends[1], zlim=ends[2])
@@ -61,7 +75,9 @@ def draw_surfaces(axes, ds):
     axes.set_box_aspect((1.0, 1.0, 0.8))
     narrow = axes.figure.get_figwidth() < NARROW
     for axis, dim, log in zip((axes.xaxis, axes.yaxis, axes.zaxis), dims, logs, strict=True):
-        axis.set_major_locator(MaxNLocator(5, integer=log and np.ptp(_scaled(ds[dim].values, log)) > 2))
+        axis.set_major_locator(
+            MaxNLocator(5, integer=log and np.ptp(_scaled(ds[dim].values, log)) > 2)
+        )
         text = label_of(ds[dim], 44 if axis is axes.zaxis else 26)  # the vertical one has more room
         axis.set_label_text(formula(ds[dim].attrs.get("symbol", ""), dim) if narrow else text)
         axis.pane.set_facecolor("#F7F7F7")
@@ -69,20 +85,29 @@ def draw_surfaces(axes, ds):
         axis.set_tick_params(pad=-2.0 if narrow else 3.0)
         if log:
             axis.set_major_formatter(FuncFormatter(lambda value, _: f"{10.0**value:.3g}"))
-    handles = [Patch(color=colours[code], label=_label(name)) for code, name in names.items() if (kinds == code).any()]
+    handles = [
+        Patch(color=colours[code], label=_label(name))
+        for code, name in names.items()
+        if (kinds == code).any()
+    ]
     if handles:
         add_legend(axes, handles)
     if not len(corners):
-        axes.text2D(0.5, 0.5, "there are no surfaces in this box", transform=axes.transAxes, ha="center")
+        axes.text2D(
+            0.5, 0.5, "there are no surfaces in this box", transform=axes.transAxes, ha="center"
+        )
 
 
 def section(ds, variable):
-    """The survey with curves: where the surfaces meet the plane of a map, between vertices along triangles."""
+    """The survey with curves: where the surfaces meet the plane of a map, between vertices along
+    triangles.
+    """
     schema.surfaces(ds)
     dims = ds.status.dims
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.name in dims]
     values, plane = ds[f"surface_{fixed[0].name}"].values, float(fixed[0])
-    # of a triangle that touches the plane with an edge, as on the border of the box, this edge is drawn
+    # of a triangle that touches the plane with an edge, as on the border of the box, this edge is
+    # drawn
     lower = plane < 0.5 * (values.min(initial=plane) + values.max(initial=plane))
     above = values > plane if lower else values >= plane
     corners, kinds = ds.surface_corners.values, _kinds(ds)
@@ -134,7 +159,9 @@ def _kinds(ds):
 
 
 def _bounds_stability(ds):
-    """Which triangles may bound stability: not those at all of whose corners another multiplier is outside."""
+    """Which triangles may bound stability: not those at all of whose corners another multiplier is
+    outside.
+    """
     if "surface_outside" not in ds or ds.surface_outside.dims != ("surface_vertex",):
         return np.ones(ds.sizes["surface_triangle"], bool)
     return ~(ds.surface_outside.values[ds.surface_corners.values] > 0).all(axis=1)

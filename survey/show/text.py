@@ -29,7 +29,12 @@ def formula(symbol, name):
 
 @lru_cache(maxsize=512)
 def _is_formula(symbol):
-    if not 0 < len(symbol) <= MAX_FORMULA or "$" in symbol or not symbol.isprintable() or _depth(symbol) > MAX_DEPTH:
+    if (
+        not 0 < len(symbol) <= MAX_FORMULA
+        or "$" in symbol
+        or not symbol.isprintable()
+        or _depth(symbol) > MAX_DEPTH
+    ):
         return False
     if any(command in symbol for command in WITH_LENGTHS):
         return False
@@ -52,9 +57,14 @@ def label_of(variable, width=40):
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
     shown = shown and not (symbol == variable.name and len(symbol) > 2)  # a name, not a formula
-    # TeX is longer than what it shows: inserted last; a name that only spells its symbol would repeat it
+    # TeX is longer than what it shows: inserted last; a name that only spells its symbol would
+    # repeat it
     text = (
-        "$$" if shown and text in (symbol, symbol.lstrip("\\")) else f"{text},\N{NO-BREAK SPACE}$$" if shown else text
+        "$$"
+        if shown and text in (symbol, symbol.lstrip("\\"))
+        else f"{text},\N{NO-BREAK SPACE}$$"
+        if shown
+        else text
     )
     text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({_with_powers(units)})"
     wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
@@ -63,33 +73,48 @@ def label_of(variable, width=40):
 
 def _with_powers(units):
     """`rad s-1` as it is printed: powers raised, no line broken within."""
-    raised = re.sub(r"(?<=[A-Za-z])(-?\d+)\b", lambda power: power[1].translate(_RAISED), literal(units))
+    raised = re.sub(
+        r"(?<=[A-Za-z])(-?\d+)\b", lambda power: power[1].translate(_RAISED), literal(units)
+    )
     return raised.replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def title_of(ds, variable):
-    """The survey's title, what is drawn if no axis or colour bar says so, as of verdicts, the options that are words,
-    and the numbers that are fixed and not zero.
+    """The survey's title, what is drawn if no axis or colour bar says so, as of verdicts, the
+    options that are words, and the numbers that are fixed and not zero.
     """
-    title, name = literal(ds.attrs.get("title", "")), literal(variable.attrs.get("long_name", variable.name))
+    title, name = (
+        literal(ds.attrs.get("title", "")),
+        literal(variable.attrs.get("long_name", variable.name)),
+    )
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
     position = {name: f" ({_place(ds[name], c)} of {ds.sizes[name]})"
                 for name, c in variable.coords.items() if c.ndim == 0 and ds.sizes.get(name, 1) > 1}  # fmt: skip
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
-    numbers = ", ".join(numbers + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels])
+    numbers = ", ".join(
+        numbers
+        + [f"{literal(c.name)} {literal(c.item())}{position.get(c.name, '')}" for c in labels]
+    )
     words = options_in_words(ds)
-    labelled = title and ("flag_values" not in variable.attrs or (variable.ndim == 1 and variable.dims[0] in ds.coords))
+    labelled = title and (
+        "flag_values" not in variable.attrs
+        or (variable.ndim == 1 and variable.dims[0] in ds.coords)
+    )
     lines = [title] if labelled or name.lower() in title.lower() else [title, name]
     lines[-1] += f" ({words})" if words and words not in title else ""
     return "\n".join([*lines, numbers] if numbers else lines)
 
 
 def options_in_words(ds):
-    """The options that say something in words, such as `prolate`; what is drawn says which question is asked."""
+    """The options that say something in words, such as `prolate`; what is drawn says which question
+    is asked.
+    """
     pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
-    return ", ".join(spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha())
+    return ", ".join(
+        spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha()
+    )
 
 
 def _is_default(fixed):
@@ -105,7 +130,11 @@ def _place(axis, coordinate):
 def _equal(coordinate):
     """`symbol = number` of a fixed parameter."""
     symbol, number = coordinate.attrs.get("symbol") or coordinate.name, f"{float(coordinate):.6g}"
-    return f"${symbol} = {number}$" if _is_formula(symbol) else f"{literal(coordinate.name)} = {number}"
+    return (
+        f"${symbol} = {number}$"
+        if _is_formula(symbol)
+        else f"{literal(coordinate.name)} = {number}"
+    )
 
 
 def spaced(name):

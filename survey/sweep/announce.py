@@ -1,4 +1,5 @@
-"""What a run or a call from Python says while it works, on a terminal and in a notebook: compiling, then a bar.
+"""What a run or a call from Python says while it works, on a terminal and in a notebook: compiling,
+then a bar.
 
 Elsewhere (scripts, pipes) nothing is said.
 """
@@ -9,7 +10,8 @@ import threading
 import time
 
 PATIENCE = 0.5  # seconds of compiling that pass without a word
-SECONDS = {"hill": 8, "cylinder": 10, "abel": 18, "nutation": 15, "danby": 8, "normal_form": 5}  # measured, 2 cores
+# measured, 2 cores
+SECONDS = {"hill": 8, "cylinder": 10, "abel": 18, "nutation": 15, "danby": 8, "normal_form": 5}
 USUAL = 10
 
 

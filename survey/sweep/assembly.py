@@ -10,7 +10,8 @@ from survey.file.map_file import MapFile
 
 
 class Assembly:
-    """The netCDF file of a run as it grows: one thread writes each region once its blocks are finished.
+    """The netCDF file of a run as it grows: one thread writes each region once its blocks are
+    finished.
 
     Use as a context manager around the run; without `finish` no file is left.
     """
@@ -41,7 +42,8 @@ class Assembly:
 
     def finished(self, number):
         """Block `number` is finished. Raises what writing an earlier region has raised."""
-        if not self.file:  # not sooner: creating it takes time in which the first block can be solved
+        # not sooner: creating it takes time in which the first block can be solved
+        if not self.file:
             self.file = self.writer.submit(MapFile, self.workflow.path, self.kept.folder, *self.map)
             self.writes.append(self.file)
         region = self.region_of[number]
@@ -52,14 +54,17 @@ class Assembly:
             self.writes.pop(0).result()
 
     def finish(self, further, timings):
-        """Wait for the map's variables, add `further` datasets, counts and history, and publish the file.
+        """Wait for the map's variables, add `further` datasets, counts and history, and publish the
+        file.
 
         `timings` are attributes too. Returns the attributes of the file.
         """
         for write in self.writes:
             write.result()
         workflow = self.workflow
-        written = attributes(workflow.scene, workflow.name, workflow.request) | self.tally.attributes
+        written = (
+            attributes(workflow.scene, workflow.name, workflow.request) | self.tally.attributes
+        )
         written |= {"title": workflow.title, "workflow": workflow.text, "date_created": now()}
         written["history"] = f"{now()}: {command()}"
         for ds in further:
@@ -74,9 +79,15 @@ class Assembly:
         """Write the region whose blocks are numbered from `first`."""
         shape = tuple(cut.stop - cut.start for cut in region)
         if self.buffers.get("status", np.empty(0)).shape != shape:
-            self.buffers = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in self.layout.items()}
+            self.buffers = {
+                name: np.empty(shape + extra, kind)
+                for name, (kind, _, extra) in self.layout.items()
+            }
         for number, block in enumerate(blocks, first):
-            inside = tuple(slice(b.start - r.start, b.stop - r.start) for b, r in zip(block, region, strict=True))
+            inside = tuple(
+                slice(b.start - r.start, b.stop - r.start)
+                for b, r in zip(block, region, strict=True)
+            )
             arrays = self.kept.load(number)
             self.tally.add(arrays)
             for name, values in arrays.items():

@@ -1,11 +1,13 @@
-"""The boundaries on a map: the edges of tongues, row by row and as curves, or curves found without rows -> variables.
+"""The boundaries on a map: the edges of tongues, row by row and as curves, or curves found without
+rows -> variables.
 
-Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along `edge`, and
-`curve_count` points of each curve along `curve_point`.
+Contiguous ragged arrays (CF 9.3.3): `edge_count` edges of each row lie one after another along
+`edge`, and `curve_count` points of each curve along `curve_point`.
 
-A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`). One that finds its
-curves without the map's rows has `closed` or `searched`; of the others `edges` finds the edges of each row, `curves`
-follows them over the map, and `folds` finds where they turn back.
+A scene has boundaries where its family has a module `curves` (see QUESTIONS of `survey.measures`).
+One that finds its curves without the map's rows has `closed` or `searched`; of the others `edges`
+finds the edges of each row, `curves` follows them over the map, and `folds` finds where they turn
+back.
 """
 
 from functools import partial
@@ -31,10 +33,11 @@ MARGIN = 1e-3  # of an axis: how close curves come to an excluded value, such as
 
 
 def find(workflow, each=in_turn, once=lambda name, make: make()):
-    """The dataset of the workflow's curves; of its edges, and of their curves where there are two axes.
+    """The dataset of the workflow's curves; of its edges, and of their curves where there are two
+    axes.
 
-    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
-    earlier run has kept under this name.
+    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those
+    that an earlier run has kept under this name.
     """
     measure = measures.curves(workflow.scene)
     if hasattr(measure, "refusal"):
@@ -42,7 +45,9 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
         if len(workflow.grid.sizes) < 2:
             return xr.Dataset(_on_a_line(workflow, measure), attrs=about)
         variables, unexplained = _closed(workflow, measure, each)
-        return xr.Dataset(variables, attrs=about | ({"curves_unexplained": unexplained} if unexplained else {}))
+        return xr.Dataset(
+            variables, attrs=about | ({"curves_unexplained": unexplained} if unexplained else {})
+        )
     grid, axis = workflow.grid, workflow.boundaries
     other = [dim for dim in grid.sizes if dim != axis]
     across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
@@ -63,12 +68,16 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
 
 
 def along(scene, options, name, ends, fixed):
-    """(OnLine, index of each or None, are these all?) between `ends` of the parameter `name`; `fixed`: all others."""
+    """(OnLine, index of each or None, are these all?) between `ends` of the parameter `name`;
+    `fixed`: all others.
+    """
     measure = measures.curves(scene)
     if hasattr(measure, "refusal"):
         found = on_line(scene, options, name, ends, fixed)
         return found, None, found.complete
-    parameters = {name: ((name,), np.array(ends))} | {key: ((), np.float64(value)) for key, value in fixed.items()}
+    parameters = {name: ((name,), np.array(ends))} | {
+        key: ((), np.float64(value)) for key, value in fixed.items()
+    }
     line = SimpleNamespace(scene=scene, grid=Grid({name: 2}, parameters), request=Request(options))
     edges = _edges(line, name)
     return OnLine(edges.position, edges.error, edges.kind), edges.index, bool(edges.complete.all())
@@ -82,16 +91,25 @@ def plan(workflow, cost):
     measure = measures.curves(workflow.scene)
     if hasattr(measure, "refusal"):
         sizes = workflow.grid.sizes
-        seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1  # measured, per map
+        # measured, per map
+        seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1
         if hasattr(measure, "searched") and not hasattr(measure, "seconds"):
             # measured: some ten points solved for each point of a curve, and a lattice
             seconds = getattr(workflow.scene, "curves_seconds", 1e5 * cost)
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
-    sizes = [size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1]
+    sizes = [
+        size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1
+    ]
     # measured: ten to twenty edges per row; about five hundred points of curves
-    seconds = prod(sizes) * (2e-3 + 250 * cost) + (prod(sizes[1:]) * (0.2 + 1e4 * cost) if sizes else 0.0)
-    return {"rows": prod(sizes), "bytes_per_edge": 25, "bytes_per_curve_point": 24 * len(sizes)}, seconds
+    seconds = prod(sizes) * (2e-3 + 250 * cost) + (
+        prod(sizes[1:]) * (0.2 + 1e4 * cost) if sizes else 0.0
+    )
+    return {
+        "rows": prod(sizes),
+        "bytes_per_edge": 25,
+        "bytes_per_curve_point": 24 * len(sizes),
+    }, seconds
 
 
 def _measure(workflow, question):
@@ -100,25 +118,36 @@ def _measure(workflow, question):
 
 
 def _closed(workflow, measure, each):
-    """The variables of curves found without rows, on one map, or on each map of the stack along further axes; and
-    along how many segments of lines across these a curve is missing.
+    """The variables of curves found without rows, on one map, or on each map of the stack along
+    further axes; and along how many segments of lines across these a curve is missing.
     """
     names, fixed = list(workflow.grid.sizes), fixed_of(workflow)
     square, third = square_of(workflow, *names[:2]), names[2:]
     planes = _planes(workflow, third)
-    task = partial(measure.searched, workflow.scene) if hasattr(measure, "searched") else measure.closed
+    task = (
+        partial(measure.searched, workflow.scene)
+        if hasattr(measure, "searched")
+        else measure.closed
+    )
     found = each(
-        lambda plane: task(square, names[:2], fixed | plane, workflow.request.options), planes, "maps of the curves"
+        lambda plane: task(square, names[:2], fixed | plane, workflow.request.options),
+        planes,
+        "maps of the curves",
     )
     count, kind, flat, error = (
-        np.concatenate([getattr(curves, name) for curves in found]) for name in ("count", "kind", "parameters", "error")
+        np.concatenate([getattr(curves, name) for curves in found])
+        for name in ("count", "kind", "parameters", "error")
     )
     points = [curves.count.sum() for curves in found]
-    values = np.column_stack([flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)])
+    values = np.column_stack(
+        [flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)]
+    )
     kind = flagged(measure.TITLE, measure.CLASSES, kind)
     variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
     for output in measure.ALONG:
-        along, errors = (np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1))
+        along, errors = (
+            np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1)
+        )
         about = meaning(output) | {"ancillary_variables": f"curve_{output.name}_error"}
         variables[f"curve_{output.name}"] = ("curve_point", along, about)
         variables[f"curve_{output.name}_error"] = ("curve_point", errors, {
@@ -133,7 +162,9 @@ def _planes(workflow, names):
 
 
 def fixed_of(workflow):
-    return {name: float(values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
+    return {
+        name: float(values) for name, (dims, values) in workflow.grid.parameters.items() if not dims
+    }
 
 
 def _on_a_line(workflow, measure):
@@ -187,16 +218,26 @@ def _edges(workflow, axis, each=in_turn, once=lambda name, make: make()):
         name = f"edges-{axis}-{some[0]}-{some.size}"
         return once(name, lambda: make(some))
 
-    parts = [measure.Edges(**part) for part in each(task, range(-(-rows // ROWS)), "parts of the edges")]
+    parts = [
+        measure.Edges(**part) for part in each(task, range(-(-rows // ROWS)), "parts of the edges")
+    ]
     names = ("row", "position", "error", "kind", "index", "complete")
-    return measure.Edges(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
+    return measure.Edges(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    )
 
 
 def _row_solver(workflow, axis, rows):
     """What `edges.find` asks of the scene, for these rows."""
     grid = workflow.grid
     other = [dim for dim in grid.sizes if dim != axis]
-    place = dict(zip(other, np.unravel_index(rows, [grid.sizes[dim] for dim in other]) if other else (), strict=True))
+    place = dict(
+        zip(
+            other,
+            np.unravel_index(rows, [grid.sizes[dim] for dim in other]) if other else (),
+            strict=True,
+        )
+    )
     others = {
         name: values[place[dims[0]]] if dims else values
         for name, (dims, values) in grid.parameters.items()
@@ -204,7 +245,10 @@ def _row_solver(workflow, axis, rows):
     }
 
     def solve(row, x, wanted):
-        point = {name: values[row][:, None] if np.ndim(values) else values for name, values in others.items()}
+        point = {
+            name: values[row][:, None] if np.ndim(values) else values
+            for name, values in others.items()
+        }
         return _solve(workflow, point | {axis: x}, wanted)
 
     return solve
@@ -212,7 +256,9 @@ def _row_solver(workflow, axis, rows):
 
 def _solve(workflow, point, wanted):
     with np.errstate(all="ignore"):
-        return workflow.scene.solve(point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted)))
+        return workflow.scene.solve(
+            point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted))
+        )
 
 
 def _rows(workflow, axis, other, edges):
@@ -235,9 +281,13 @@ def _rows(workflow, axis, other, edges):
 
 
 def _curves(workflow, across, axis, other, edges, each):
-    """The variables of the curves on each map of the axes `across` (its rows) and `axis`, and of their folds."""
+    """The variables of the curves on each map of the axes `across` (its rows) and `axis`, and of
+    their folds.
+    """
     grid, further = workflow.grid, [dim for dim in other if dim != across]
-    place = dict(zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True))
+    place = dict(
+        zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True)
+    )
     found, square = [], square_of(workflow, across, axis)
     curve_of, curves_before = np.full(edges.row.size, -1), 0
     for plane in _planes(workflow, further):
@@ -255,13 +305,18 @@ def _curves(workflow, across, axis, other, edges, each):
     def all_of(name):
         return np.concatenate([getattr(curves, name) for _, curves, _, _ in found])
 
-    planes = [[np.full((curves.error.size, 1), plane[dim]) for dim in further] for plane, curves, _, _ in found]
+    planes = [
+        [np.full((curves.error.size, 1), plane[dim]) for dim in further]
+        for plane, curves, _, _ in found
+    ]
     on_curves = np.column_stack([
         square.parameters(all_of("x")), *(np.concatenate([part[i] for part in planes]) for i in range(len(further)))
     ])  # fmt: skip
     names, where = (across, axis, *further), "on the edge of a tongue"
     kind = _class(workflow, all_of("kind"))
-    variables = _of_curves(workflow, names, all_of("count"), kind, on_curves, all_of("error"), where)
+    variables = _of_curves(
+        workflow, names, all_of("count"), kind, on_curves, all_of("error"), where
+    )
     variables |= {
         "edge_curve": ("edge", curve_of.astype(np.int32), {
             "long_name": "curve through the edge, counted from 0", "units": "1"}),
@@ -273,24 +328,36 @@ def _curves(workflow, across, axis, other, edges, each):
 
 
 def _on_plane(workflow, square, across, axis, of_rows, plane, each):
-    """(the curves, their folds) on one map, in positions; `of_rows`: positions, kinds and indices of edges on rows."""
-    fixed = {name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims} | plane
+    """(the curves, their folds) on one map, in positions; `of_rows`: positions, kinds and indices
+    of edges on rows.
+    """
+    fixed = {
+        name: values for name, (dims, values) in workflow.grid.parameters.items() if not dims
+    } | plane
 
     def solve(q, p, wanted):
         return _solve(workflow, fixed | {across: q, axis: p}, wanted)
 
     pieces = [_pieces(workflow, name) for name in (across, axis)]
     searched = _measure(workflow, "edges"), solve, square, _columns(pieces[1])
-    found = [(square.positions(of_rows[0]), *of_rows[1:]), *(_of_columns(*searched, *piece) for piece in pieces[0])]
+    found = [
+        (square.positions(of_rows[0]), *of_rows[1:]),
+        *(_of_columns(*searched, *piece) for piece in pieces[0]),
+    ]
     measure = measures.curves(workflow.scene)
-    seeds = measure.Seeds(*_with_rectangles(*(np.concatenate(v) for v in zip(*found, strict=True)), pieces))
+    seeds = measure.Seeds(
+        *_with_rectangles(*(np.concatenate(v) for v in zip(*found, strict=True)), pieces)
+    )
     curves = measure.trace(solve, square, seeds, each)
     return curves, _measure(workflow, "folds").find(solve, square, curves)
 
 
 def _of_folds(workflow, across, names, square, further, found):
     """The variables of the folds of all maps."""
-    x, error = (np.concatenate([getattr(folds, name) for _, _, folds, _ in found]) for name in ("x", "error"))
+    x, error = (
+        np.concatenate([getattr(folds, name) for _, _, folds, _ in found])
+        for name in ("x", "error")
+    )
     curve = np.concatenate([folds.curve + before for _, _, folds, before in found])
     at_folds = square.parameters(x)
     variables = {"fold_curve": ("fold", curve.astype(np.int32), {
@@ -306,7 +373,9 @@ def _of_folds(workflow, across, names, square, further, found):
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
     for name in further:
         parameter, named = parameter_of(workflow, name)
-        values = np.concatenate([np.full(len(folds.curve), plane[name]) for plane, _, folds, _ in found])
+        values = np.concatenate(
+            [np.full(len(folds.curve), plane[name]) for plane, _, folds, _ in found]
+        )
         variables[f"fold_{name}"] = ("fold", values, named | {"long_name": parameter.long_name})
     return variables
 
@@ -322,22 +391,30 @@ def square_over(values):
 
 
 def _pieces(workflow, name):
-    """Parts (low, high) of an axis, in units of its range, between the values that the parameter excludes.
+    """Parts (low, high) of an axis, in units of its range, between the values that the parameter
+    excludes.
 
-    Tongues accumulate at these singular values: the parts end half way to the map's nearest value, or MARGIN before.
+    Tongues accumulate at these singular values: the parts end half way to the map's nearest value,
+    or MARGIN before.
     """
     line = square_of(workflow, name)
     excluded = np.array(next(p for p in workflow.scene.PARAMETERS if p.name == name).excluded)
     known = np.asarray(workflow.grid.parameters[name][1])
     inner = excluded[(excluded > line.low) & (excluded < line.high)]
     units = [line.positions(v[:, None])[:, 0] for v in (inner, known[~np.isin(known, excluded)])]
-    apart = np.array([max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]])
+    apart = np.array(
+        [max(4 * line.grain, min(MARGIN, 0.5 * abs(units[1] - cut).min())) for cut in units[0]]
+    )
     return list(zip([0.0, *(units[0] + apart)], [*(units[0] - apart), 1.0], strict=True))
 
 
 def _parts(workflow, name):
     """The same parts, in values of the parameter."""
-    return square_of(workflow, name).parameters(np.array(_pieces(workflow, name))[..., None])[..., 0].tolist()
+    return (
+        square_of(workflow, name)
+        .parameters(np.array(_pieces(workflow, name))[..., None])[..., 0]
+        .tolist()
+    )
 
 
 def _columns(pieces):
@@ -352,7 +429,9 @@ def _of_columns(measure, solve, square, columns, low, high):
     """(positions, kind, index) of the edges along the columns, from low to high in the square."""
 
     def along(column, x, wanted):
-        here = square.parameters(np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1))
+        here = square.parameters(
+            np.stack(np.broadcast_arrays(x, columns[column][:, None]), axis=-1)
+        )
         out = solve(here[..., 0].reshape(-1, 1), here[..., 1].reshape(-1, 1), wanted)
         return {name: values.reshape(x.shape) for name, values in out.items()}
 
@@ -377,7 +456,9 @@ def parameter_of(workflow, name):
 
 
 def _class(workflow, kind):
-    return flagged("kind of the periodic solution at the edge", _measure(workflow, "edges").CLASSES, kind)
+    return flagged(
+        "kind of the periodic solution at the edge", _measure(workflow, "edges").CLASSES, kind
+    )
 
 
 def flagged(title, classes, kind):
@@ -385,9 +466,18 @@ def flagged(title, classes, kind):
 
 
 def _index(index):
-    meaning = {"long_name": "number of the tongue, twice its rotation number", "units": "1", "symbol": "n"}
+    meaning = {
+        "long_name": "number of the tongue, twice its rotation number",
+        "units": "1",
+        "symbol": "n",
+    }
     return index.astype(np.int32), meaning
 
 
 def _yes_or_no(question, answers):
-    return {"long_name": question, "units": "1", "flag_values": np.array([0, 1], np.int8), "flag_meanings": answers}
+    return {
+        "long_name": question,
+        "units": "1",
+        "flag_values": np.array([0, 1], np.int8),
+        "flag_meanings": answers,
+    }

@@ -1,7 +1,9 @@
-"""Tasks on workers of a dask cluster, which may die, freeze or never arrive. Only this file and `dispatch` use dask.
+"""Tasks on workers of a dask cluster, which may die, freeze or never arrive. Only this file and
+`dispatch` use dask.
 
-A block whose workers die repeatedly is set aside and called alone at the end, so that an innocent block on the same
-worker is not blamed. A worker that finishes nothing for too long is restarted or released, its blocks go to others.
+A block whose workers die repeatedly is set aside and called alone at the end, so that an innocent
+block on the same worker is not blamed. A worker that finishes nothing for too long is restarted or
+released, its blocks go to others.
 """
 
 import contextlib
@@ -22,31 +24,43 @@ WORKERLESS_SECONDS = 60
 RESTART_SECONDS = 10
 PAUSED_SECONDS = 20  # that a worker short of memory may hold blocks without working on one
 TRIES = 3  # workers that may take too long for the same block
-STRIKES = 3  # workers that killed a block in a row, with no block finished in between, before the run stops
+# workers that killed a block in a row, with no block finished in between, before the run stops
+STRIKES = 3
 ENCRYPTED = ("tls", "wss")
 
 
 def client_of(address):
-    """A client of the dask cluster at `address`, in a scheduler file, or of a Client. Raises BadInput or Stopped."""
+    """A client of the dask cluster at `address`, in a scheduler file, or of a Client. Raises
+    BadInput or Stopped.
+    """
     try:
         from dask.distributed import Client
     except ImportError:
         raise BadInput("--scheduler needs dask.distributed: pip install distributed") from None
     if isinstance(address, Client):  # it stays its owner's, and open
         if address.status != "running":
-            raise BadInput("scheduler: this dask.distributed Client is closed; give one that is open")
+            raise BadInput(
+                "scheduler: this dask.distributed Client is closed; give one that is open"
+            )
         where, security = address.scheduler.address, address.security
     elif isinstance(address, (str, os.PathLike)):
         where = _address_in(os.fspath(address))
         security = _security(where)
     else:
-        raise BadInput(f"scheduler = {shown(address)}: give an address, a scheduler file, or a dask.distributed Client")
+        raise BadInput(
+            f"scheduler = {shown(address)}: give an address, a scheduler file, or a dask.distributed Client"
+        )
     try:
-        client = Client(address=where, security=security, timeout=SCHEDULER_SECONDS, set_as_default=False)
+        client = Client(
+            address=where, security=security, timeout=SCHEDULER_SECONDS, set_as_default=False
+        )
     except (OSError, ValueError) as error:
         raise Stopped(_unreachable(where, error)) from None
-    for name in [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]:
-        logging.getLogger(name).setLevel(logging.CRITICAL)  # what they would log is reported in one line
+    for name in [
+        name for name in logging.root.manager.loggerDict if name.startswith("distributed")
+    ]:
+        # what they would log is reported in one line
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     return client
 
 
@@ -68,7 +82,9 @@ def _address_in(address):
 
 
 def _security(address):
-    """dask's TLS settings where the scheduler asks for them, else None. Raises BadInput if they are not complete."""
+    """dask's TLS settings where the scheduler asks for them, else None. Raises BadInput if they are
+    not complete.
+    """
     if not address.startswith(tuple(f"{scheme}://" for scheme in ENCRYPTED)):
         return None
     from dask.distributed import Security
@@ -93,7 +109,9 @@ def _security(address):
 def _unreachable(address, error):
     """Why there is no connection to the scheduler, and what to do."""
     cause = " ".join(str(error.__cause__ or error).split())
-    closed = address.startswith(tuple(f"{scheme}://" for scheme in ENCRYPTED)) and "CommClosedError" in _brief(error)
+    closed = address.startswith(
+        tuple(f"{scheme}://" for scheme in ENCRYPTED)
+    ) and "CommClosedError" in _brief(error)
     if "CERTIFICATE" in cause or "TLSV1_ALERT" in cause or "SSLV3_ALERT" in cause or closed:
         expired = "expired" in cause.lower()
         return (
@@ -105,11 +123,15 @@ def _unreachable(address, error):
                 else "use certificates from one CA, and its ca-file, on both sides"
             )
         )
-    return f"no dask scheduler answers at {address!r} ({_brief(error)}); start one with dask scheduler"
+    return (
+        f"no dask scheduler answers at {address!r} ({_brief(error)}); start one with dask scheduler"
+    )
 
 
 def on_cluster(task, numbers, finished, died, client, patience=None):
-    """Call the task for every number on the cluster's workers (see `dispatch`). Raises Stopped if they fail."""
+    """Call the task for every number on the cluster's workers (see `dispatch`). Raises Stopped if
+    they fail.
+    """
     done, watch = itertools.count(1), _Watch(client, patience or Patience())
     finished(0)
     aside = []
@@ -125,7 +147,9 @@ def on_cluster(task, numbers, finished, died, client, patience=None):
 
 
 def _results(task, numbers, client, watch):
-    """Yield (number, result, None) as results arrive; or (number, None, address of the last worker that it killed)."""
+    """Yield (number, result, None) as results arrive; or (number, None, address of the last worker
+    that it killed).
+    """
     from dask.distributed import KilledWorker
 
     task = _Signed(task)
@@ -138,9 +162,12 @@ def _results(task, numbers, client, watch):
             ready.put((future.key, None, error))
 
     futures = client.map(task, numbers, key="survey-block", pure=False, allow_other_workers=False)
-    waiting = {future.key: (future, number) for future, number in zip(futures, numbers, strict=True)}
+    waiting = {
+        future.key: (future, number) for future, number in zip(futures, numbers, strict=True)
+    }
     for future in futures:
-        client.loop.add_callback(fetch, future)  # so only the fetch of a result on a stuck worker waits
+        # so only the fetch of a result on a stuck worker waits
+        client.loop.add_callback(fetch, future)
     del futures, future
     while waiting:
         with contextlib.suppress(queue.Empty):
@@ -175,7 +202,9 @@ class _Signed:
 
 
 class _Watch:
-    """Checks from time to time what the workers are doing: stuck ones are replaced, and a lost cluster is reported."""
+    """Checks from time to time what the workers are doing: stuck ones are replaced, and a lost
+    cluster is reported.
+    """
 
     def __init__(self, client, patience):
         self.client, self.patience, self.address = client, patience, client.scheduler.address
@@ -190,7 +219,9 @@ class _Watch:
         return min(max(self.patience.limit / 10, 0.1), 5.0)
 
     def finished(self, worker):
-        """This worker has finished a block: it has compiled what it needs, and the workers are able to work."""
+        """This worker has finished a block: it has compiled what it needs, and the workers are able
+        to work.
+        """
         self.struck_by.clear()
         self.proven.add(worker)
 
@@ -221,16 +252,24 @@ class _Watch:
         self.held = {worker: self._since(worker, keys, now) for worker, keys in held.items()}
         self._check_staff(held, now)
         long = {worker: now - since for worker, (keys, since) in self.held.items() if keys}
-        starved = self._starved([worker for worker, seconds in long.items() if seconds > PAUSED_SECONDS])
+        starved = self._starved(
+            [worker for worker, seconds in long.items() if seconds > PAUSED_SECONDS]
+        )
         if starved:
             self._feed(starved)
-        stuck = [worker for worker, seconds in long.items() if seconds > self._limit(worker) and worker not in starved]
+        stuck = [
+            worker
+            for worker, seconds in long.items()
+            if seconds > self._limit(worker) and worker not in starved
+        ]
         if stuck:
             self._replace(stuck, waiting)
 
     def _ask(self, what):
         """Call this method of the scheduler."""
-        return self.client.sync(getattr(self.client.scheduler, what), callback_timeout=SCHEDULER_SECONDS)
+        return self.client.sync(
+            getattr(self.client.scheduler, what), callback_timeout=SCHEDULER_SECONDS
+        )
 
     def _limit(self, worker):
         """Seconds that the worker may hold the same blocks."""
@@ -242,7 +281,9 @@ class _Watch:
         return keys, since if keys == before else now
 
     def _check_staff(self, held, now):
-        """Raise Stopped where no worker takes a block; only warn where none has arrived yet: a queue may start some."""
+        """Raise Stopped where no worker takes a block; only warn where none has arrived yet: a
+        queue may start some.
+        """
         patience = max(self.patience.limit, WORKERLESS_SECONDS)
         if any(held.values()) or not held:
             self.busy = now
@@ -255,7 +296,8 @@ class _Watch:
                     "s; see their logs (a worker short of memory pauses) and run the command again to resume"
                 )
             return
-        if self.had_some and now - self.staffed > patience:  # a nanny does not always start another worker
+        # a nanny does not always start another worker
+        if self.had_some and now - self.staffed > patience:
             raise Stopped(
                 f"the dask cluster at {self.address} lost its last worker {now - self.staffed:.0f} s ago; "
                 f"start some (dask worker {self.address}; see the logs) and run the command again to resume"
@@ -286,8 +328,14 @@ class _Watch:
         if workers:
             with contextlib.suppress(OSError, TimeoutError, ValueError):
                 known = self._ask("identity")["workers"]
-        paused = [worker for worker in workers if worker in known and known[worker]["status"] == "paused"]
-        return [worker for worker in paused if not known[worker]["metrics"]["task_counts"].get("executing")]
+        paused = [
+            worker for worker in workers if worker in known and known[worker]["status"] == "paused"
+        ]
+        return [
+            worker
+            for worker in paused
+            if not known[worker]["metrics"]["task_counts"].get("executing")
+        ]
 
     def _feed(self, starved):
         """Restart workers that wait for memory, which a process seldom gives back."""
@@ -313,4 +361,8 @@ class _Watch:
 def _brief(error):
     """The first line of an error, but for a lost connection only its kind."""
     name = type(error).__name__
-    return name if name in ("CommClosedError", "CancelledError", "FutureCancelledError") else str(error).split("\n")[0]
+    return (
+        name
+        if name in ("CommClosedError", "CancelledError", "FutureCancelledError")
+        else str(error).split("\n")[0]
+    )

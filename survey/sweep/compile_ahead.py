@@ -1,4 +1,6 @@
-"""At the first use of a scene on a machine, a separate process compiles some of the kernels that are needed later."""
+"""At the first use of a scene on a machine, a separate process compiles some of the kernels that
+are needed later.
+"""
 
 import contextlib
 import subprocess
@@ -9,7 +11,9 @@ from survey.sweep.dispatch import cpus
 
 
 def program(ahead, request):
-    """The Python program that calls a scene's `compile_ahead` for what is asked; where that yields, it says so."""
+    """The Python program that calls a scene's `compile_ahead` for what is asked; where that yields,
+    it says so.
+    """
     call = f"({list(request.variables)}, {dict(request.options)})"
     steps = f"from {ahead.__module__} import {ahead.__name__} as ahead\nfor _ in ahead{call} or (): print(flush=True)"
     return f"import gc; gc.disable(); {steps}"
@@ -17,9 +21,16 @@ def program(ahead, request):
 
 @contextlib.contextmanager
 def compiling_ahead(scene, request):
-    """Where kernels are not compiled yet, compile some in another process while this one compiles the longest."""
+    """Where kernels are not compiled yet, compile some in another process while this one compiles
+    the longest.
+    """
     ahead = getattr(scene, "compile_ahead", None)
-    if not (ahead and request.method == "auto" and cpus() > 1 and jit.is_first(_work(ahead, request.options))):
+    if not (
+        ahead
+        and request.method == "auto"
+        and cpus() > 1
+        and jit.is_first(_work(ahead, request.options))
+    ):
         yield
         return
     command = [sys.executable, "-c", program(ahead, request)]
@@ -33,5 +44,9 @@ def compiling_ahead(scene, request):
 
 
 def _work(ahead, options):
-    """A name of what is compiled: other scenes, other questions and other kinds of options need other kernels."""
-    return "-".join([ahead.__module__, ahead.__name__, str(options.get("question")), *sorted(options)])
+    """A name of what is compiled: other scenes, other questions and other kinds of options need
+    other kernels.
+    """
+    return "-".join(
+        [ahead.__module__, ahead.__name__, str(options.get("question")), *sorted(options)]
+    )

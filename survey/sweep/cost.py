@@ -11,12 +11,15 @@ from survey.wording import counted
 BLOCK_SECONDS = 0.5
 BLOCK_POINTS = 2**17
 MAX_BLOCKS = 4 * 10**6  # each is a file
-# what the writer holds at a time: enough for square tiles, little compared to the rest of the process
+# what the writer holds at a time: enough for square tiles, little compared to the rest of the
+# process
 REGION_POINTS, REGION_BYTES = 2**20, 2**25
 
 
 def seconds_per_point(scene, request, grid):
-    """Estimated seconds per point: the scene's cost on this grid, times the method's factor for its family."""
+    """Estimated seconds per point: the scene's cost on this grid, times the method's factor for its
+    family.
+    """
     seconds = scene_cost(scene, request, grid)
     if request.method == "auto":
         return seconds
@@ -26,7 +29,9 @@ def seconds_per_point(scene, request, grid):
 def scene_cost(scene, request, grid):
     """The scene's own estimate for this grid, in seconds per point."""
     dear = getattr(scene, "SECONDS", {})  # such outputs come together
-    seconds = scene.cost(request.options, {name: values.size for name, (_, values) in grid.parameters.items()})
+    seconds = scene.cost(
+        request.options, {name: values.size for name, (_, values) in grid.parameters.items()}
+    )
     return seconds + max((dear[name] for name in request.variables if name in dear), default=0.0)
 
 
@@ -41,7 +46,9 @@ def points_per_block(scene, request, grid):
 
 
 def regions_of(workflow):
-    """(lengths of a tile, [(region, its blocks)]) of a workflow's grid; regions have complete tiles and blocks."""
+    """(lengths of a tile, [(region, its blocks)]) of a workflow's grid; regions have complete tiles
+    and blocks.
+    """
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
     number = grid.points / points_per_block(scene, request, grid)
     if number > MAX_BLOCKS:
@@ -59,13 +66,19 @@ def blocks_of(workflow):
 
 
 def block_geometry(workflow):
-    """What determines the blocks and their numbers: points per block, and the first chunk sizes by dimension."""
+    """What determines the blocks and their numbers: points per block, and the first chunk sizes by
+    dimension.
+    """
     tile, regions = regions_of(workflow)
     region, blocks = regions[0]
     sizes = {"tile": tile} | {
-        name: [cut.stop - cut.start for cut in cuts] for name, cuts in (("region", region), ("block", blocks[0]))
+        name: [cut.stop - cut.start for cut in cuts]
+        for name, cuts in (("region", region), ("block", blocks[0]))
     }
-    chunks = {name: dict(zip(workflow.grid.sizes, lengths, strict=True)) for name, lengths in sizes.items()}
+    chunks = {
+        name: dict(zip(workflow.grid.sizes, lengths, strict=True))
+        for name, lengths in sizes.items()
+    }
     return {"points": points_per_block(workflow.scene, workflow.request, workflow.grid)} | chunks
 
 

@@ -1,7 +1,8 @@
 """Tasks through dask, on threads or processes of this machine (on a cluster: `cluster`).
 
-A task is called once for each number (or other hashable, sortable value). `finished(done, result)` is called as each
-ends, and with (0, None) before. For a task that kills its worker DEATHS times, `died(number)` provides the result.
+A task is called once for each number (or other hashable, sortable value). `finished(done, result)`
+is called as each ends, and with (0, None) before. For a task that kills its worker DEATHS times,
+`died(number)` provides the result.
 """
 
 import contextlib
@@ -23,11 +24,13 @@ from dask.callbacks import Callback
 from survey.errors import Stopped, SurveyError
 
 DEATHS = 3
-# A worker is considered stuck, and is replaced, once a block takes this many times as long as the longest one so far,
-# and at least this many seconds; during its first block it may compile, which takes up to a minute on an idle machine.
+# A worker is considered stuck, and is replaced, once a block takes this many times as long as the
+# longest one so far, and at least this many seconds; during its first block it may compile, which
+# takes up to a minute on an idle machine.
 PATIENCE, PATIENCE_SECONDS, COMPILE_SECONDS = 20, 300.0, 300.0
 LEAVE_SECONDS = 10.0  # that idle worker processes get to end
-MASKS = hasattr(signal, "pthread_sigmask")  # not on Windows, where a worker hears of Ctrl-C until it ignores it
+# not on Windows, where a worker hears of Ctrl-C until it ignores it
+MASKS = hasattr(signal, "pthread_sigmask")
 
 
 def cpus():
@@ -60,14 +63,21 @@ def on_threads(task, numbers, finished=lambda done, result=None: None, threads=N
     done = itertools.count(1)
     finished(0)
     # the function itself: given its name, dask would import all of distributed
-    _compute(task, numbers, lambda number, result: finished(next(done), result), dask.threaded.get, threads or cpus())
+    _compute(
+        task,
+        numbers,
+        lambda number, result: finished(next(done), result),
+        dask.threaded.get,
+        threads or cpus(),
+    )
 
 
 def on_processes(task, numbers, finished, died, workers, patience=None):
-    """Call the task for every number on worker processes; tasks of a worker that dies or freezes are called again.
+    """Call the task for every number on worker processes; tasks of a worker that dies or freezes
+    are called again.
 
-    The tasks that were running when a worker died are repeated one by one, which shows the one that killed it. Raises
-    Stopped for a task that exceeds the time limit then, too.
+    The tasks that were running when a worker died are repeated one by one, which shows the one that
+    killed it. Raises Stopped for a task that exceeds the time limit then, too.
     """
     done, ended, patience = itertools.count(1), set(), patience or Patience()
     finished(0)
@@ -82,7 +92,13 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
         try:
             with _pool(workers) as pool, watch:
                 _compute(
-                    _Signed(task), some, watch.ended(end), dask.multiprocessing.get, workers, watch.began, pool=pool
+                    _Signed(task),
+                    some,
+                    watch.ended(end),
+                    dask.multiprocessing.get,
+                    workers,
+                    watch.began,
+                    pool=pool,
                 )
         except BrokenProcessPool:
             if watch.stuck and alone:
@@ -161,14 +177,17 @@ def _kill(starter):
 def _pool(workers):
     """Worker processes; an error or an interruption kills them, whatever they are doing."""
     if MASKS:
-        resource_tracker.ensure_running()  # otherwise the first worker's start would, and unblock the signal
-    leave = threading.Timer(LEAVE_SECONDS, _kill, [threading.get_ident()])  # a frozen one does not end by itself
+        # otherwise the first worker's start would, and unblock the signal
+        resource_tracker.ensure_running()
+    # a frozen one does not end by itself
+    leave = threading.Timer(LEAVE_SECONDS, _kill, [threading.get_ident()])
     leave.daemon = True
     try:
         with ProcessPoolExecutor(workers, _Spawning(), _serve) as pool:
             try:
                 with _deferred(signal.SIGINT, signal.SIGTERM):
-                    pool.submit(int)  # starts the workers and the pool's thread: one half started could not be joined
+                    # starts the workers and the pool's thread: one half started could not be joined
+                    pool.submit(int)
                 yield pool
             except BaseException:
                 _kill(threading.get_ident())
@@ -187,7 +206,8 @@ class _Worker(multiprocessing.context.SpawnProcess):
             if not MASKS:
                 super().start()
                 return
-            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # the process inherits it
+            # the process inherits it
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 super().start()
             finally:
@@ -196,12 +216,17 @@ class _Worker(multiprocessing.context.SpawnProcess):
 
 @contextlib.contextmanager
 def _deferred(*signals):
-    """Defer the handling of these signals to the end of the block. (Python handles signals on the main thread only.)"""
+    """Defer the handling of these signals to the end of the block. (Python handles signals on the
+    main thread only.)
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     received = []
-    before = {number: signal.signal(number, lambda number, _: received.append(number)) for number in signals}
+    before = {
+        number: signal.signal(number, lambda number, _: received.append(number))
+        for number in signals
+    }
     try:
         yield
     finally:
@@ -228,19 +253,30 @@ def _follow(parent):
 
 
 def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **more):
-    """Run the tasks with dask's scheduler, which takes tasks of equal priority in reverse order of their names."""
+    """Run the tasks with dask's scheduler, which takes tasks of equal priority in reverse order of
+    their names.
+    """
     keys = {f"task-{-position % 10**9:09d}": number for position, number in enumerate(numbers, 1)}
     call = dask.delayed(task, pure=False, traverse=False)
     callback = Callback(
-        pretask=lambda key, *_: begun(keys[key]), posttask=lambda key, result, *_: ended(keys[key], result)
+        pretask=lambda key, *_: begun(keys[key]),
+        posttask=lambda key, result, *_: ended(keys[key], result),
     )
     try:
         with callback:
             calls = [call(number, dask_key_name=key) for key, number in keys.items()]
-            dask.compute(*calls, scheduler=get, num_workers=workers, chunksize=1, optimize_graph=False, **more)
+            dask.compute(
+                *calls,
+                scheduler=get,
+                num_workers=workers,
+                chunksize=1,
+                optimize_graph=False,
+                **more,
+            )
     except OSError as error:
         raise Stopped(f"the run stopped ({error}); run the command again to resume") from None
     except Exception as error:
         if isinstance(error, SurveyError):
-            raise getattr(error, "exception", error) from None  # dask adds a worker's traceback to the message
+            # dask adds a worker's traceback to the message
+            raise getattr(error, "exception", error) from None
         raise

@@ -1,10 +1,14 @@
-"""What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, surfaces, and cells."""
+"""What [boundaries] and [refine] add to the file of a map: edges of tongues and curves, surfaces,
+and cells.
+"""
 
 from survey.sweep import dispatch
 
 
 def find(workflow, once, progress=None):
-    """The datasets that [boundaries] and [refine] add to the file, their attributes included; `once` as in `Blocks`."""
+    """The datasets that [boundaries] and [refine] add to the file, their attributes included;
+    `once` as in `Blocks`.
+    """
     found, parts = [], requested(workflow)
     if "edges" in parts and not (workflow.proves and workflow.refine is None):
         found.append(parts["edges"].find(workflow, _on_threads(progress), once))
@@ -15,12 +19,16 @@ def find(workflow, once, progress=None):
 
         found.append(proofs.find(workflow, once, progress))
     elif "cells" in parts:
-        found.append(parts["cells"].find(workflow, _on_threads(), once, getattr(progress, "refining", None)))
+        found.append(
+            parts["cells"].find(workflow, _on_threads(), once, getattr(progress, "refining", None))
+        )
     return found
 
 
 def _on_threads(progress=None):
-    """`each` of `survey.measures.tasks` on threads of this process; `progress` is called as each task ends."""
+    """`each` of `survey.measures.tasks` on threads of this process; `progress` is called as each
+    task ends.
+    """
 
     def each(task, items, what):
         results = [None] * len(items)

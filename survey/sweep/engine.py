@@ -30,7 +30,9 @@ SAMPLES = 16  # blocks, spread over the map, that are solved first
 
 @dataclass(frozen=True)
 class Finished:
-    """The result of a run: the file's attributes, the counts, and seconds of wall time that do not overlap."""
+    """The result of a run: the file's attributes, the counts, and seconds of wall time that do not
+    overlap.
+    """
 
     attributes: dict[str, Any]
     counts: dict[str, dict[str, int]]
@@ -42,8 +44,8 @@ class Finished:
 
 
 class Solved(NamedTuple):
-    """A worker's report on a block: its process, the seconds it has spent compiling in total and solving this block,
-    and the block itself where the worker cannot write it beside the output."""
+    """A worker's report on a block: its process, the seconds it has spent compiling in total and
+    solving this block, and the block itself where the worker cannot write it beside the output."""
 
     number: int
     process: str
@@ -76,7 +78,9 @@ class Job:
         number, ends = block
         cuts = tuple(slice(*pair) for pair in ends)
         began, before = time.perf_counter(), compile_seconds()
-        content = self.kept.keep(number, solve_block(self.scene, self.request, self.grid, cuts, self.earlier))
+        content = self.kept.keep(
+            number, solve_block(self.scene, self.request, self.grid, cuts, self.earlier)
+        )
         compiled = compile_seconds()
         seconds = time.perf_counter() - began - (compiled - before)
         return Solved(number, _process(), compiled, max(seconds, 0.0), content)
@@ -86,7 +90,9 @@ class Job:
         number, ends = block
         shape = tuple(stop - start for start, stop in ends)
         table = layout(self.scene, self.request)
-        arrays = {name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()}
+        arrays = {
+            name: np.full(shape + extra, fill, kind) for name, (kind, fill, extra) in table.items()
+        }
         arrays["status"][...] = status.WORKER_DIED
         self.kept.save(number, arrays)
         return Solved(number, "", 0.0, None)
@@ -99,18 +105,23 @@ def run(
     """Run or resume the survey and write its netCDF file; returns a Finished.
 
     A region of the file is written as soon as its blocks are finished, while others are computed.
-    `progress(done, total, reused, what, left)` is called as blocks and parts of the boundaries finish; `left()`
-    estimates the seconds left. `resume_command` resumes the run after an interruption.
-    `block_timeout`: seconds after which a worker process that has finished no block is replaced. `earlier`: the values
-    of another file that are taken over, a survey.sweep.reuse.Earlier; the output may replace that file.
-    Raises BadInput, Damaged or Stopped.
+    `progress(done, total, reused, what, left)` is called as blocks and parts of the boundaries
+    finish; `left()` estimates the seconds left. `resume_command` resumes the run after an
+    interruption. `block_timeout`: seconds after which a worker process that has finished no block
+    is replaced. `earlier`: the values of another file that are taken over, a
+    survey.sweep.reuse.Earlier; the output may replace that file. Raises BadInput, Damaged or
+    Stopped.
     """
     started = time.perf_counter()
     refuse_too_large(workflow)
     client = cluster.client_of(scheduler) if scheduler else contextlib.nullcontext()
     tile, regions = regions_of(workflow)
     blocks = [block for _, blocks in regions for block in blocks]
-    about = {"points": workflow.grid.points, "blocks": len(blocks), "code": code_version() | compilers()}
+    about = {
+        "points": workflow.grid.points,
+        "blocks": len(blocks),
+        "code": code_version() | compilers(),
+    }
     kept = Blocks(
         workflow.path, fingerprint(workflow), fresh, about, _findable(workflow), resume_command, workflow.text,
         earlier is not None and os.path.exists(workflow.path) and os.path.samefile(earlier.path, workflow.path),
@@ -125,7 +136,11 @@ def run(
         compiled, patience = {}, dispatch.Patience(block_timeout)
 
         compiles_here = len(reused) < len(blocks) and not (workers or scheduler)
-        compiler = compiling_ahead(workflow.scene, workflow.request) if compiles_here else contextlib.nullcontext()
+        compiler = (
+            compiling_ahead(workflow.scene, workflow.request)
+            if compiles_here
+            else contextlib.nullcontext()
+        )
         with compiler, Assembly(workflow, kept, tile, regions) as assembly:
 
             def finished(done, solved=None):
@@ -169,18 +184,30 @@ def run(
     writing = time.perf_counter() - computed - finding - compiling_further
     computing = max(0.0, computed - began - (compiling - compiling_further))
     if not (reused or earlier or workers or scheduler or workflow.proves):
-        measured.note(workflow, estimates(workflow)[0], {"kernels": computing, "further": finding}, compiling)
-    return Finished(written, assembly.tally.counts, compiling, computing, finding if further else 0.0, writing)
+        measured.note(
+            workflow, estimates(workflow)[0], {"kernels": computing, "further": finding}, compiling
+        )
+    return Finished(
+        written, assembly.tally.counts, compiling, computing, finding if further else 0.0, writing
+    )
 
 
 def _findable(workflow):
-    """The workflow's text, with the path of a scene's file relative to the current folder, not to the workflow."""
+    """The workflow's text, with the path of a scene's file relative to the current folder, not to
+    the workflow.
+    """
     table = tomllib.loads(workflow.text)
-    return workflow.text if table["scene"] == workflow.name else tomli_w.dumps(table | {"scene": workflow.name})
+    return (
+        workflow.text
+        if table["scene"] == workflow.name
+        else tomli_w.dumps(table | {"scene": workflow.name})
+    )
 
 
 def _spread(numbers):
-    """The numbers in order, but first some spread over the map, so that the time left can soon be estimated."""
+    """The numbers in order, but first some spread over the map, so that the time left can soon be
+    estimated.
+    """
     first = numbers[:: max(1, len(numbers) // SAMPLES)] if len(numbers) > 4 * SAMPLES else []
     return first + sorted(set(numbers) - set(first))
 

@@ -17,7 +17,9 @@ from survey.sweep.cost import block_geometry
 
 @cache
 def code_version():
-    """What identifies the code that solves blocks: it must be the same on every worker, but not the processor."""
+    """What identifies the code that solves blocks: it must be the same on every worker, but not the
+    processor.
+    """
     return {"survey": __version__, "sources": jit.deciding_hash()}
 
 
@@ -57,7 +59,9 @@ def fingerprint(workflow):
 
 
 def _hash_of_plugin(scene):
-    """Hash of the source of a scene that another package brings; "" for those here, which `kernels` covers."""
+    """Hash of the source of a scene that another package brings; "" for those here, which `kernels`
+    covers.
+    """
     file = getattr(scene, "__file__", None)
     if file is None or scene.__name__.startswith("survey."):
         return ""

@@ -1,7 +1,8 @@
-"""The boundaries that a line along one parameter meets, all others fixed: exact as the curves of [boundaries] are.
+"""The boundaries that a line along one parameter meets, all others fixed: exact as the curves of
+[boundaries] are.
 
-Where a scene's family finds curves without rows, the line is the border of a narrow map: there the curves end at points
-of their own, and the error of such a point is along the border.
+Where a scene's family finds curves without rows, the line is the border of a narrow map: there the
+curves end at points of their own, and the error of such a point is along the border.
 """
 
 from dataclasses import dataclass
@@ -30,7 +31,8 @@ class OnLine:
 
 
 def on_line(scene, options, along, ends, fixed):
-    """The OnLine between `ends` (low, high) of the parameter `along`; `fixed`: {name: value} of all others.
+    """The OnLine between `ends` (low, high) of the parameter `along`; `fixed`: {name: value} of all
+    others.
 
     Raises BadInput where the scene's family knows no curves.
     """
@@ -55,12 +57,17 @@ def on_line(scene, options, along, ends, fixed):
     order = np.lexsort((kind, position))
     position, error, kind = position[order], error[order], kind[order]
     near = np.diff(position) <= SAME * (error[1:] + error[:-1])
-    keep = np.concatenate([[True], ~(near & (np.diff(kind) == 0))]) if position.size else np.zeros(0, bool)
+    keep = (
+        np.concatenate([[True], ~(near & (np.diff(kind) == 0))])
+        if position.size
+        else np.zeros(0, bool)
+    )
     return OnLine(position[keep], error[keep], kind[keep], curves.complete)
 
 
 def second_axis(measure, scene, along, fixed, options):
-    """The parameter that spans a map with `along` on which curves are known; "" where they are known along it alone.
+    """The parameter that spans a map with `along` on which curves are known; "" where they are
+    known along it alone.
 
     Raises BadInput if there is neither.
     """
@@ -70,7 +77,9 @@ def second_axis(measure, scene, along, fixed, options):
         known = p.name != along and np.isfinite(fixed.get(p.name, np.nan))
         if known and measure.refusal([along, p.name], scene, options) is None:
             return p.name
-    raise BadInput(f"no boundaries are known along {along}: {measure.refusal([along], scene, options)}")
+    raise BadInput(
+        f"no boundaries are known along {along}: {measure.refusal([along], scene, options)}"
+    )
 
 
 def _bounds(parameter, value):
@@ -82,7 +91,9 @@ def _bounds(parameter, value):
         )
         if inside:
             return min(value, other), max(value, other)
-    raise BadInput(f"{parameter.name} = {value:g}: no boundaries can be found so close to the ends of its domain")
+    raise BadInput(
+        f"{parameter.name} = {value:g}: no boundaries can be found so close to the ends of its domain"
+    )
 
 
 class _Flat:

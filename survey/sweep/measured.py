@@ -1,6 +1,7 @@
 """What runs on this machine have taken: by it `survey plan` corrects its estimates.
 
-It is a list of records, the latest last, in the user's cache. A file that cannot be read or written is as good as none.
+It is a list of records, the latest last, in the user's cache. A file that cannot be read or written
+is as good as none.
 """
 
 import contextlib
@@ -18,9 +19,12 @@ from survey.kernels import jit
 from survey.sweep.announce import always_compiled
 
 MOST = 400  # records that are kept
-SHORT = 1.0  # seconds: a shorter run has spent them on beginning, and would tell a longer one a multiple of its time
+# seconds: a shorter run has spent them on beginning, and would tell a longer one a multiple of its
+# time
+SHORT = 1.0
 LITTLE = 1e-3  # seconds of an estimate: beside the beginning of a run they cannot be measured
-PARTS = ("kernels", "further")  # [seconds estimated, measured] of the points; of edges, curves and cells
+# [seconds estimated, measured] of the points; of edges, curves and cells
+PARTS = ("kernels", "further")
 
 
 def note(workflow, estimated, measured, compiling):
@@ -30,7 +34,9 @@ def note(workflow, estimated, measured, compiling):
     record = _about(workflow) | {"hash": jit.KERNEL_HASH, "compiling": round(compiling, 2)}
     for part in PARTS:
         if estimated.get(part, 0.0) > LITTLE and measured.get(part, 0.0) > SHORT:
-            record[part] = [float(f"{seconds:.3g}") for seconds in (estimated[part], measured[part])]
+            record[part] = [
+                float(f"{seconds:.3g}") for seconds in (estimated[part], measured[part])
+            ]
     with contextlib.suppress(OSError, RuntimeError):  # RuntimeError: no home
         path = _path()
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -41,14 +47,23 @@ def note(workflow, estimated, measured, compiling):
 
 
 def factor(workflow, part, estimated):
-    """By what the estimated seconds of a part are multiplied on this machine; 1 if nothing is known.
+    """By what the estimated seconds of a part are multiplied on this machine; 1 if nothing is
+    known.
 
-    The runs most like this one decide: of the same question on the same axes, else of the question, of the scene; of
-    those the three of nearest length.
+    The runs most like this one decide: of the same question on the same axes, else of the question,
+    of the scene; of those the three of nearest length.
     """
     about = _about(workflow)
-    for keys in (("scene", "options", "method", "axes"), ("scene", "options", "method"), ("scene",)):
-        like = [one[part] for one in _records() if part in one and all(one.get(key) == about[key] for key in keys)]
+    for keys in (
+        ("scene", "options", "method", "axes"),
+        ("scene", "options", "method"),
+        ("scene",),
+    ):
+        like = [
+            one[part]
+            for one in _records()
+            if part in one and all(one.get(key) == about[key] for key in keys)
+        ]
         if like and estimated > 0.0:
             like.sort(key=lambda pair: abs(log(pair[0] / estimated)))
             return median(taken / expected for expected, taken in like[:3])
@@ -58,15 +73,22 @@ def factor(workflow, part, estimated):
 def knows(workflow):
     """Has the scene run here before?"""
     about = _about(workflow)
-    return any(one.get("scene") == about["scene"] and any(part in one for part in PARTS) for one in _records())
+    return any(
+        one.get("scene") == about["scene"] and any(part in one for part in PARTS)
+        for one in _records()
+    )
 
 
 def compiling(workflow):
-    """(seconds of compiling at the last run like this one that had to, or None; is what this run needs compiled?)"""
+    """(seconds of compiling at the last run like this one that had to, or None; is what this run
+    needs compiled?)
+    """
     about = _about(workflow)
     keys = ("scene", "options", "method", "tables")
     like = [one for one in _records() if all(one.get(key) == about[key] for key in keys)]
-    known = any(one["hash"] == jit.KERNEL_HASH for one in like) and not always_compiled(workflow.scene)
+    known = any(one["hash"] == jit.KERNEL_HASH for one in like) and not always_compiled(
+        workflow.scene
+    )
     spent = [one["compiling"] for one in like if one["compiling"] > 1.0]
     return (spent[-1] if spent else None), known
 
@@ -79,7 +101,9 @@ def _about(workflow):
         "options": ",".join(f"{key}={value}" for key, value in request.options.items()),
         "method": request.method,
         "axes": ",".join(workflow.grid.sizes),
-        "tables": ",".join(name for name in ("boundaries", "surfaces", "refine") if getattr(workflow, name)),
+        "tables": ",".join(
+            name for name in ("boundaries", "surfaces", "refine") if getattr(workflow, name)
+        ),
     }
 
 
@@ -100,6 +124,10 @@ def _is_record(one):
     try:
         pairs = [one[part] for part in PARTS if part in one]
         numbers = [number for pair in pairs for number in pair]
-        return one["compiling"] >= 0 and len(numbers) == 2 * len(pairs) and all(0 < number < inf for number in numbers)
+        return (
+            one["compiling"] >= 0
+            and len(numbers) == 2 * len(pairs)
+            and all(0 < number < inf for number in numbers)
+        )
     except (KeyError, TypeError):
         return False

@@ -19,9 +19,14 @@ GUESSED = "a usual machine; the next plan knows what this run took"
 
 
 def estimates(workflow):
-    """({"kernels", "further": seconds on all threads of a usual machine}, what is known of edges and cells)."""
+    """({"kernels", "further": seconds on all threads of a usual machine}, what is known of edges
+    and cells).
+    """
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
-    seconds, parts = {"kernels": grid.points * seconds_per_point(scene, request, grid), "further": 0.0}, {}
+    seconds, parts = (
+        {"kernels": grid.points * seconds_per_point(scene, request, grid), "further": 0.0},
+        {},
+    )
     for name, module in edges_and_cells.requested(workflow).items():
         parts[name], more = module.plan(workflow, lone_cost(scene, request, grid))
         seconds["further"] += more
@@ -29,7 +34,8 @@ def estimates(workflow):
 
 
 def plan(workflow):
-    """What a run would do: points, blocks, bytes, method, estimated seconds, as plain data; no kernel is called.
+    """What a run would do: points, blocks, bytes, method, estimated seconds, as plain data; no
+    kernel is called.
 
     Estimates are corrected by what earlier runs on this machine have taken.
     """
@@ -64,7 +70,9 @@ def _compiling(workflow):
     spent, done = measured.compiling(workflow)
     if done:
         return "done already"
-    about = lasting(announce.SECONDS.get(workflow.scene.FAMILY, announce.USUAL) if spent is None else spent)
+    about = lasting(
+        announce.SECONDS.get(workflow.scene.FAMILY, announce.USUAL) if spent is None else spent
+    )
     own = announce.always_compiled(workflow.scene)
     when = "at each run, as the equation is your own" if own else "once on this machine"
     return f"{about} besides, {when}"

@@ -9,13 +9,16 @@ from types import SimpleNamespace
 from survey.sweep import announce
 from survey.wording import counted
 
-LOG_SECONDS, NOTEBOOK_SECONDS = 60, 5  # between two lines, in a log and in a notebook without ipywidgets
+# between two lines, in a log and in a notebook without ipywidgets
+LOG_SECONDS, NOTEBOOK_SECONDS = 60, 5
 BAR_SECONDS = 0.2
 LONG = 2.0  # seconds of work, estimated, for which a call from Python has a bar
 
 
 class Progress:
-    """A context manager, called with (done, total, reused, what); for each `what` first with done = reused."""
+    """A context manager, called with (done, total, reused, what); for each `what` first with done =
+    reused.
+    """
 
     def __init__(self, console, workflow, silent=False):
         self.console, self.workflow, self.silent = console, workflow, silent
@@ -25,7 +28,9 @@ class Progress:
     def __enter__(self):
         if self.silent:
             return self
-        self.naming = announce.compiling(self.workflow.name, getattr(self.workflow, "scene", None), self._say)
+        self.naming = announce.compiling(
+            self.workflow.name, getattr(self.workflow, "scene", None), self._say
+        )
         if getattr(self.workflow, "scene", None) is not None:
             self.naming.__enter__()
         if self.console.is_terminal or (self.console.is_jupyter and find_spec("ipywidgets")):
@@ -38,7 +43,12 @@ class Progress:
                 MofNCompleteColumn(),
                 TextColumn("{task.fields[what]}"),
             )
-            self.bar = Bar(*columns, TimeElapsedColumn(), TextColumn("ETA {task.fields[eta]}"), console=self.console)
+            self.bar = Bar(
+                *columns,
+                TimeElapsedColumn(),
+                TextColumn("ETA {task.fields[eta]}"),
+                console=self.console,
+            )
             self.bar.start()
         return self
 
@@ -63,14 +73,20 @@ class Progress:
         elif done != reused and (done == total or time.monotonic() - self.logged > self._pause):
             self.logged = time.monotonic()
             eta = _left(done, total, reused, elapsed, left)
-            self._line(f"{done:,} of {_counted(total, what)}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s")
+            self._line(
+                f"{done:,} of {_counted(total, what)}, {elapsed:.0f} s elapsed, ETA {eta:.0f} s"
+            )
         if done == total and what == "blocks":
-            self._line(f"computed {done - reused:,}, reused {reused:,} of {counted(total, 'block')}")
+            self._line(
+                f"computed {done - reused:,}, reused {reused:,} of {counted(total, 'block')}"
+            )
 
     def _begin(self, total, reused, what):
         self.started = self.logged = time.monotonic()
         if self.bar:
-            self.task = self.bar.add_task(self.workflow.name, total=total, completed=reused, what=what, eta="-")
+            self.task = self.bar.add_task(
+                self.workflow.name, total=total, completed=reused, what=what, eta="-"
+            )
         if what == "blocks":
             points = counted(self.workflow.grid.points, "point")
             self._line(f"{points} in {counted(total, 'block')}, {reused:,} already done")
@@ -82,18 +98,24 @@ class Progress:
         return NOTEBOOK_SECONDS if self.console.is_jupyter else LOG_SECONDS
 
     def refining(self, settled, points, left):
-        """Called as cells are refined, with the fraction of the map that is settled, the points solved, and seconds.
+        """Called as cells are refined, with the fraction of the map that is settled, the points
+        solved, and seconds.
 
-        `left`: seconds for the cells known to be open; those may leave further ones open, so more may be needed.
+        `left`: seconds for the cells known to be open; those may leave further ones open, so more
+        may be needed.
         """
         if self.silent:
             return
         text = f"cells: {settled:.2%} of the map settled, {counted(points, 'point')} solved"
         if self.bar and settled < 1:
             eta = f"{_clock(left)} or more"
-            self.bar.update(self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta)
+            self.bar.update(
+                self.task, description=f"{self.workflow.name}: {text}", what="cells", eta=eta
+            )
         elif settled == 1:
-            self._line(f"cells: all decided or at the requested width, {counted(points, 'point')} solved")
+            self._line(
+                f"cells: all decided or at the requested width, {counted(points, 'point')} solved"
+            )
         elif time.monotonic() - self.logged > LOG_SECONDS:
             self.logged = time.monotonic()
             self._line(f"{text}, ETA {left:.0f} s or more")
@@ -122,7 +144,8 @@ def _left(done, total, reused, elapsed, left):
 
 @contextlib.contextmanager
 def watched(name, scene, points, seconds, what="blocks"):
-    """For a call from Python: names compiling; yields what to call with (done, total), or None if nothing is shown.
+    """For a call from Python: names compiling; yields what to call with (done, total), or None if
+    nothing is shown.
 
     `seconds()` estimates how long it takes; `what` is counted.
     """

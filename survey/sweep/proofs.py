@@ -1,8 +1,9 @@
-"""The cells of a map, or the edges of a row, each a theorem in ball arithmetic, with a certificate for `survey-check`.
+"""The cells of a map, or the edges of a row, each a theorem in ball arithmetic, with a certificate
+for `survey-check`.
 
-What `survey prove` puts into the file instead of the cells of `survey.sweep.refine` and the edges of
-`survey.sweep.boundaries`, under the same names. The rectangle or interval is proved in parts, side by side in
-processes, as the arithmetic holds Python's lock; finished parts are kept.
+What `survey prove` puts into the file instead of the cells of `survey.sweep.refine` and the edges
+of `survey.sweep.boundaries`, under the same names. The rectangle or interval is proved in parts,
+side by side in processes, as the arithmetic holds Python's lock; finished parts are kept.
 """
 
 import contextlib
@@ -21,15 +22,36 @@ from survey.sweep import dispatch
 
 CODES = {"undecided": -1, "unstable": 0, "stable": 1}
 LABELS = ("unstable", "stable")
-# of the solution on an edge, or of the curve through it, by the factor of `checker.KINDS` that is zero there
-EVEN_CLASSES = (("even_antiperiodic", 0), ("even_periodic", 2), ("odd_periodic", 3), ("odd_antiperiodic", 1))
-REVERSIBLE_CLASSES = (("A", 0), ("C", 3), ("D", 4), ("B", 1), ("t", 5), ("two_minus_t", 6), ("KC", 2))
-CLASSES = {"even": EVEN_CLASSES, "periodic": (("periodic", 0), ("antiperiodic", 1)), "reversible": REVERSIBLE_CLASSES}
+# of the solution on an edge, or of the curve through it, by the factor of `checker.KINDS` that is
+# zero there
+EVEN_CLASSES = (
+    ("even_antiperiodic", 0),
+    ("even_periodic", 2),
+    ("odd_periodic", 3),
+    ("odd_antiperiodic", 1),
+)
+REVERSIBLE_CLASSES = (
+    ("A", 0),
+    ("C", 3),
+    ("D", 4),
+    ("B", 1),
+    ("t", 5),
+    ("two_minus_t", 6),
+    ("KC", 2),
+)
+CLASSES = {
+    "even": EVEN_CLASSES,
+    "periodic": (("periodic", 0), ("antiperiodic", 1)),
+    "reversible": REVERSIBLE_CLASSES,
+}
 DEEPEST = 20  # halvings of the rectangle
-START = {"even": 2, "periodic": 2, "reversible": 0}  # of them, at least, to make the parts that are proved in turn
-FRACTION = 1e-3  # of the width of a cell: what the polynomials may leave out, in units of the factors
+# of them, at least, to make the parts that are proved in turn
+START = {"even": 2, "periodic": 2, "reversible": 0}
+# of the width of a cell: what the polynomials may leave out, in units of the factors
+FRACTION = 1e-3
 ROW_PARTS = 8
-EDGE_WIDTH, EDGE_ULPS = 1e-13, 4  # of the intervals that enclose edges; the latter at the larger end
+# of the intervals that enclose edges; the latter at the larger end
+EDGE_WIDTH, EDGE_ULPS = 1e-13, 4
 ROW_BITS = 192
 
 
@@ -38,7 +60,9 @@ def equation_of(workflow):
     try:
         import flint  # noqa: F401
     except ImportError:
-        raise BadInput("prove: python-flint is missing; install it with pip install python-flint") from None
+        raise BadInput(
+            "prove: python-flint is missing; install it with pip install python-flint"
+        ) from None
     scene = workflow.scene
     if not hasattr(scene, "equation"):
         raise BadInput(
@@ -51,7 +75,12 @@ def equation_of(workflow):
         names[key] = key if np.ndim(values) else f"({_decimal(float(values))})"
     axes = _axes(workflow)
     kind, pieces = scene.equation(names, ends, dict(workflow.request.options))
-    return kind, [list(piece) for piece in pieces], axes, [[_decimal(end) for end in ends[key]] for key in axes]
+    return (
+        kind,
+        [list(piece) for piece in pieces],
+        axes,
+        [[_decimal(end) for end in ends[key]] for key in axes],
+    )
 
 
 def _axes(workflow):
@@ -78,7 +107,8 @@ def _decimal(value):
 
 
 def find(workflow, once, progress=None):
-    """The dataset of the proved cells and areas, or edges; writes the certificate beside the output.
+    """The dataset of the proved cells and areas, or edges; writes the certificate beside the
+    output.
 
     `once` as in `survey.file.blocks.Blocks`; `progress` is called as parts are finished.
     """
@@ -90,7 +120,9 @@ def find(workflow, once, progress=None):
 
 
 def described(workflow, path, text):
-    """The dataset of what the text of a certificate at `path` states of the workflow's map or row; not checked."""
+    """The dataset of what the text of a certificate at `path` states of the workflow's map or row;
+    not checked.
+    """
     return (_describe if workflow.refine else _describe_row)(workflow, path, text)
 
 
@@ -102,26 +134,40 @@ def prover_of(workflow):
     if len(names) == 1:
         low, high = (Fraction(end) for end in rectangle[0])
         width = max(EDGE_WIDTH, EDGE_ULPS * math.ulp(max(abs(low), abs(high))))
-        across, depth = [ROW_PARTS], max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width)))))
+        across, depth = (
+            [ROW_PARTS],
+            max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width))))),
+        )
         bits, tolerance = ROW_BITS, FRACTION * width
     else:
         ends = [[float(end) for end in side] for side in rectangle]
-        widths = [_linear(*width, *side) for width, side in zip(workflow.refine.values(), ends, strict=True)]
+        widths = [
+            _linear(*width, *side)
+            for width, side in zip(workflow.refine.values(), ends, strict=True)
+        ]
         depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x in widths]
         depth = max(0, min(depths) - START[kind])
-        across, tolerance = [2 ** (halvings - depth) for halvings in depths], FRACTION * 0.5 ** max(depths)
+        across, tolerance = (
+            [2 ** (halvings - depth) for halvings in depths],
+            FRACTION * 0.5 ** max(depths),
+        )
         bits = search.BITS
-    return Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
+    return Prover(
+        {"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits
+    )
 
 
 def _linear(width, log, low, high):
-    """A width as a fraction of an axis; on a logarithmic one, whose fraction is of the logarithm, that of the least."""
+    """A width as a fraction of an axis; on a logarithmic one, whose fraction is of the logarithm,
+    that of the least.
+    """
     low, high = sorted((abs(low), abs(high)))
     return math.expm1(width * math.log(high / low)) / (high / low - 1) if log else width
 
 
 class Prover:
-    """All that a worker needs to prove a part of the map; called with its number, gives (number, (layout, panels)).
+    """All that a worker needs to prove a part of the map; called with its number, gives (number,
+    (layout, panels)).
 
     The rectangle has `across` parts along its sides, whose cells are halved at most `depth` times.
     """
@@ -141,7 +187,9 @@ class Prover:
         checker.ctx.prec = self.bits
         equation = checker.Equation(self.equation["kind"], self.equation["pieces"], self.names)
         sides = [[Fraction(end) for end in side] for side in self.rectangle]
-        part = checker.places(sides, {"across": self.across, "layout": search.PANEL * len(self.numbers)})[number]
+        part = checker.places(
+            sides, {"across": self.across, "layout": search.PANEL * len(self.numbers)}
+        )[number]
         return number, search.panels(equation, part, self.depth, self.tolerance)
 
 
@@ -177,8 +225,10 @@ def solved(prover, once, progress=None):
         return number, (search.PANEL, [search.open_panel(len(prover.names))])
 
     if todo:
-        workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)  # a part may take minutes
-        dispatch.on_processes(prover, todo[::-1], finished, died, workers, patience)  # large parameters take longest
+        # a part may take minutes
+        workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)
+        # large parameters take longest
+        dispatch.on_processes(prover, todo[::-1], finished, died, workers, patience)
     layouts, lists = zip(*(parts[number] for number in prover.numbers), strict=True)
     return "".join(layouts), [panel for some in lists for panel in some]
 
@@ -200,7 +250,9 @@ def certificate(title, prover, layout, panels):
     shares = dict.fromkeys(checker.VERDICTS, Fraction(0))
     for place, panel in zip(places, panels, strict=True):
         for letter, part in checker.walk(panel["cells"], [place], checker.halved):
-            shares[letter if letter in shares else checker.OPEN] += checker.size(part) / checker.size(sides)
+            shares[letter if letter in shares else checker.OPEN] += checker.size(
+                part
+            ) / checker.size(sides)
     table = {
         "format": checker.FORMAT, "title": title, "statement": [], "bits": prover.bits, "equation": prover.equation,
         "parameters": prover.names, "rectangle": prover.rectangle,
@@ -223,12 +275,18 @@ def _describe(workflow, path, text):
 
     certificate, names = checker.Certificate(text), list(workflow.refine)
     parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
-    box = np.array([[float(end) for side in place for end in side] for _, place in certificate.cells])
+    box = np.array(
+        [[float(end) for side in place for end in side] for _, place in certificate.cells]
+    )
     letters = certificate.letters
     variables = {}
     for at, p in enumerate(parameters):
         for side, end in enumerate(("low", "high")):
-            meaning = {"long_name": f"{end} end of the cell in {p.long_name}", "units": p.units, "symbol": p.symbol}
+            meaning = {
+                "long_name": f"{end} end of the cell in {p.long_name}",
+                "units": p.units,
+                "symbol": p.symbol,
+            }
             variables[f"cell_{p.name}_{end}"] = ("cell", box[:, 2 * at + side], meaning)
     codes = {checker.OPEN: -1, checker.UNSTABLE: 0, checker.STABLE: 1}
     variables["cell_verdict"] = ("cell", np.array([codes[letter] for letter in letters], np.int8), {
@@ -248,7 +306,9 @@ def _describe(workflow, path, text):
         for label, part in zip(LABELS, least, strict=True)
     )
     about = {"refine": ", ".join(names), "areas": ", ".join(words)}
-    return xr.Dataset(variables, coords, about | _about(certificate, path, text, "each decided cell"))
+    return xr.Dataset(
+        variables, coords, about | _about(certificate, path, text, "each decided cell")
+    )
 
 
 def _about(certificate, path, text, what):
@@ -266,7 +326,10 @@ def _describe_row(workflow, path, text):
     certificate, axis = checker.Certificate(text), workflow.boundaries
     cells = [(letter, *place[0]) for letter, place in certificate.cells if letter in checker.EDGES]
     position = np.array([float((low + high) / 2) for _, low, high in cells])
-    reach = [max(high - Fraction(x), Fraction(x) - low) for x, (_, low, high) in zip(position, cells, strict=True)]
+    reach = [
+        max(high - Fraction(x), Fraction(x) - low)
+        for x, (_, low, high) in zip(position, cells, strict=True)
+    ]
     error = round_up(np.array([float(x) for x in reach]) * (1 + 2**-50))
     classes = CLASSES[certificate.equation.kind]
     kind = np.array([classes[checker.EDGES.index(letter)][1] for letter, *_ in cells], np.int8)
@@ -293,7 +356,9 @@ def _describe_row(workflow, path, text):
 
 
 def _areas(sides, least, left, units):
-    """The proved bounds of the area of each verdict, rounded outwards, and the values halfway between them."""
+    """The proved bounds of the area of each verdict, rounded outwards, and the values halfway
+    between them.
+    """
     variables, total = {}, math.prod(high - low for low, high in sides)
     for name, scale, unit, words in (
         ("area", total, units, "area of the map with this verdict"),
@@ -304,7 +369,11 @@ def _areas(sides, least, left, units):
         bar = round_up(0.5 * (high - low) + 2**-51 * high)
         about = {"units": unit, "ancillary_variables": f"{name}_error"}
         variables[name] = ("area_verdict", 0.5 * (low + high), {"long_name": words, **about})
-        variables[f"{name}_error"] = ("area_verdict", bar, {"long_name": f"error bound of {name}", "units": unit})
+        variables[f"{name}_error"] = (
+            "area_verdict",
+            bar,
+            {"long_name": f"error bound of {name}", "units": unit},
+        )
         for end, values, bound in (("low", low, "lower"), ("high", high, "upper")):
             meaning = {"long_name": f"proved {bound} bound of the {words}", "units": unit}
             variables[f"{name}_{end}"] = ("area_verdict", values, meaning)

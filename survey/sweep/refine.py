@@ -1,6 +1,7 @@
 """The map in cells, as small as needed where the verdict changes, and the area of each verdict.
 
-Cells are halved until they are decided or have the width of [refine]; they are variables along the dimension `cell`.
+Cells are halved until they are decided or have the width of [refine]; they are variables along the
+dimension `cell`.
 """
 
 import math
@@ -24,9 +25,10 @@ ROUNDING = 1e-13  # of the sum of areas, relative to the total
 def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
     """The dataset of the workflow's cells and areas.
 
-    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those that an
-    earlier run has kept under this name. `report(settled, points, left)` is called with the part of the map
-    that is settled, the points solved for it, and the seconds that the parts known to be open will take.
+    `each`: see `survey.measures.tasks`; `once(name, make)` gives the arrays of `make()`, or those
+    that an earlier run has kept under this name. `report(settled, points, left)` is called with the
+    part of the map that is settled, the points solved for it, and the seconds that the parts known
+    to be open will take.
     """
     measure, panels = _measure(workflow), _panels(workflow)
     points, found, total = 0, [], _area(panels)
@@ -39,11 +41,15 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
             known[:] = done + share * part, before + solved
 
         name = f"cells-{len(found)}-{x.depth}-{y.depth}"
-        parts = _in_parts(name, each, once, lambda left, known=known: report and report(*known, left))
+        parts = _in_parts(
+            name, each, once, lambda left, known=known: report and report(*known, left)
+        )
         try:
             cells = measure.find(_solver(workflow, x, y), x, y, parts, settled, **more)
         except OverflowError as error:
-            raise BadInput(f"refine.width: the map has {error}; use a larger width, or a smaller map") from None
+            raise BadInput(
+                f"refine.width: the map has {error}; use a larger width, or a smaller map"
+            ) from None
         found.append(cells)
         points += cells.points
     if report:
@@ -58,7 +64,8 @@ def plan(workflow, cost):
     """
     measure, panels = _measure(workflow), _panels(workflow)
     most = min(sum(1 << x.depth + y.depth for x, y in panels), measure.MOST)
-    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each cell is solved
+    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each
+    # cell is solved
     usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
     blocks = sum(16 + 2 * ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y))
                  for x, y in panels)  # fmt: skip
@@ -74,18 +81,25 @@ def _measure(workflow):
 def _cut(workflow, at, axis):
     """How many ends of a panel's side are excluded values of its parameter."""
     name = list(workflow.refine)[at]
-    return len({axis.low, axis.high} & set(next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name)))
+    return len(
+        {axis.low, axis.high}
+        & set(next(p.excluded for p in workflow.scene.PARAMETERS if p.name == name))
+    )
 
 
 def _in_parts(name, each, once, report):
-    """`each`, which `cells.find` calls once for every halving: what a part finds is kept as soon as it is there."""
+    """`each`, which `cells.find` calls once for every halving: what a part finds is kept as soon as
+    it is there.
+    """
     halvings, lock = count(), threading.Lock()
 
     def parts(task, items, what):
         halving, began, done = next(halvings), time.perf_counter(), count(1)
 
         def part(number):
-            leaves = once(f"{name}-{halving}-{number}", lambda: {"leaves": task(items[number])})["leaves"]
+            leaves = once(f"{name}-{halving}-{number}", lambda: {"leaves": task(items[number])})[
+                "leaves"
+            ]
             with lock:
                 solved = next(done)
                 report((time.perf_counter() - began) / solved * (len(items) - solved))
@@ -101,7 +115,9 @@ def _area(panels):
 
 
 def _panels(workflow):
-    """The rectangles (x, y) of the map between the values that a parameter excludes: nothing is analytic across."""
+    """The rectangles (x, y) of the map between the values that a parameter excludes: nothing is
+    analytic across.
+    """
     sides = [_sides(workflow, name, *asked) for name, asked in workflow.refine.items()]
     return [(x, y) for x in sides[0] for y in sides[1]]
 
@@ -118,7 +134,10 @@ def _sides(workflow, name, width, log):
 
     return [
         _measure(workflow).Side(
-            a, b, max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)), log
+            a,
+            b,
+            max(0, math.ceil(math.log2(length(a, b) / (width * length(low, high))) - 1e-9)),
+            log,
         )
         for a, b in pairwise(cuts)
     ]
@@ -128,8 +147,14 @@ def _solver(workflow, x, y):
     """What `cells.find` asks of the scene; NaN outside the parameters' domains."""
     rtol = _measure(workflow).accuracy(max(x.depth, y.depth))
     request = Request(workflow.request.options, "auto", rtol, frozenset(_measure(workflow).OUTPUTS))
-    fixed = {name: np.full((1, 1, 1), values) for name, (dims, values) in workflow.grid.parameters.items() if not dims}
-    axes = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in workflow.refine]
+    fixed = {
+        name: np.full((1, 1, 1), values)
+        for name, (dims, values) in workflow.grid.parameters.items()
+        if not dims
+    }
+    axes = [
+        next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in workflow.refine
+    ]
 
     def solve(*values):
         point = {p.name: np.where(p.holds(v), v, np.nan) for p, v in zip(axes, values, strict=True)}
@@ -148,7 +173,11 @@ def _describe(workflow, found, points):
     variables = {}
     for at, p in enumerate(parameters):
         for side, end in enumerate(("low", "high")):
-            meaning = {"long_name": f"{end} end of the cell in {p.long_name}", "units": p.units, "symbol": p.symbol}
+            meaning = {
+                "long_name": f"{end} end of the cell in {p.long_name}",
+                "units": p.units,
+                "symbol": p.symbol,
+            }
             variables[f"cell_{p.name}_{end}"] = ("cell", box[:, 2 * at + side], meaning)
     flags = {key: code for key, code in _measure(workflow).VERDICTS.items()}
     variables["cell_verdict"] = ("cell", verdict, {
@@ -172,6 +201,9 @@ def _describe(workflow, found, points):
     coords = {"area_verdict": ("area_verdict", codes, {
         "long_name": "verdict of the area", "units": "1",
         "flag_values": codes, "flag_meanings": " ".join(LABELS)})}  # fmt: skip
-    words = (f"{label}: {percent(value / total, error / total)}" for label, value in zip(LABELS, area, strict=True))
+    words = (
+        f"{label}: {percent(value / total, error / total)}"
+        for label, value in zip(LABELS, area, strict=True)
+    )
     about = {"refine": ", ".join(names), "refine_points": points, "areas": ", ".join(words)}
     return xr.Dataset(variables, coords, about)

@@ -1,4 +1,6 @@
-"""Values that an earlier file holds: they have the same bits, so that only the points between them are solved."""
+"""Values that an earlier file holds: they have the same bits, so that only the points between them
+are solved.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -16,9 +18,9 @@ from survey.sweep import solve
 class Earlier:
     """The points of a file that belong to a grid too.
 
-    `where` holds for each dimension of the grid the position of its values in the file (-1: not in it); `dims` those
-    dimensions that the file has, too; `fixed` the position along those that the grid does not have. `version` tells
-    the file from one that replaces it.
+    `where` holds for each dimension of the grid the position of its values in the file (-1: not in
+    it); `dims` those dimensions that the file has, too; `fixed` the position along those that the
+    grid does not have. `version` tells the file from one that replaces it.
     """
 
     path: str
@@ -34,8 +36,15 @@ class Earlier:
 
     def values(self, name, cuts):
         """A variable at the held points of a block: its dimensions are those of the grid, then its own."""
-        at = {dim: place[cut][place[cut] >= 0] for (dim, place), cut in zip(self.where.items(), cuts, strict=True)}
-        held = _dataset(self.path, self.version)[name].isel(self.fixed).isel({dim: at[dim] for dim in self.dims})
+        at = {
+            dim: place[cut][place[cut] >= 0]
+            for (dim, place), cut in zip(self.where.items(), cuts, strict=True)
+        }
+        held = (
+            _dataset(self.path, self.version)[name]
+            .isel(self.fixed)
+            .isel({dim: at[dim] for dim in self.dims})
+        )
         held = as_stored(held.transpose(*self.dims, ...))
         missing = [i for i, dim in enumerate(at) if dim not in self.dims]
         return np.expand_dims(held, tuple(missing))
@@ -49,12 +58,19 @@ def _dataset(path, version):
 
 def solve_block(scene, request, grid, block, earlier=None):
     """`solve.solve_block`, of whose points those in the file are taken from it."""
-    held = [earlier.where[dim][cut] >= 0 for dim, cut in zip(grid.sizes, block, strict=True)] if earlier else []
+    held = (
+        [earlier.where[dim][cut] >= 0 for dim, cut in zip(grid.sizes, block, strict=True)]
+        if earlier
+        else []
+    )
     if not held or not all(some.any() for some in held):
         return solve.solve_block(scene, request, grid, block)
     shape, point = tuple(some.size for some in held), grid.point(block)
     request = replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges)
-    out = {name: np.empty(shape + extra, kind) for name, (kind, _, extra) in layout(scene, request).items()}
+    out = {
+        name: np.empty(shape + extra, kind)
+        for name, (kind, _, extra) in layout(scene, request).items()
+    }
     for name, values in out.items():
         values[np.ix_(*held)] = earlier.values(name, block)
     for rectangle in _rest(held):
@@ -66,10 +82,16 @@ def solve_block(scene, request, grid, block, earlier=None):
 
 
 def _rest(held):
-    """Rectangles, an index array for each dimension, that together hold the points that are not in the file."""
+    """Rectangles, an index array for each dimension, that together hold the points that are not in
+    the file.
+    """
     for d, some in enumerate(held):
         inside = [np.flatnonzero(other) for other in held[:d]]
-        rectangle = [*inside, np.flatnonzero(~some), *(np.arange(other.size) for other in held[d + 1 :])]
+        rectangle = [
+            *inside,
+            np.flatnonzero(~some),
+            *(np.arange(other.size) for other in held[d + 1 :]),
+        ]
         if all(index.size for index in rectangle):
             yield rectangle
 
@@ -84,8 +106,8 @@ def _at(values, rectangle):
 def obstacle(scene, request, grid, earlier, old, points=3):
     """Why the values in the file are not those that this grid would get, or "".
 
-    Some of them are solved again: the bits must be the same, and so must each axis that the scene looks at as a whole.
-    `old`: the file's own grid.
+    Some of them are solved again: the bits must be the same, and so must each axis that the scene
+    looks at as a whole. `old`: the file's own grid.
     """
     seen = [(_Seen(grid.lines), old.lines), (_Seen(grid.ranges), old.ranges)]
     request = replace(request, lines=seen[0][0], fixed=grid.fixed, ranges=seen[1][0])
@@ -98,10 +120,16 @@ def obstacle(scene, request, grid, earlier, old, points=3):
         )
         shape = tuple(cut.stop - cut.start for cut in cuts)
         for name, values in solve.solve_point(scene, request, grid.point(cuts), shape).items():
-            if not np.array_equal(values, earlier.values(name, cuts), equal_nan=values.dtype.kind == "f"):
+            if not np.array_equal(
+                values, earlier.values(name, cuts), equal_nan=values.dtype.kind == "f"
+            ):
                 return f"{name} has other bits on this map"
-    other = sorted(name for now, then in seen for name in now.names if dict.get(now, name) != then.get(name))
-    return f"on a map, its values depend on all of the axis {other[0]}, which differs" if other else ""
+    other = sorted(
+        name for now, then in seen for name in now.names if dict.get(now, name) != then.get(name)
+    )
+    return (
+        f"on a map, its values depend on all of the axis {other[0]}, which differs" if other else ""
+    )
 
 
 class _Seen(dict):

@@ -24,23 +24,31 @@ def solve_block(scene, request, grid, block):
 
 
 def _shape(grid, block):
-    return tuple(len(range(*cut.indices(size))) for cut, size in zip(block, grid.shape, strict=True))
+    return tuple(
+        len(range(*cut.indices(size))) for cut, size in zip(block, grid.shape, strict=True)
+    )
 
 
 def solve_point(scene, request, point, shape):
-    """The variables of `layout` at `point` ({name: array that broadcasts to shape}), as they are stored.
+    """The variables of `layout` at `point` ({name: array that broadcasts to shape}), as they are
+    stored.
 
     Values outside a parameter's domain reach the scene as NaN.
     """
     used = {p.name: p for p in scene.PARAMETERS}
-    valid = {key: np.where(used[key].holds(values, request.variables), values, np.nan) for key, values in point.items()}
+    valid = {
+        key: np.where(used[key].holds(values, request.variables), values, np.nan)
+        for key, values in point.items()
+    }
     with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
         solved = scene.solve({key: np.atleast_1d(values) for key, values in valid.items()}, request)
     return stored(scene, request, solved, shape)
 
 
 def stored(scene, request, solved, shape):
-    """A scene's results in the file's types and the block's shape; status `overflow` where a bar does not fit."""
+    """A scene's results in the file's types and the block's shape; status `overflow` where a bar
+    does not fit.
+    """
     arrays, table = {}, layout(scene, request)
     left_out = [name for name in table if name not in solved]
     if left_out:
@@ -48,20 +56,32 @@ def stored(scene, request, solved, shape):
     for name, (dtype, _, extra) in table.items():
         values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])
         arrays[name] = values.astype(dtype, copy=False).reshape(shape + extra)
-    unbounded = [bad for bad in (np.isinf(arrays[name]) for name in table if name.endswith("_error")) if bad.any()]
+    unbounded = [
+        bad
+        for bad in (np.isinf(arrays[name]) for name in table if name.endswith("_error"))
+        if bad.any()
+    ]
     for bad in unbounded:
         lost = bad.reshape(*shape, -1).any(axis=-1)
         for name, (dtype, fill, extra) in table.items():
             where = lost.reshape(shape + (1,) * len(extra))
             if name == "status":
-                where, fill = lost & ~np.isin(arrays[name], list(status.UNANSWERED)), status.OVERFLOW
+                where, fill = (
+                    lost & ~np.isin(arrays[name], list(status.UNANSWERED)),
+                    status.OVERFLOW,
+                )
             arrays[name] = np.where(where, dtype.type(fill), arrays[name])
     return arrays
 
 
 def compute(grid, scene, request, threads=None, progress=None):
-    """All variables of the grid, in memory: {name: array in the grid's shape}; `progress(done, total)` of blocks."""
-    result = {name: np.empty(grid.shape + extra, kind) for name, (kind, _, extra) in layout(scene, request).items()}
+    """All variables of the grid, in memory: {name: array in the grid's shape}; `progress(done,
+    total)` of blocks.
+    """
+    result = {
+        name: np.empty(grid.shape + extra, kind)
+        for name, (kind, _, extra) in layout(scene, request).items()
+    }
 
     def task(block):
         for name, values in solve_block(scene, request, grid, block).items():
@@ -77,5 +97,7 @@ def compute(grid, scene, request, threads=None, progress=None):
         if len(blocks) == 1:
             task(blocks[0])
         else:
-            dispatch.on_threads(lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads)
+            dispatch.on_threads(
+                lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads
+            )
     return result

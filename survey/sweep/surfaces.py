@@ -1,8 +1,9 @@
-"""The surfaces of a survey of three parameters that [boundaries] with `surfaces = true` asks for -> variables.
+"""The surfaces of a survey of three parameters that [boundaries] with `surfaces = true` asks for ->
+variables.
 
-Contiguous ragged arrays: `surface_vertices` vertices of each connected piece lie one after another along
-`surface_vertex`, and `surface_triangles` triangles along `surface_triangle`, whose `surface_corners` are numbers of
-vertices.
+Contiguous ragged arrays: `surface_vertices` vertices of each connected piece lie one after another
+along `surface_vertex`, and `surface_triangles` triangles along `surface_triangle`, whose
+`surface_corners` are numbers of vertices.
 """
 
 import numpy as np
@@ -20,18 +21,27 @@ BYTES_PER_TRIANGLE = 12
 
 def find(workflow, each=in_turn, once=lambda name, make: make()):
     """The dataset of the surfaces; `each` and `once` as in `survey.sweep.boundaries.find`."""
-    from survey.measures import isosurfaces  # it imports much of SciPy, which other runs need not wait for
+    # it imports much of SciPy, which other runs need not wait for
+    from survey.measures import isosurfaces
 
     measure = measures.question(workflow.scene.FAMILY, "surfaces")
     names, box = list(workflow.grid.sizes), boundaries.square_of(workflow, *workflow.grid.sizes)
-    functions = measure.Functions(workflow.scene, box, names, boundaries.fixed_of(workflow), workflow.request.options)
-    found = isosurfaces.find(functions, box.grain, [output.name for output in measure.ALONG], each, once)
+    functions = measure.Functions(
+        workflow.scene, box, names, boundaries.fixed_of(workflow), workflow.request.options
+    )
+    found = isosurfaces.find(
+        functions, box.grain, [output.name for output in measure.ALONG], each, once
+    )
     about = {"surfaces": ", ".join(names), "surfaces_left_out": found.left_out}
-    return xr.Dataset(_variables(workflow, measure, names, box.parameters(found.x), found), attrs=about)
+    return xr.Dataset(
+        _variables(workflow, measure, names, box.parameters(found.x), found), attrs=about
+    )
 
 
 def plan(workflow, cost):
-    """({what is known beforehand: bytes}, estimated seconds on one thread), as in `survey.sweep.boundaries.plan`."""
+    """({what is known beforehand: bytes}, estimated seconds on one thread), as in
+    `survey.sweep.boundaries.plan`.
+    """
     from survey.measures import isosurfaces
 
     measure = measures.question(workflow.scene.FAMILY, "surfaces")

@@ -5,15 +5,22 @@ from math import prod
 
 import numpy as np
 
-NEAR = 0.02  # fraction of the map: a finished block this close is a good enough estimate of another's cost
+# fraction of the map: a finished block this close is a good enough estimate of another's cost
+NEAR = 0.02
 
 
 class TimeLeft:
-    """Called, the seconds left: a block is taken to cost, per point, as much as the nearest finished block."""
+    """Called, the seconds left: a block is taken to cost, per point, as much as the nearest
+    finished block.
+    """
 
     def __init__(self, shape, blocks, reused):
-        self.points = np.array([prod(cut.stop - cut.start for cut in block) for block in blocks], float)
-        self.centres = np.array([[(cut.start + cut.stop) / 2 for cut in block] for block in blocks], float)
+        self.points = np.array(
+            [prod(cut.stop - cut.start for cut in block) for block in blocks], float
+        )
+        self.centres = np.array(
+            [[(cut.start + cut.stop) / 2 for cut in block] for block in blocks], float
+        )
         self.centres /= np.array(shape, float)
         self.open = np.ones(len(blocks), bool)
         self.open[list(reused)] = False

@@ -1,11 +1,12 @@
-"""Truths: the outputs of every family to some 30 digits, by formulas and arithmetic that the kernels do not use.
+"""Truths: the outputs of every family to some 30 digits, by formulas and arithmetic that the
+kernels do not use.
 
-The attack on error bars, the failure maps and the tests hold answers against them. A truth is a function of the
-parameters {name: array (N)} and of the answer {output: array (N, ...)}:
+The attack on error bars, the failure maps and the tests hold answers against them. A truth is a
+function of the parameters {name: array (N)} and of the answer {output: array (N, ...)}:
 
     truth(given, answer)    {output: (value, low, doubt)}, arrays that broadcast to the output: the truth is value + low
-                            to within `doubt`, NaN where nothing is known; and "wrong": {what: mask (N)}, what the
-                            answer says that cannot be (optional)
+                            to within `doubt`, NaN where nothing is known; and "wrong": {what: mask
+                            (N)}, what the answer says that cannot be (optional)
 
     hill, own       Taylor series in double-double (Duffing's equation for satellites); closed forms of pieces
     danby           the same, in the eccentric anomaly

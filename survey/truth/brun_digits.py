@@ -1,4 +1,6 @@
-"""Brun's problem in multiprecision: (S1)-(S6) of `scenes/brun.md`, and what half an ulp of the inputs changes."""
+"""Brun's problem in multiprecision: (S1)-(S6) of `scenes/brun.md`, and what half an ulp of the
+inputs changes.
+"""
 
 import warnings
 from itertools import pairwise
@@ -34,7 +36,8 @@ def real_roots(k, L, a, b):
     c = quartic(k, L, a, b)
     while c[0] == 0:
         c = c[1:]
-    with warnings.catch_warnings():  # mpmath 1.4 asks for another order of coefficients, which 1.3 does not know
+    # mpmath 1.4 asks for another order of coefficients, which 1.3 does not know
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         found = mp.polyroots(c, maxsteps=400, extraprec=300)
     return sorted(r.real for r in found if abs(r.imag) < mpf(10) ** -35), c
@@ -73,7 +76,9 @@ def polished(given, ends):
 
 
 def third(x, y, p):
-    """R_J(0, X, Y, p) for x^2 = X, y^2 = Y, by the mean (DLMF 19.22); to the working precision but for p -> 0."""
+    """R_J(0, X, Y, p) for x^2 = X, y^2 = Y, by the mean (DLMF 19.22); to the working precision but
+    for p -> 0.
+    """
     total, weight, root, mean = mpf(0), mpf(1), mp.sqrt(p), mp.agm(x, y).real
     while abs(weight) > mpf(10) ** -mp.dps:
         total += weight
@@ -85,7 +90,9 @@ def third(x, y, p):
 
 
 def outputs(given, ends, library=True):
-    """u_min, u_max, T, Delta_psi, Delta_phi, J by (S5), (S6), (S14), with mpmath's R_J or, faster, the mean."""
+    """u_min, u_max, T, Delta_psi, Delta_phi, J by (S5), (S6), (S14), with mpmath's R_J or, faster,
+    the mean.
+    """
     A, C, k, L, a, b, _u = given
     low, high = ends
     S = low + high
@@ -106,7 +113,9 @@ def outputs(given, ends, library=True):
     up = (b - a) * half(1 - high, 1 - low, q(low)) / A if b != a else mpf(0)
     down = (b + a) * half(1 + low, 1 + high, q(high)) / A if b != -a else mpf(0)
     level = L - (k * low * high + L - k + k * (S * S - low * high)) / 2
-    action = (period / A * level + 4 * mp.elliprg(0, X, Y).real - (b - a) * up - (b + a) * down) / (2 * mp.pi)
+    action = (period / A * level + 4 * mp.elliprg(0, X, Y).real - (b - a) * up - (b + a) * down) / (
+        2 * mp.pi
+    )
     return [low, high, period, up + down, a * (1 / C - 1 / A) * period + down - up, action]
 
 
@@ -121,7 +130,9 @@ def truth(point, given=integrals, ends=None):
         if x:
             moved = given([*state[:i], x * (1 + step), *state[i + 1 :]])
             there = outputs(moved, polished(moved, ends), library=False)
-            floor = [f + abs(t - h) / step * HALF_ULP for f, t, h in zip(floor, there, here, strict=True)]
+            floor = [
+                f + abs(t - h) / step * HALF_ULP for f, t, h in zip(floor, there, here, strict=True)
+            ]
     return exact, floor
 
 
@@ -152,7 +163,13 @@ def draw(random):
         if saddle:
             wide = k / 2 * np.sqrt((1 - u * u) * (1 - 9 * u * u))
             y = sign[1] * np.sqrt(k / 2 * (1 - 3 * u * u) + wide * random.uniform(-1, 1))
-        a, b, theta, p = u * (y - k / y), y - k * u * u / y, np.arccos(u), 10 ** random.uniform(-12, -1)  # (S8)
+        # (S8)
+        a, b, theta, p = (
+            u * (y - k / y),
+            y - k * u * u / y,
+            np.arccos(u),
+            10 ** random.uniform(-12, -1),
+        )
         epsilon = k / (A * A * (1 - C))
     elif kind == "near the upright rotation":
         k = -abs(k)
@@ -181,7 +198,11 @@ def draw_scaled(random):
     if kind in ("near a saddle", "near a regular precession"):
         alpha, beta = u * (y - sign / y), y - sign * u * u / y  # (S8)
         level = y * y * (1 - u * u) - sign * u * u + alpha * alpha
-        return kind, sign, (level + close * random.choice([-1.0, 1.0]) * max(1.0, abs(level)), alpha, beta)
+        return (
+            kind,
+            sign,
+            (level + close * random.choice([-1.0, 1.0]) * max(1.0, abs(level)), alpha, beta),
+        )
     if kind == "passing a pole closely":
         beta = side * alpha * (1 + close * random.choice([-1.0, 1.0]))
     elif kind == "near the upright rotation":
@@ -192,7 +213,9 @@ def draw_scaled(random):
     elif kind == "tiny field":
         large = 10 ** random.uniform(2, 9)
         alpha, beta = large * alpha, large * beta
-    level = max(alpha * alpha, beta * beta) * (1 + 10 ** random.uniform(-3, 1)) + random.uniform(-1, 1)
+    level = max(alpha * alpha, beta * beta) * (1 + 10 ** random.uniform(-3, 1)) + random.uniform(
+        -1, 1
+    )
     return kind, sign, (level, alpha, beta)
 
 

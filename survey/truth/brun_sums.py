@@ -1,14 +1,15 @@
-"""Brun's problem in the double-double arithmetic of this folder: periods by sums, not by elliptic integrals.
+"""Brun's problem in the double-double arithmetic of this folder: periods by sums, not by elliptic
+integrals.
 
-The polynomial P of (S2) is expanded about the start (or u = 0); its roots are bisected between its stationary points
-and polished, those near a pole as roots in 1 -+ u. With u between its turning points as a cosine of x,
-P = (u - ul)(uh - u) Q and
+The polynomial P of (S2) is expanded about the start (or u = 0); its roots are bisected between its
+stationary points and polished, those near a pole as roots in 1 -+ u. With u between its turning
+points as a cosine of x, P = (u - ul)(uh - u) Q and
 
     T = 2 A int dx / sqrt Q,
     advance at the pole u = 1: sgn(d) (pi + int sqrt(vl vh) k (1 + u + S) / (sqrt Q (sqrt Q + sqrt Q1)) dx),
 
-d = b - a, v = 1 - u, S = ul + uh, Q1 = Q(1), and likewise at -1. The integrands are periodic and smooth: sums converge
-like exp(-n).
+d = b - a, v = 1 - u, S = ul + uh, Q1 = Q(1), and likewise at -1. The integrands are periodic and
+smooth: sums converge like exp(-n).
 """
 
 import numpy as np
@@ -38,7 +39,9 @@ def derived(c, out):
 
 @inline
 def between(c, d, a, b):
-    """The root of a polynomial in [a, b] (double-doubles), where its sign changes once; `d` is its derivative."""
+    """The root of a polynomial in [a, b] (double-doubles), where its sign changes once; `d` is its
+    derivative.
+    """
     fa = value(c, a)[0]
     low, high = a, b
     for _ in range(52):
@@ -104,7 +107,9 @@ def at_pole(v, d2, c1, c2, c3, c4):
     """The root v near 0 of -d2 + c1 v + c2 v^2 + c3 v^3 + c4 v^4, from a guess."""
     for _ in range(5):
         p = add(mul(add(mul(add(mul(add(mul(c4, v), c3), v), c2), v), c1), v), neg(d2))
-        s = add(mul(add(mul(add(times(mul(c4, v), 4.0), times(c3, 3.0)), v), times(c2, 2.0)), v), c1)
+        s = add(
+            mul(add(mul(add(times(mul(c4, v), 4.0), times(c3, 3.0)), v), times(c2, 2.0)), v), c1
+        )
         if s[0] == 0.0:
             break
         v = sub(v, div(p, s))
@@ -117,7 +122,9 @@ def beside_pole(side, k, L, slope, end):
     five = add(times(k, 5.0), L)
     if five[0] < 0.0:
         zero = (0.0, 0.0)
-        short = at_pole(div(times(slope, 2.0), five), zero, times(slope, 2.0), neg(five), times(k, 4.0), neg(k))
+        short = at_pole(
+            div(times(slope, 2.0), five), zero, times(slope, 2.0), neg(five), times(k, 4.0), neg(k)
+        )
         far, u = sub((2.0, 0.0), short), sub((1.0, 0.0), short)
         end[0], end[1] = u if side == 1 else neg(u)
         end[2], end[3] = short if side == 1 else far
@@ -126,7 +133,9 @@ def beside_pole(side, k, L, slope, end):
 
 @inline
 def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
-    """T, advances at the poles, action of a well; `level` is L + k - a b, `below` L + k + a b; v = 1 - u, w = 1 + u."""
+    """T, advances at the poles, action of a well; `level` is L + k - a b, `below` L + k + a b; v =
+    1 - u, w = 1 + u.
+    """
     delta, sigma = sub(b, a), add(b, a)
     S, p = add(ul, uh), mul(ul, uh)
     half = times(sub(vl, vh), 0.5)
@@ -166,7 +175,11 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
         count = n if first else n // 2
         # nodes (j + 1/2) pi / n0 at first; then those half way
         for j in range(count):
-            x = times(PI, (2 * j + 1.0) / (2.0 * n)) if first else times(PI, (2 * j + 1.0) / (1.0 * n))
+            x = (
+                times(PI, (2 * j + 1.0) / (2.0 * n))
+                if first
+                else times(PI, (2 * j + 1.0) / (1.0 * n))
+            )
             sin, cos = sine_cosine(times(x, 0.5))
             # u = uh - 2 half sin^2(x/2); 1 - u = vh + ..., 1 + u = wl + 2 half cos^2(x/2)
             down, up = times(mul(half, mul(sin, sin)), 2.0), times(mul(half, mul(cos, cos)), 2.0)
@@ -199,7 +212,8 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
         if good:
             break
         if first:
-            # the first nodes are those of the shifted rule; restart with the rule at multiples of pi / n
+            # the first nodes are those of the shifted rule; restart with the rule at multiples of
+            # pi / n
             first = False
             ends = np.zeros((4, 2))
             for e in range(2):
@@ -215,15 +229,25 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
                 else:
                     term = add(q, times(add(mul(mul(vl, vh), e1), mul(mul(wl, wh), e2)), 0.5))
                 for m in range(4):
-                    t = inverse if m == 0 else (mul(e1, inverse) if m == 1 else (mul(e2, inverse) if m == 2 else term))
+                    t = (
+                        inverse
+                        if m == 0
+                        else (
+                            mul(e1, inverse) if m == 1 else (mul(e2, inverse) if m == 2 else term)
+                        )
+                    )
                     ends[m, 0], ends[m, 1] = add((ends[m, 0], ends[m, 1]), times(t, 0.5))
-            # shifted nodes with n are the odd multiples of pi / 2n: with the even ones the rule of 2n
+            # shifted nodes with n are the odd multiples of pi / 2n: with the even ones the rule of
+            # 2n
             for m in range(4):
                 old[m, 0], old[m, 1] = add((old[m, 0], old[m, 1]), (ends[m, 0], ends[m, 1]))
             # still wanted: multiples of pi / n inside
             for j in range(1, n):
                 sin, cos = sine_cosine(times(PI, j / (2.0 * n)))
-                down, up = times(mul(half, mul(sin, sin)), 2.0), times(mul(half, mul(cos, cos)), 2.0)
+                down, up = (
+                    times(mul(half, mul(sin, sin)), 2.0),
+                    times(mul(half, mul(cos, cos)), 2.0),
+                )
                 u = sub(uh, down) if abs(uh[0]) < abs(ul[0]) else add(ul, up)
                 v, w = add(vh, down), add(wl, up)
                 q = root(add(mul(add(mul(k, u), kS), u), q0))
@@ -235,7 +259,13 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
                 else:
                     term = add(q, times(add(mul(mul(vl, vh), e1), mul(mul(wl, wh), e2)), 0.5))
                 for m in range(4):
-                    t = inverse if m == 0 else (mul(e1, inverse) if m == 1 else (mul(e2, inverse) if m == 2 else term))
+                    t = (
+                        inverse
+                        if m == 0
+                        else (
+                            mul(e1, inverse) if m == 1 else (mul(e2, inverse) if m == 2 else term)
+                        )
+                    )
                     old[m, 0], old[m, 1] = add((old[m, 0], old[m, 1]), t)
             for m in range(4):
                 total[m, 0], total[m, 1] = times((old[m, 0], old[m, 1]), 1.0 / (2 * n))
@@ -275,19 +305,26 @@ def between_ends(A, k, L, a, b, level, below, e, one, most):
 
 @inline
 def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, ends):
-    """Roots of P (expanded about u0, whose 1 -+ u0 are v0, w0) with their u, 1 - u, 1 + u; returns their number."""
+    """Roots of P (expanded about u0, whose 1 -+ u0 are v0, w0) with their u, 1 - u, 1 + u; returns
+    their number.
+    """
     number = stationary(c, low, high, work, found)
     d, s = sub(b, a), add(b, a)
     for j in range(number):
         x = (found[j, 0], found[j, 1])
         u, v, w = add(u0, x), sub(v0, x), add(w0, x)
-        # far nearer to a pole than the start: a root in v of P(1 - v) = -d^2 + 2 level v - (L + 5 k) v^2 ...
+        # far nearer to a pole than the start: a root in v of P(1 - v) = -d^2 + 2 level v - (L + 5
+        # k) v^2 ...
         if v[0] < 0.01 * v0[0]:
-            v = at_pole(v, mul(d, d), times(level, 2.0), sub(neg(times(k, 5.0)), L), times(k, 4.0), neg(k))
+            v = at_pole(
+                v, mul(d, d), times(level, 2.0), sub(neg(times(k, 5.0)), L), times(k, 4.0), neg(k)
+            )
             w = sub((2.0, 0.0), v)
             u = sub((1.0, 0.0), v)
         elif w[0] < 0.01 * w0[0]:
-            w = at_pole(w, mul(s, s), times(below, 2.0), sub(neg(times(k, 5.0)), L), times(k, 4.0), neg(k))
+            w = at_pole(
+                w, mul(s, s), times(below, 2.0), sub(neg(times(k, 5.0)), L), times(k, 4.0), neg(k)
+            )
             v = sub((2.0, 0.0), w)
             u = sub(w, (1.0, 0.0))
         ends[j, 0], ends[j, 1] = u
@@ -298,10 +335,12 @@ def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, en
 
 @inline
 def doubts(A, k, L, a, b, c, low, high, u0, e, work, found, o):
-    """What rounds of L of ROUNDS times the size of its terms do beside a separatrix (floats suffice), into o[13:17].
+    """What rounds of L of ROUNDS times the size of its terms do beside a separatrix (floats
+    suffice), into o[13:17].
 
-    These are the doubt of T relative to it, those of u_min and u_max, and the fastest precession at a saddle. A saddle
-    is a minimum of P (as c, expanded about u0) with P = (1 - u^2) (L - L_sep) there.
+    These are the doubt of T relative to it, those of u_min and u_max, and the fastest precession at
+    a saddle. A saddle is a minimum of P (as c, expanded about u0) with P = (1 - u^2) (L - L_sep)
+    there.
     """
     rounds = ROUNDS * (abs(L) + 2.0 * abs(k) + a * a + b * b)
     slopes, square = np.zeros((5, 2)), np.zeros((4, 2))
@@ -355,7 +394,8 @@ def states(points, most, out):
         below = add(add(energy, mul(k, sin2)), mul(a, add(a, b)))
         c[0] = mul(mul(p, p), sin2)
         c[1] = add(
-            sub(times(mul(a, mul(X, sin)), 2.0), times(mul(cos, energy), 2.0)), times(mul(mul(k, cos), sin2), 2.0)
+            sub(times(mul(a, mul(X, sin)), 2.0), times(mul(cos, energy), 2.0)),
+            times(mul(mul(k, cos), sin2), 2.0),
         )
         c[2] = sub(sub(k, L), times(mul(k, mul(cos, cos)), 6.0))
         c[3] = times(mul(k, cos), -4.0)
@@ -376,12 +416,18 @@ def states(points, most, out):
                     lower = j
                 elif upper < 0:
                     upper = j
-        if number < 1 or (lower < 0 and b[0] != -a[0]) or (upper < 0 and b[0] != a[0]) or (p[0] == 0.0):
+        if (
+            number < 1
+            or (lower < 0 and b[0] != -a[0])
+            or (upper < 0 and b[0] != a[0])
+            or (p[0] == 0.0)
+        ):
             size = abs(energy[0]) + abs(k[0]) + a[0] * a[0] + b[0] * b[0]
             if p[0] != 0.0 or abs(c[1, 0]) <= 1e-30 * size:
                 continue
             slope = level[0] if b[0] == a[0] else below[0]
-            if abs(b[0]) == abs(a[0]) and abs(slope) <= 1e-12 * size:  # two roots beside a pole look like one
+            # two roots beside a pole look like one
+            if abs(b[0]) == abs(a[0]) and abs(slope) <= 1e-12 * size:
                 continue
             # at rest: the start is a root itself, exactly
             if c[1, 0] > 0.0:
@@ -405,7 +451,8 @@ def states(points, most, out):
                 e[side, 0], e[side, 1] = (-1.0, 0.0) if side == 0 else (1.0, 0.0)
                 e[side, 2], e[side, 3] = (2.0, 0.0) if side == 0 else (0.0, 0.0)
                 e[side, 4], e[side, 5] = (0.0, 0.0) if side == 0 else (2.0, 0.0)
-                if (below[0] if side == 0 else level[0]) < 0.0:  # P < 0 next to it: the motion turns before
+                # P < 0 next to it: the motion turns before
+                if (below[0] if side == 0 else level[0]) < 0.0:
                     beside_pole(side, k, L, below if side == 0 else level, e[side])
             else:
                 e[side] = ends[j]
@@ -445,7 +492,21 @@ def integrals(points, sign, ratio, most, out):
         c[1] = times(mul(a, b), 2.0)
         c[2], c[3], c[4] = sub(k, L), (0.0, 0.0), neg(k)
         number = prepared(
-            k, L, a, b, level, below, c, (-1.0, 0.0), (1.0, 0.0), (0.0, 0.0), (1.0, 0.0), (1.0, 0.0), work, found, ends
+            k,
+            L,
+            a,
+            b,
+            level,
+            below,
+            c,
+            (-1.0, 0.0),
+            (1.0, 0.0),
+            (0.0, 0.0),
+            (1.0, 0.0),
+            (1.0, 0.0),
+            work,
+            found,
+            ends,
         )
         if q[1] == q[2] or q[1] == -q[2]:
             continue
@@ -461,5 +522,19 @@ def integrals(points, sign, ratio, most, out):
                     between_ends((1.0, 0.0), k, L, a, b, level, below, e, one, most)
                     fill(o[at], e, one, drift)
                     zero = (0.0, 0.0)
-                    doubts(1.0, k[0], L[0], a[0], b[0], c, (-1.0, 0.0), (1.0, 0.0), zero, e, work, marks, o[at])
+                    doubts(
+                        1.0,
+                        k[0],
+                        L[0],
+                        a[0],
+                        b[0],
+                        c,
+                        (-1.0, 0.0),
+                        (1.0, 0.0),
+                        zero,
+                        e,
+                        work,
+                        marks,
+                        o[at],
+                    )
                 at += 1

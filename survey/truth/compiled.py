@@ -1,4 +1,6 @@
-"""The decorator of this folder's kernels: kept on disk under a hash of these sources, so that none goes stale."""
+"""The decorator of this folder's kernels: kept on disk under a hash of these sources, so that none
+goes stale.
+"""
 
 import hashlib
 import os
@@ -12,7 +14,9 @@ import platformdirs
 
 def _folder(function):
     """Named by a hash of the function's file and of the arithmetic that is compiled into it."""
-    digest = hashlib.sha256(f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode())
+    digest = hashlib.sha256(
+        f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode()
+    )
     for path in (function.__code__.co_filename, Path(__file__).with_name("double.py"), __file__):
         digest.update(Path(path).read_bytes())
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey"))

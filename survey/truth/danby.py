@@ -1,4 +1,6 @@
-"""Danby's map: the trace invariants a, b of the flow of `danby_flow`, and what its factors say of verdicts."""
+"""Danby's map: the trace invariants a, b of the flow of `danby_flow`, and what its factors say of
+verdicts.
+"""
 
 import numpy as np
 
@@ -46,9 +48,15 @@ def truth(given, answer):
         negative = (k > dk) & ((ab < -dab) | (t < -dt))
         expected = np.where(off, 2, np.where(negative, 1, -1))
         neither = (ab > dab) & (k > dk) & (t > dt)
-    other = (expected >= 0) & (meeting >= 0) & (meeting != expected) | neither & unstable & (meeting > 0)
+    other = (expected >= 0) & (meeting >= 0) & (meeting != expected) | neither & unstable & (
+        meeting > 0
+    )
     wrong = {
         "verdict": ((said == 1) & unstable) | ((said == 0) & stable),
         "collision": (said == 0) & (mu > 0) & other,
     }
-    return {"a": (out[:, 0], out[:, 1], out[:, 4]), "b": (out[:, 2], out[:, 3], out[:, 5]), "wrong": wrong}
+    return {
+        "a": (out[:, 0], out[:, 1], out[:, 4]),
+        "b": (out[:, 2], out[:, 3], out[:, 5]),
+        "wrong": wrong,
+    }

@@ -1,14 +1,31 @@
-"""Danby's linear equations in the double-double arithmetic of this folder, in the eccentric anomaly E.
+"""Danby's linear equations in the double-double arithmetic of this folder, in the eccentric anomaly
+E.
 
-With s = sqrt(1 - e^2), g = s / (1 - e cos E): (x, q, p, m)_E of equations (3) of the scene's notes times df/dE = g,
-and r df/dE = 1/s. Four solutions over half a period, from which the monodromy M = R Phi^-1 R Phi is multiplied out; its
-trace and the sum of its principal minors of order two are a and b, by no other formula.
+With s = sqrt(1 - e^2), g = s / (1 - e cos E): (x, q, p, m)_E of equations (3) of the scene's notes
+times df/dE = g, and r df/dE = 1/s. Four solutions over half a period, from which the monodromy M =
+R Phi^-1 R Phi is multiplied out; its trace and the sum of its principal minors of order two are a
+and b, by no other formula.
 """
 
 import numpy as np
 
 from survey.truth.compiled import kernel
-from survey.truth.double import PI, add, conv, div, get, horner, mul, neg, put, reach, root, sine_cosine, sub, times
+from survey.truth.double import (
+    PI,
+    add,
+    conv,
+    div,
+    get,
+    horner,
+    mul,
+    neg,
+    put,
+    reach,
+    root,
+    sine_cosine,
+    sub,
+    times,
+)
 
 TERMS = 33
 TINY = 1e-31
@@ -92,7 +109,8 @@ def _invariants(x, o):
         for j in range(4):
             total = (0.0, 0.0)
             for k in range(4):
-                # entry (i, k) of R Phi^-1 R, R = diag(1, 1, -1, -1): the signs of the off-diagonal blocks turn
+                # entry (i, k) of R Phi^-1 R, R = diag(1, 1, -1, -1): the signs of the off-diagonal
+                # blocks turn
                 r, c = (k + 2) % 4, (i + 2) % 4  # Phi^-1 = J^-1 Phi' J
                 total = add(total, mul((x[c, r, 0], x[c, r, 1]), (x[j, k, 0], x[j, k, 1])))
             m[i, j, 0], m[i, j, 1] = total

@@ -1,6 +1,8 @@
-"""Hill equations that users define: z with mpmath's numbers, the flow by extrapolated leapfrog steps of order 20.
+"""Hill equations that users define: z with mpmath's numbers, the flow by extrapolated leapfrog
+steps of order 20.
 
-z is the user's own Python, run with mpmath's functions (as for the package's double-double); all else is done here.
+z is the user's own Python, run with mpmath's functions (as for the package's double-double); all
+else is done here.
 """
 
 from itertools import pairwise
@@ -19,14 +21,20 @@ SMALL, DIGITS = 1e-26, 1e-36  # of a step, over the size of the flow; of the ari
 
 
 def of_file(path):
-    """(the Ranges, the truth) of a Hill equation in a file, or in a workflow; raises BadInput where none is known."""
+    """(the Ranges, the truth) of a Hill equation in a file, or in a workflow; raises BadInput where
+    none is known.
+    """
     found = ranges.of(path)
     if not isinstance(found.scene, HillScene):
-        raise BadInput(f"{path}: true values are known only of Hill equations y'' + z(u, p) y = 0; name a file with z")
+        raise BadInput(
+            f"{path}: true values are known only of Hill equations y'' + z(u, p) y = 0; name a file with z"
+        )
     try:
         return found, own(found.scene)
     except multiprecision.Unsupported as error:
-        raise BadInput(f"{path}: z cannot be run with more digits ({error}), so no true values are known") from None
+        raise BadInput(
+            f"{path}: z cannot be run with more digits ({error}), so no true values are known"
+        ) from None
 
 
 def own(scene):
@@ -58,7 +66,9 @@ def _factors(scene, z, p):
     mp = multiprecision.context()
     exact = [mp.mpf(float(x)) for x in p]
     period = float(scene.period(p) if callable(scene.period) else scene.period)
-    breaks = np.atleast_1d(scene.breaks(p) if callable(scene.breaks) else scene.breaks).astype(float)
+    breaks = np.atleast_1d(scene.breaks(p) if callable(scene.breaks) else scene.breaks).astype(
+        float
+    )
     end = period / 2 if scene.EVEN else period
     ends = [0.0, *sorted({x for x in breaks.tolist() if 0.0 < x < end}), end]
     flow, doubt, steps, largest = (mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(1)), 0.0, 0, 1.0
@@ -72,9 +82,12 @@ def _factors(scene, z, p):
 
 
 def _piece(z, mp, flow, u, end):
-    """The flow y1, y2, y1', y2' at the end of a smooth piece, the local errors' sum, steps, the largest entry."""
+    """The flow y1, y2, y1', y2' at the end of a smooth piece, the local errors' sum, steps, the
+    largest entry.
+    """
     h, doubt, steps, largest = end - u, 0.0, 0, 1.0
-    inside = (end - u) * mp.mpf(2) ** -110  # a jump at an end of the piece belongs to the other side
+    # a jump at an end of the piece belongs to the other side
+    inside = (end - u) * mp.mpf(2) ** -110
     low, high = u + inside, end - inside
     while u < end:
         h = min(h, end - u)
@@ -91,7 +104,9 @@ def _piece(z, mp, flow, u, end):
 
 
 def _step(z, mp, flow, u, h):
-    """Leapfrog with 1, 2, ..., ORDER + 2 steps, extrapolated in the square of the step (Gragg, Aitken, Neville)."""
+    """Leapfrog with 1, 2, ..., ORDER + 2 steps, extrapolated in the square of the step (Gragg,
+    Aitken, Neville).
+    """
     seen, table = {}, []
     for n in range(1, ORDER + 3):
         at = []
@@ -103,7 +118,11 @@ def _step(z, mp, flow, u, h):
         row = [_leapfrog(at, flow, h / n)]
         for k in range(1, n):
             ratio = mp.mpf(n * n) / ((n - k) * (n - k)) - 1
-            row.append(tuple(a + (a - b) / ratio for a, b in zip(row[k - 1], table[-1][k - 1], strict=True)))
+            row.append(
+                tuple(
+                    a + (a - b) / ratio for a, b in zip(row[k - 1], table[-1][k - 1], strict=True)
+                )
+            )
         table.append(row)
     error = max(abs(a - b) for a, b in zip(table[-1][-1], table[-1][-2], strict=True))
     return table[-1][-1], float(error)

@@ -1,7 +1,8 @@
-"""Double-double arithmetic of this folder's own, not the kernels': pairs (high, low) with a fused multiply-add.
+"""Double-double arithmetic of this folder's own, not the kernels': pairs (high, low) with a fused
+multiply-add.
 
-Sums and products are those of M. Joldes, J.-M. Muller, V. Popescu, ACM Trans. Math. Softw. 44 (2017) 15res
-(algorithms 6, 12, 17), good to about 2^-102 relative. A series is an array (2, terms).
+Sums and products are those of M. Joldes, J.-M. Muller, V. Popescu, ACM Trans. Math. Softw. 44
+(2017) 15res (algorithms 6, 12, 17), good to about 2^-102 relative. A series is an array (2, terms).
 """
 
 from math import sqrt
@@ -23,7 +24,9 @@ def fma(typingctx, a, b, c):
 
     def code(context, builder, signature, values):
         double = ir.DoubleType()
-        fused = builder.module.declare_intrinsic("llvm.fma", (double,), ir.FunctionType(double, (double,) * 3))
+        fused = builder.module.declare_intrinsic(
+            "llvm.fma", (double,), ir.FunctionType(double, (double,) * 3)
+        )
         return builder.call(fused, values)
 
     return types.float64(types.float64, types.float64, types.float64), code
@@ -153,7 +156,9 @@ def reach(series, scale, tolerance):
     """The h at which the last two terms of a series are `tolerance` times `scale`."""
     n = series.shape[1]
     a, b = abs(series[0, n - 1]) + 1e-300, abs(series[0, n - 2]) + 1e-300
-    return min((tolerance * scale / a) ** (1.0 / (n - 1)), (tolerance * scale / b) ** (1.0 / (n - 2)))
+    return min(
+        (tolerance * scale / a) ** (1.0 / (n - 1)), (tolerance * scale / b) ** (1.0 / (n - 2))
+    )
 
 
 @inline
@@ -174,7 +179,10 @@ def sine_cosine(x):
     sin = mul(h, sub((1.0, 0.0), s))
     short = times(mul(h2, sub((1.0, 0.0), c)), 0.5)  # 1 - cos
     for _ in range(6):
-        sin, short = mul(times(sin, 2.0), sub((1.0, 0.0), short)), times(mul(short, sub((2.0, 0.0), short)), 2.0)
+        sin, short = (
+            mul(times(sin, 2.0), sub((1.0, 0.0), short)),
+            times(mul(short, sub((2.0, 0.0), short)), 2.0),
+        )
     cos = sub((1.0, 0.0), short)
     k = int(q) & 3
     if k == 0:

@@ -1,4 +1,6 @@
-"""The gyrostat's motions in time and over the angle: what the flow of `gyrostat_flow` makes of their outputs."""
+"""The gyrostat's motions in time and over the angle: what the flow of `gyrostat_flow` makes of
+their outputs.
+"""
 
 import numpy as np
 
@@ -9,11 +11,15 @@ SURE = 1e-26  # of the truth, relative, where nothing grows
 
 
 def _points(given, last, ok):
-    return np.ascontiguousarray(np.column_stack([given[name] for name in (*SYSTEM, "phi0", "w0", last)])[ok])
+    return np.ascontiguousarray(
+        np.column_stack([given[name] for name in (*SYSTEM, "phi0", "w0", last)])[ok]
+    )
 
 
 def _twice(kernel, points, said, bars, columns):
-    """The truth, and where a bar seems to miss it, what another tolerance makes of it: (out, doubt per column)."""
+    """The truth, and where a bar seems to miss it, what another tolerance makes of it: (out, doubt
+    per column).
+    """
     out = _solved(kernel, points, gyrostat_flow.TINY)
     doubt = np.full((len(points), len(columns)), 0.0)
     for j, c in enumerate(columns):
@@ -25,13 +31,17 @@ def _twice(kernel, points, said, bars, columns):
     if suspicious.any():
         again = _solved(kernel, points[suspicious], 1e-30)
         for j, c in enumerate(columns):
-            off = np.abs((again[:, c] - out[suspicious, c]) + (again[:, c + 1] - out[suspicious, c + 1]))
+            off = np.abs(
+                (again[:, c] - out[suspicious, c]) + (again[:, c + 1] - out[suspicious, c + 1])
+            )
             doubt[suspicious, j] += 100 * off
     return out, doubt
 
 
 def _solved(kernel, points, tolerance):
-    return remembered((kernel.__name__, tolerance), lambda p, out: kernel(p, tolerance, out), points, 6)
+    return remembered(
+        (kernel.__name__, tolerance), lambda p, out: kernel(p, tolerance, out), points, 6
+    )
 
 
 def _spread(ok, values):
@@ -47,7 +57,11 @@ def flow(given, answer):
     out, doubt = _twice(gyrostat_flow.flow, points, said, bars, (0, 2))
     turns = answer["turnings"][ok]
     with np.errstate(invalid="ignore"):
-        clear = (out[:, 4] >= 0) & (np.abs(out[:, 2]) > 2 * np.maximum(bars[1], 1e-25)) & (points[:, 7] != 0)
+        clear = (
+            (out[:, 4] >= 0)
+            & (np.abs(out[:, 2]) > 2 * np.maximum(bars[1], 1e-25))
+            & (points[:, 7] != 0)
+        )
         wrong = np.zeros(len(ok), bool)
         wrong[ok] = clear & (turns >= 0) & (turns != out[:, 4])
     spread = lambda x: _spread(ok, x)  # noqa: E731
@@ -60,7 +74,10 @@ def along(given, answer):
     turned = np.isfinite(answer["phi_turning"])
     ok = (status == 0) | turned
     points = _points(given, "phi", ok)
-    pick = [np.where(turned, answer[a], answer[b])[ok] for a, b in (("phi_turning", "w"), ("t_turning", "t"))]
+    pick = [
+        np.where(turned, answer[a], answer[b])[ok]
+        for a, b in (("phi_turning", "w"), ("t_turning", "t"))
+    ]
     bars = [
         np.where(turned, answer[a + "_error"], answer[b + "_error"])[ok]
         for a, b in (("phi_turning", "w"), ("t_turning", "t"))
@@ -73,13 +90,19 @@ def along(given, answer):
         further = points[early]
         further[:, 8] += np.sign(further[:, 8] - further[:, 6])
         found = [part[early] for part in (*pick, *bars)]
-        out[early], doubt[early] = _twice(gyrostat_flow.along, further, found[:2], found[2:], (0, 2))
+        out[early], doubt[early] = _twice(
+            gyrostat_flow.along, further, found[:2], found[2:], (0, 2)
+        )
     true = _spread(ok, out[:, 4])
     wrong = ((status == 0) & (true == 1)) | (turned & (true == 0))
     found = {"wrong": {"turning": wrong}}
     for names, here in ((("w", "t"), true == 0), (("phi_turning", "t_turning"), true == 1)):
         for name, c, j in zip(names, (0, 2), (0, 1), strict=True):
-            value, low, d = _spread(ok, out[:, c]), _spread(ok, out[:, c + 1]), _spread(ok, doubt[:, j])
+            value, low, d = (
+                _spread(ok, out[:, c]),
+                _spread(ok, out[:, c + 1]),
+                _spread(ok, doubt[:, j]),
+            )
             said = np.isfinite(answer[name])
             found[name] = np.where(here & said, value, np.nan), low, d
     return found

@@ -1,13 +1,28 @@
-"""phi' = w, w' = f w + g in the double-double arithmetic of this folder: Taylor series in time, of order 26.
+"""phi' = w, w' = f w + g in the double-double arithmetic of this folder: Taylor series in time, of
+order 26.
 
-`flow` goes to a time and counts the turning points on its way; `along` goes to an angle, or to the turning point before
-it. Parameters are scaled by powers of two, exactly (symmetry S5), so that no series overflows.
+`flow` goes to a time and counts the turning points on its way; `along` goes to an angle, or to the
+turning point before it. Parameters are scaled by powers of two, exactly (symmetry S5), so that no
+series overflows.
 """
 
 import numpy as np
 
 from survey.truth.compiled import inline, kernel
-from survey.truth.double import add, conv, div, get, horner, neg, put, reach, sine_cosine, slope, sub, times
+from survey.truth.double import (
+    add,
+    conv,
+    div,
+    get,
+    horner,
+    neg,
+    put,
+    reach,
+    sine_cosine,
+    slope,
+    sub,
+    times,
+)
 
 TERMS = 27
 TINY = 1e-32
@@ -64,7 +79,9 @@ def pace(y, tolerance):
 
 @kernel
 def flow(points, tolerance, out):
-    """points (N, 9): b12 .. s3, phi0, w0, t. out (N, 6): phi, w (high, low), turnings or -1 in doubt, steps."""
+    """points (N, 9): b12 .. s3, phi0, w0, t. out (N, 6): phi, w (high, low), turnings or -1 in
+    doubt, steps.
+    """
     y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
     for i in range(len(points)):
         row, o = points[i], out[i]
@@ -125,7 +142,9 @@ def zero(series, goal, low, high):
 
 @kernel
 def along(points, tolerance, out):
-    """points (N, 9): b12 .. s3, phi0, w0, phi. out (N, 6): w, t (high, low), 0, or phi, t of turning, 1; steps."""
+    """points (N, 9): b12 .. s3, phi0, w0, phi. out (N, 6): w, t (high, low), 0, or phi, t of
+    turning, 1; steps.
+    """
     y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
     for i in range(len(points)):
         row, o = points[i], out[i]
@@ -176,10 +195,11 @@ def along(points, tolerance, out):
 
 @kernel
 def settle(points, section, span, tolerance, out):
-    """points (N, 8) without a time, for `span` in units of the fastest rate; velocities are over that rate.
+    """points (N, 8) without a time, for `span` in units of the fastest rate; velocities are over
+    that rate.
 
-    out (N, 8): phi, w at the end, w at the last two passages of `section`, phi at the last two right turning points,
-    the rate, and 1 if all was done.
+    out (N, 8): phi, w at the end, w at the last two passages of `section`, phi at the last two
+    right turning points, the rate, and 1 if all was done.
     """
     y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
     for i in range(len(points)):

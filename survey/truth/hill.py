@@ -1,6 +1,8 @@
-"""Hill's equation: what the flow of `hill_flow` makes of the outputs of satellites and of Mathieu's equation.
+"""Hill's equation: what the flow of `hill_flow` makes of the outputs of satellites and of Mathieu's
+equation.
 
-A truth is a function (given, answer) -> {output: (value, low, doubt), "wrong": {what: mask}}: see `survey.truth`.
+A truth is a function (given, answer) -> {output: (value, low, doubt), "wrong": {what: mask}}: see
+`survey.truth`.
 """
 
 from math import pi
@@ -29,7 +31,9 @@ def solved(way, given, rates, rho, direction=1.0, oblate=False, tolerance=TOLERA
 
 
 def satellite(way, inertia, direction, oblate, most=3e3):
-    """The truth of satellites named by `way` and rho or inertia ratio, where |rho| <= `most` max(k, 1): it is dear."""
+    """The truth of satellites named by `way` and rho or inertia ratio, where |rho| <= `most` max(k,
+    1): it is dear.
+    """
     name = "inertia_ratio" if inertia else "rho"
 
     def truth(given, answer):
@@ -51,13 +55,22 @@ def satellite(way, inertia, direction, oblate, most=3e3):
         grows, _low, doubt = found["exponent"]
         with np.errstate(all="ignore"):
             turns = _long(out, 8) * 2 / (2 * LONG_PI) * _rho_long(rho, other, inertia)
-            found["exponent_per_orbit"] = grows / turns, 0.0, doubt / turns + 8 * ULP * np.abs(grows / turns)
+            found["exponent_per_orbit"] = (
+                grows / turns,
+                0.0,
+                doubt / turns + 8 * ULP * np.abs(grows / turns),
+            )
         wrong = found["wrong"]
-        wrong["lyapunov certifies what is not stable"] = (answer["lyapunov"] == 1) & found.pop("unstable")
+        wrong["lyapunov certifies what is not stable"] = (answer["lyapunov"] == 1) & found.pop(
+            "unstable"
+        )
         with np.errstate(invalid="ignore"):
-            # its Runge-Kutta steps add up to an error of about 1e-4, which D feels times the squares of the factors
+            # its Runge-Kutta steps add up to an error of about 1e-4, which D feels times the
+            # squares of the factors
             known = ok & (np.abs(out[:, :8:2]).max(axis=1) ** 2 < LOUD)
-            off = np.abs(np.abs(answer["rotation_number"]) - rough_rotation(k, short, rho, body, known))
+            off = np.abs(
+                np.abs(answer["rotation_number"]) - rough_rotation(k, short, rho, body, known)
+            )
             wrong["rotation number"] = known & (off > 0.08 + answer["rotation_number_error"])
         return found
 
@@ -76,7 +89,9 @@ def _rho_long(rho, alpha, inertia):
 
 def _tractable(given, way, name, most):
     """Points that are cheap enough to hold against the truth."""
-    values, other = np.broadcast_arrays(np.asarray(given[way], float), np.asarray(given[name], float))
+    values, other = np.broadcast_arrays(
+        np.asarray(given[way], float), np.asarray(given[name], float)
+    )
     k = {"k": values, "one_minus_k": 1 - values, "amplitude": np.sin(values)}[way]
     with np.errstate(all="ignore"):
         rho = other if name == "rho" else 1 / np.sqrt(3 * np.abs(1 - other))
@@ -95,7 +110,10 @@ def hill_outputs(out, answer, half):
     """What follows from the factors of `half` a period or of the whole, and which verdicts are wrong."""
     doubt = out[:, 10]
     y1, y2, d1, d2 = (_long(out, i) for i in (0, 2, 4, 6))
-    found = {name: (out[:, 2 * i], out[:, 2 * i + 1], doubt) for i, name in enumerate(("y1", "y2", "dy1", "dy2"))}
+    found = {
+        name: (out[:, 2 * i], out[:, 2 * i + 1], doubt)
+        for i, name in enumerate(("y1", "y2", "dy1", "dy2"))
+    }
     with np.errstate(all="ignore"):
         if half:
             minus, plus = d1 * y2, y1 * d2  # (D - 2) / 4 and (D + 2) / 4
@@ -116,21 +134,32 @@ def hill_outputs(out, answer, half):
         growth = np.where(minus > 0, minus, np.where(plus < 0, -plus, 0))
         slack = np.where(minus > 0, dminus, np.where(plus < 0, dplus, np.minimum(dminus, dplus)))
         exponent = 2 * np.arcsinh(np.sqrt(growth))
-        about = 2 * np.arcsinh(np.sqrt(growth + slack)) - 2 * np.arcsinh(np.sqrt(np.maximum(growth - slack, 0)))
+        about = 2 * np.arcsinh(np.sqrt(growth + slack)) - 2 * np.arcsinh(
+            np.sqrt(np.maximum(growth - slack, 0))
+        )
         found["exponent"] = exponent, 0.0, about.astype(float) + 8 * ULP * exponent.astype(float)
         found["discriminant"] = trace, 0.0, dtrace.astype(float)
-        theta = np.where(minus > 0, 0, np.where(plus < 0, LONG_PI / 2, np.arctan2(np.sqrt(-minus), np.sqrt(plus))))
+        theta = np.where(
+            minus > 0,
+            0,
+            np.where(plus < 0, LONG_PI / 2, np.arctan2(np.sqrt(-minus), np.sqrt(plus))),
+        )
         dtheta = _angle_doubt(minus, plus, dminus, dplus)
         fraction = theta / LONG_PI  # of theta / 2 pi, theta in [0, pi]
         said = answer["rotation_number"]
-        whole = np.rint(np.asarray(said, LONG) - fraction), np.rint(np.asarray(said, LONG) + fraction)
+        whole = (
+            np.rint(np.asarray(said, LONG) - fraction),
+            np.rint(np.asarray(said, LONG) + fraction),
+        )
         near, other = whole[0] + fraction, whole[1] - fraction
         true = np.where(np.abs(near - said) < np.abs(other - said), near, other)
         found["rotation_number"] = true, 0.0, dtheta + 8 * ULP * (1 + np.abs(true).astype(float))
     verdict = answer["verdict"]
     found["wrong"] = {
         "verdict": ((verdict == 1) & unstable) | ((verdict == 0) & stable),
-        "marginal": (verdict == 2) & ((minus < -dminus) | (minus > dminus)) & ((plus < -dplus) | (plus > dplus)),
+        "marginal": (verdict == 2)
+        & ((minus < -dminus) | (minus > dminus))
+        & ((plus < -dplus) | (plus > dplus)),
     }
     found["unstable"] = unstable
     return found
@@ -146,7 +175,10 @@ def _angle_doubt(minus, plus, dminus, dplus):
     """What the doubts make of theta / 2 pi."""
     with np.errstate(all="ignore"):
         ends = [
-            np.arctan2(np.sqrt(np.maximum(-minus + s * dminus, 0)), np.sqrt(np.maximum(plus - s * dplus, 0)))
+            np.arctan2(
+                np.sqrt(np.maximum(-minus + s * dminus, 0)),
+                np.sqrt(np.maximum(plus - s * dplus, 0)),
+            )
             for s in (-1, 1)
         ]
         return (np.abs(ends[1] - ends[0]) / LONG_PI).astype(float)

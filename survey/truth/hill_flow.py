@@ -1,8 +1,10 @@
-"""Hill's equation in the double-double arithmetic of this folder, in another form than the package's.
+"""Hill's equation in the double-double arithmetic of this folder, in another form than the
+package's.
 
-Satellites: w = k cn u (or k dn k u) solves Duffing's equation w'' = (2 k^2 - 1) w - 2 w^3. It is solved from the
-place where w is least, so that its relative error does not grow however near k is to 1, and both solutions with it; the
-rest of the half period follows from rho -> -rho there. Taylor series of order 30, in steps of their own length.
+Satellites: w = k cn u (or k dn k u) solves Duffing's equation w'' = (2 k^2 - 1) w - 2 w^3. It is
+solved from the place where w is least, so that its relative error does not grow however near k is
+to 1, and both solutions with it; the rest of the half period follows from rho -> -rho there. Taylor
+series of order 30, in steps of their own length.
 """
 
 import numpy as np
@@ -41,7 +43,10 @@ def modulus(which, given):
     if which == AMPLITUDE:
         k, kc = sine_cosine((given, 0.0))
         if given > 1.0:  # cos = sin(pi/2 - given), so that none of its digits is lost
-            left = sub(sub((HALF_PI_PARTS[0] - given, 0.0), (-HALF_PI_PARTS[1], 0.0)), (-HALF_PI_PARTS[2], 0.0))
+            left = sub(
+                sub((HALF_PI_PARTS[0] - given, 0.0), (-HALF_PI_PARTS[1], 0.0)),
+                (-HALF_PI_PARTS[2], 0.0),
+            )
             kc, k = sine_cosine(left)
         return k, mul(kc, kc)
     short = (given, 0.0) if which == ONE_MINUS_K else sub((1.0, 0.0), (given, 0.0))
@@ -64,7 +69,12 @@ def rate(which, given, direction):
 @kernel
 def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, out):
     """Half-period factors of points: out[i] = y1, y2, y1', y2' and T/2 (high, low), their doubt, steps."""
-    w, w2, w3, z = np.zeros((2, TERMS)), np.zeros((2, TERMS)), np.zeros((2, TERMS)), np.zeros((2, TERMS))
+    w, w2, w3, z = (
+        np.zeros((2, TERMS)),
+        np.zeros((2, TERMS)),
+        np.zeros((2, TERMS)),
+        np.zeros((2, TERMS)),
+    )
     y = np.zeros((4, 2, TERMS))
     state = np.zeros((4, 4))
     for i in range(len(given)):
@@ -72,7 +82,9 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
         rho, ob = rate(rhowhich, rhogiven[i], direction)
         if rhowhich == RHO:
             ob = oblate
-        rotates = (given[i] < 0.0) if which == ONE_MINUS_K else (given[i] > 1.0 if which == K else False)
+        rotates = (
+            (given[i] < 0.0) if which == ONE_MINUS_K else (given[i] > 1.0 if which == K else False)
+        )
         scale = k[0] if k[0] > 1.0 else 1.0
         # everything in units of `scale` (a float: its division is exact to double-double)
         kk, ro = div(k, (scale, 0.0)), div(rho, (scale, 0.0))
@@ -96,7 +108,8 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
         for n in range(4):
             for m in range(4):
                 state[n, m] = 0.0
-        state[0, 0] = state[1, 2] = state[2, 0] = state[3, 2] = 1.0  # y, y_s of each solution (high, low)
+        # y, y_s of each solution (high, low)
+        state[0, 0] = state[1, 2] = state[2, 0] = state[3, 2] = 1.0
         w0, v0 = least, dleast
         left = length
         steps = 0
@@ -109,7 +122,14 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
                 put(w2, n, conv(w, w, n))
                 put(w3, n, conv(w2, w, n))
                 if n + 2 < TERMS:
-                    put(w, n + 2, div(sub(mul(alpha, get(w, n)), times(get(w3, n), 2.0)), ((n + 1.0) * (n + 2.0), 0.0)))
+                    put(
+                        w,
+                        n + 2,
+                        div(
+                            sub(mul(alpha, get(w, n)), times(get(w3, n), 2.0)),
+                            ((n + 1.0) * (n + 2.0), 0.0),
+                        ),
+                    )
             h = reach(w, abs(w0[0]) + 0.3 * abs(v0[0]), tolerance) if kk[0] > 1e-30 else 1e30
             for side in range(signs):
                 both = times(ro, 2.0 if side == 0 else -2.0)
@@ -152,7 +172,8 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
         o[4], o[5] = times(d1, scale)
         o[6], o[7] = d2
         o[8], o[9] = div(length, (scale, 0.0))
-        # rounding of all steps, of T and of w: what the flow makes of it is bounded by its largest entries
+        # rounding of all steps, of T and of w: what the flow makes of it is bounded by its largest
+        # entries
         o[10] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + abs(ro[0]) * length[0])
         o[11] = float(steps)
         if steps >= MOST:
@@ -165,7 +186,9 @@ TWO_PI = 6.283185307179586  # as it stands in a user's z
 
 @inline
 def wave(z, sin, cos, rate, a, b):
-    """Add a cos(rate u) + b sin(rate u) to the series z about a place where their sine and cosine are these."""
+    """Add a cos(rate u) + b sin(rate u) to the series z about a place where their sine and cosine
+    are these.
+    """
     f = add(times(cos, a), times(sin, b))
     g = sub(times(cos, b), times(sin, a))
     for n in range(TERMS):
@@ -218,7 +241,8 @@ def own_series(kind, p, u, z, piece):
 
 @kernel
 def own_points(kind, points, ends, lengths, tolerance, out):
-    """y1, y2, y1', y2' at the end of [0, length] of points (N, n): as `satellites`; `ends` (N) are breaks.
+    """y1, y2, y1', y2' at the end of [0, length] of points (N, n): as `satellites`; `ends` (N) are
+    breaks.
 
     `lengths` (N, 2) are double-doubles.
     """
@@ -228,7 +252,9 @@ def own_points(kind, points, ends, lengths, tolerance, out):
         p, o = points[i], out[i]
         length = lengths[i, 0], lengths[i, 1]
         size = abs(p[0]) + abs(p[1])
-        for n in range(2, 4 if kind == BENT else (9 if kind == HARMONICS else (3 if kind == COSINE else 2))):
+        for n in range(
+            2, 4 if kind == BENT else (9 if kind == HARMONICS else (3 if kind == COSINE else 2))
+        ):
             size += abs(p[n])
         x[:] = 0.0
         x[0, 0] = x[1, 2] = 1.0
@@ -248,7 +274,10 @@ def own_points(kind, points, ends, lengths, tolerance, out):
                     put(q[s], 1, (x[s, 2], x[s, 3]))
                     for n in range(TERMS - 2):
                         put(q[s], n + 2, div(neg(conv(z, q[s], n)), ((n + 1.0) * (n + 2.0), 0.0)))
-                    h = min(h, reach(q[s], abs(x[s, 0]) + abs(x[s, 2]) / (1.0 + np.sqrt(size)), tolerance))
+                    h = min(
+                        h,
+                        reach(q[s], abs(x[s, 0]) + abs(x[s, 2]) / (1.0 + np.sqrt(size)), tolerance),
+                    )
                 last = h >= left[0]
                 step = left if last else (h, 0.0)
                 for s in range(2):

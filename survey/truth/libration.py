@@ -9,17 +9,44 @@ from mpmath import mp, mpf
 from survey.kernels.libration.coefficients import FORMS, LABELS
 
 DIGITS = 60
-SINGLE = ("omega1", "omega2", "a20", "a11", "a02", "D4", "D6", "M_ray", "discriminant", "det_N", "det_bordered")
+SINGLE = (
+    "omega1",
+    "omega2",
+    "a20",
+    "a11",
+    "a02",
+    "D4",
+    "D6",
+    "M_ray",
+    "discriminant",
+    "det_N",
+    "det_bordered",
+)
 RESONANT = ("0.0242938971420523216662227326885", "0.0135160160224525267555750091159")  # mu1, mu2
 LONG = np.longdouble
 ULP = float(np.finfo(LONG).eps)
-VECTORS = np.array([k for k in product(range(-8, 9), range(-8, 9), range(-8, 9, 2)) if 0 < sum(map(abs, k)) <= 8])
+VECTORS = np.array(
+    [k for k in product(range(-8, 9), range(-8, 9), range(-8, 9, 2)) if 0 < sum(map(abs, k)) <= 8]
+)
 
 
 def _forms(w1, w2):
     """The closed forms (their integers), in the arithmetic of w1 and w2."""
     u, v = w1 * w1, w2 * w2
-    factors = (w1, w2, u, v, u - v, 1 - 5 * u, 1 - 5 * v, 1 - 10 * u, 1 - 10 * v, 4 - u, 4 - v, 9 - 4 * u * v)
+    factors = (
+        w1,
+        w2,
+        u,
+        v,
+        u - v,
+        1 - 5 * u,
+        1 - 5 * v,
+        1 - 10 * u,
+        1 - 10 * v,
+        4 - u,
+        4 - v,
+        9 - 4 * u * v,
+    )
     found = {}
     for name in LABELS:
         common, powers, numerator = FORMS[name]
@@ -63,7 +90,9 @@ def _known(mu):
             alpha = [t for t in alpha if 0 <= t <= w2 / w1]
             if alpha:
                 beta = w2 - alpha[0] * w1
-                values["M_ray"] = sum(f[n] * alpha[0] ** int(n[0]) * beta ** int(n[2]) for n in LABELS[6:])
+                values["M_ray"] = sum(
+                    f[n] * alpha[0] ** int(n[0]) * beta ** int(n[2]) for n in LABELS[6:]
+                )
         values["discriminant"] = a11 * a11 - 4 * a20 * a02
         hessian = mp.matrix(4)
         for i, j, name in ((0, 1, "110"), (0, 2, "101"), (1, 2, "011")):
@@ -77,7 +106,9 @@ def _known(mu):
         pairs["alpha"] = np.array([_split(x) for x in rays]).T
         pairs["beta"] = np.array([_split(w2 - x * w1) for x in rays]).T
         pairs["c"] = np.array([_split(f[name]) for name in LABELS]).T
-        combination = VECTORS[:, 0] * LONG(1) * _long(w1) - VECTORS[:, 1] * _long(w2) + VECTORS[:, 2]
+        combination = (
+            VECTORS[:, 0] * LONG(1) * _long(w1) - VECTORS[:, 1] * _long(w2) + VECTORS[:, 2]
+        )
         return pairs, np.abs(combination).min(), 1 if (a02 > 0) == (D4 > 0) else 2
 
 
@@ -99,7 +130,9 @@ def truth(given, answer):
             found, near[i], expected = _known(float(mu[i]))
             for name, (high, low) in found.items():
                 pairs[name][0][i], pairs[name][1][i] = high, low
-            wrong[i] = (said in (1, 2) and said != expected) or (said in (0, 4) and m < limit - mpf(2) ** -56)
+            wrong[i] = (said in (1, 2) and said != expected) or (
+                said in (0, 4) and m < limit - mpf(2) ** -56
+            )
             if said == 3:
                 wrong[i] = min(abs(m - mpf(x)) for x in RESONANT) > mpf(2) ** -58
     found = {name: (high, low, 1e-30 * np.abs(high)) for name, (high, low) in pairs.items()}

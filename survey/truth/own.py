@@ -1,4 +1,6 @@
-"""User-defined equations y'' + z y = 0 whose truth is known: series in double-double, or pieces in closed form."""
+"""User-defined equations y'' + z y = 0 whose truth is known: series in double-double, or pieces in
+closed form.
+"""
 
 from math import cos, sin
 
@@ -35,8 +37,8 @@ def lorentz(u, p):
 
 SHORT = ("a", "b", "c", "d")
 LONG_NAMES = ("a", "c1", "c2", "c3", "c4", "s1", "s2", "s3", "s4", "T")
-# z, parameters, kind of its truth, and the rest that survey.hill is given; z is not that of a smooth period but for
-# the harmonics, so 0 is a break
+# z, parameters, kind of its truth, and the rest that survey.hill is given; z is not that of a
+# smooth period but for the harmonics, so 0 is a break
 OWN = {
     "harmonics": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9])),
     "harmonics even": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9], even=True)),
@@ -80,7 +82,9 @@ def _steps(row, even):
             else:
                 c, s = mp.cosh(x), mp.sinh(x)
             # sin(x) / root loses nothing but where z is 0
-            step = mp.matrix([[c, s / root if root else length], [-s * root if z > 0 else s * root, c]])
+            step = mp.matrix(
+                [[c, s / root if root else length], [-s * root if z > 0 else s * root, c]]
+            )
             flow = step * flow
         out = []
         for value in (flow[0, 0], flow[0, 1], flow[1, 0], flow[1, 1]):

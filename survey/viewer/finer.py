@@ -28,7 +28,9 @@ def wanted(shown, view):
 
 
 def of_window(shown, view):
-    """The dataset of the view's window, at the centres of equal cells; raises BadInput where it would take too long."""
+    """The dataset of the view's window, at the centres of equal cells; raises BadInput where it
+    would take too long.
+    """
     ends = [axis.inner(*window) for axis, window in zip(shown.axes, view.window, strict=True)]
     sizes = np.array(FINE, float)
     checked = _checked(shown, view, ends, sizes.astype(int))
@@ -36,30 +38,43 @@ def of_window(shown, view):
     if seconds > SECONDS:
         sizes = np.floor(sizes * np.sqrt(SECONDS / seconds)).astype(int)
         if (sizes < LEAST).any():
-            raise BadInput(f"{sizes.prod():,} points take {SECONDS:g} s, too few to show more than the map does")
+            raise BadInput(
+                f"{sizes.prod():,} points take {SECONDS:g} s, too few to show more than the map does"
+            )
         checked = _checked(shown, view, ends, sizes)
     return _solved(checked)
 
 
 def of_point(shown, view):
     """The dataset of the one point that is chosen, anywhere in the map, with all outputs of the file."""
-    return _solved(_workflow(shown, view, dict(zip(shown.dims, view.point, strict=True)), shown.names))
+    return _solved(
+        _workflow(shown, view, dict(zip(shown.dims, view.point, strict=True)), shown.names)
+    )
 
 
 def _checked(shown, view, ends, sizes):
     axes = {}
     for dim, axis, (low, high), size in zip(shown.dims, shown.axes, ends, sizes, strict=True):
         half = 0.5 * (axis.scaled(high) - axis.scaled(low)) / size
-        first, last = (float(axis.unscaled(axis.scaled(end) + side)) for end, side in ((low, half), (high, -half)))
+        first, last = (
+            float(axis.unscaled(axis.scaled(end) + side))
+            for end, side in ((low, half), (high, -half))
+        )
         spacing = "log" if axis.log else "linear"
         axes[dim] = {"start": first, "stop": last, "num": int(size), "spacing": spacing}
-    return _workflow(shown, view, axes, [name for name in (view.name, "verdict") if name in shown.names])
+    return _workflow(
+        shown, view, axes, [name for name in (view.name, "verdict") if name in shown.names]
+    )
 
 
 def _workflow(shown, view, axes, names):
     """The survey's workflow with these tables of axes, its other axes at the numbers of the view."""
     data = workflow_of(shown.ds)
-    fixed = {dim: float(shown.ds[dim].values[at]) for dim, at in view.others.items() if dim in shown.ds.status.dims}
+    fixed = {
+        dim: float(shown.ds[dim].values[at])
+        for dim, at in view.others.items()
+        if dim in shown.ds.status.dims
+    }
     data["axes"] |= fixed | axes
     data["output"] = {"variables": [name for name in names if name != "status"]}
     return workflow.check(data, default_path="window.nc")

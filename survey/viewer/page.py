@@ -38,7 +38,8 @@ QUIET = 300  # ms after the last move before a window is solved afresh
 COPY = "Copy Python for this point"
 SOON = 30  # ms: changes that follow each other faster are handled together
 MOMENT = 0.4  # seconds of reading a large map between two pictures of it
-GROWTH = 1.5  # factor by which more must have been read for a new picture, as drawing takes time too
+# factor by which more must have been read for a new picture, as drawing takes time too
+GROWTH = 1.5
 RINGS = 100  # pixels with undecided or failed points: if there are fewer, each is ringed
 RED = "#D40000"
 CURVE_POINTS = 300_000  # curves with more points are thinned
@@ -54,14 +55,17 @@ class Page:
     def __init__(self, shown, document):
         self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
         self.share = 0.0  # of the map that had been read when it was last drawn
-        self.finer = self.finer_of = self.timer = None  # the Map of the window solved afresh, of which view, and when
+        # the Map of the window solved afresh, of which view, and when
+        self.finer = self.finer_of = self.timer = None
         self.not_finer = ""  # why it is not
         self.caption = _text(styles={"color": "#555555"})
         self.view = self._from_link(document.session_context.request.arguments)
         self._plot()
         self._side()
         sheet = InlineStyleSheet(css=STACK)
-        document.add_root(row(self.plot, self.side, sizing_mode="stretch_both", stylesheets=[sheet]))
+        document.add_root(
+            row(self.plot, self.side, sizing_mode="stretch_both", stylesheets=[sheet])
+        )
         document.title = shown.title
         self._fill()
         self.changed()
@@ -69,7 +73,11 @@ class Page:
             self.choose(self.view.point)
 
     def _from_link(self, arguments):
-        query = [f"{key}={values[0].decode()}" for key, values in arguments.items() if not key.startswith("bokeh-")]
+        query = [
+            f"{key}={values[0].decode()}"
+            for key, values in arguments.items()
+            if not key.startswith("bokeh-")
+        ]
         try:
             self.complaint = ""
             return self.map.read("&".join(query))
@@ -90,18 +98,26 @@ class Page:
             background_fill_color=raster.BACKGROUND, sizing_mode="stretch_both", min_width=300, min_height=300,
             stylesheets=[":host(:focus) {outline: none}", STACKED],
         )  # fmt: skip
-        plot.xaxis.axis_label, plot.yaxis.axis_label = (widgets.label(self.map.ds[dim]) for dim in self.map.dims)
+        plot.xaxis.axis_label, plot.yaxis.axis_label = (
+            widgets.label(self.map.ds[dim]) for dim in self.map.dims
+        )
         plot.grid.visible, plot.toolbar.logo = False, None
         empty = {"x": [], "y": []}
-        self.image = plot.image_rgba(source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE).data_source
-        self.over = plot.image_rgba(source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE).data_source
+        self.image = plot.image_rgba(
+            source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE
+        ).data_source
+        self.over = plot.image_rgba(
+            source=empty | {"image": [], "dw": [], "dh": []}, **widgets.IMAGE
+        ).data_source
         found = boundaries.curves_of(self.map.ds) if "curve_count" in self.map.ds else ()
         self.curves = {name: widgets.curve(plot, name) for name in found}
         style = {"size": 9, "line_color": RED, "line_width": 2, "fill_color": "colour"}
         self.rings = plot.scatter("x", "y", source=empty | {"colour": []}, **style).data_source
         style = {"size": 20, "marker": "circle_x", "line_color": "white", **widgets.HOLLOW}
         self.chosen = plot.scatter("x", "y", source=dict(empty), **style).data_source
-        plot.scatter("x", "y", source=self.chosen, **style | {"line_color": "black", "line_width": 1})
+        plot.scatter(
+            "x", "y", source=self.chosen, **style | {"line_color": "black", "line_width": 1}
+        )
         self.near = Label(**widgets.LABEL)
         self.bar = ColorBar(color_mapper=LinearColorMapper(Viridis256), visible=False)
         plot.add_layout(self.near)
@@ -122,7 +138,11 @@ class Page:
         """Show the boundaries in the plane that is drawn."""
         if not self.curves:
             return
-        others = {dim: at for dim, at in self.view.others.items() if dim in self.map.ds[self.view.name].dims}
+        others = {
+            dim: at
+            for dim, at in self.view.others.items()
+            if dim in self.map.ds[self.view.name].dims
+        }
         ds = boundaries.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
         x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
         thin, found = max(1, x.size // CURVE_POINTS), boundaries.curves_of(ds)
@@ -135,9 +155,13 @@ class Page:
 
     def _side(self):
         ds, view = self.map.ds, self.view
-        self.variable = Select(title="variable", value=view.name, options=self.map.names, width=WIDTH)
+        self.variable = Select(
+            title="variable", value=view.name, options=self.map.names, width=WIDTH
+        )
         _on(self.variable, ("value",), self.changed)
-        label = "; ".join(dict.fromkeys(boundaries.CURVES[name][0] for name in self.curves)).replace("\n", " ")
+        label = "; ".join(
+            dict.fromkeys(boundaries.CURVES[name][0] for name in self.curves)
+        ).replace("\n", " ")
         self.edges = Checkbox(label=label, active=view.boundaries, visible=bool(self.curves))
         _on(self.edges, ("active",), self.changed)
         self.sliders = {
@@ -161,12 +185,16 @@ class Page:
         self.motion.text, self.untrusted = CLICK, None
         self.read = Button(label="Show the file", visible=False)
         self.run = Button(
-            label="I have read it: allow it to run until survey view ends", button_type="warning", visible=False
+            label="I have read it: allow it to run until survey view ends",
+            button_type="warning",
+            visible=False,
         )
         self.read.on_event(events.ButtonClick, lambda _: self.show_source())
         self.run.on_event(events.ButtonClick, lambda _: self.trust())
         self.copy = Button(label=COPY, visible=False)
-        self.copy.js_on_event(events.ButtonClick, CustomJS(args={"copy": self.copy}, code=widgets.COPYING))
+        self.copy.js_on_event(
+            events.ButtonClick, CustomJS(args={"copy": self.copy}, code=widgets.COPYING)
+        )
         self.python = _text()
         texts = [self.legend, self.caption, self.motion, self.read, self.source, self.run]
         texts += [self.copy, self.python, self.known]
@@ -228,7 +256,9 @@ class Page:
         self.soon(self.describe)
 
     def draw(self):
-        """Draw the visible window of the map and its legend, explain the pixels, and go on reading if necessary."""
+        """Draw the visible window of the map and its legend, explain the pixels, and go on reading
+        if necessary.
+        """
         layer = self.map.layer(self.view)
         try:
             sizes = self.plot.inner_width, self.plot.inner_height
@@ -243,20 +273,30 @@ class Page:
         mask, value = layer.pixels(xs, ys)
         image, kinds = raster.paint(mask, value, layer)
         (left, right), (low, high) = xs.ends, ys.ends
-        self.image.data = {"x": [left], "y": [low], "dw": [right - left], "dh": [high - low], "image": [image]}
+        self.image.data = {
+            "x": [left],
+            "y": [low],
+            "dw": [right - left],
+            "dh": [high - low],
+            "image": [image],
+        }
         kinds = self._over(layer, sizes) or self._ring(mask, layer, kinds, xs, ys) or kinds
         self._legend(layer, kinds, value is not None and (np.isnan(value) & (mask == 0)).any())
         caption = self.complaint
         if max(xs.points, ys.points) > 1:
             shows = "its rarest kind" if layer.flagged else "the value largest in magnitude"
-            caption += f"a pixel represents up to {xs.points} × {ys.points} points and shows {shows}"
+            caption += (
+                f"a pixel represents up to {xs.points} × {ys.points} points and shows {shows}"
+            )
         if self.finer:
             number = " × ".join(str(axis.values.size) for axis in self.finer.axes)
             caption = f"{self.complaint}this window is solved afresh, {number} points; the link shows the same"
         elif self.not_finer:
             caption += f"{'; ' * bool(caption)}{self.not_finer}"
         elif finer.wanted(self.map, self.view):
-            caption = f"{self.complaint}narrower than the map's grid: solving this window afresh ..."
+            caption = (
+                f"{self.complaint}narrower than the map's grid: solving this window afresh ..."
+            )
             self.later()
         if layer.waits(xs, ys):
             self.share = layer.overview.share
@@ -272,17 +312,28 @@ class Page:
         self.soon(self.draw if overview.share >= min(1.0, GROWTH * self.share) else self.refine)
 
     def _over(self, base, sizes):
-        """Draw the window that is solved afresh in the colours of the map's layer; {kind: pixels}, or None without."""
+        """Draw the window that is solved afresh in the colours of the map's layer; {kind: pixels},
+        or None without.
+        """
         self.over.data = {"x": [], "y": [], "dw": [], "dh": [], "image": []}
         if not self.finer:
             return None
         axes = self.finer.axes
-        xs, ys = (axis.pixels(*w, size) for axis, w, size in zip(axes, self.view.window, sizes, strict=True))
+        xs, ys = (
+            axis.pixels(*w, size)
+            for axis, w, size in zip(axes, self.view.window, sizes, strict=True)
+        )
         layer = self.finer.layer(self.finer.like(self.view))
         mask, value = layer.pixels(xs, ys)
         image, kinds = raster.paint(mask, value, layer, None if layer.flagged else base.limits)
         (left, right), (low, high) = xs.ends, ys.ends
-        self.over.data = {"x": [left], "y": [low], "dw": [right - left], "dh": [high - low], "image": [image]}
+        self.over.data = {
+            "x": [left],
+            "y": [low],
+            "dw": [right - left],
+            "dh": [high - low],
+            "image": [image],
+        }
         self._ring(mask, layer, kinds, xs, ys)
         return kinds
 
@@ -297,10 +348,16 @@ class Page:
         }
 
     def _legend(self, layer, kinds, empty):
-        """Show the visible kinds with their share of the map, or the colour bar. `empty`: have some pixels no value?"""
+        """Show the visible kinds with their share of the map, or the colour bar. `empty`: have some
+        pixels no value?
+        """
         ds, name = self.map.ds, self.view.name
         shares = self.map.shares(name)
-        entries = [(kind, colour, shares.get(kind, "")) for kind, colour in layer.colours.items() if kind in kinds]
+        entries = [
+            (kind, colour, shares.get(kind, ""))
+            for kind, colour in layer.colours.items()
+            if kind in kinds
+        ]
         entries += [("does not apply", raster.NOT_APPLY, "")] if empty else []
         self.legend.update(text=widgets.legend(entries), visible=bool(entries))
         self.bar.visible = not layer.flagged
@@ -333,9 +390,15 @@ class Page:
         )  # fmt: skip
 
     def _nearest(self, x, y):
-        """(the Map, and indices of the point of it in whose cell the position lies), the window's before the map's."""
+        """(the Map, and indices of the point of it in whose cell the position lies), the window's
+        before the map's.
+        """
         for shown in (self.finer, self.map):
-            point = [axis.nearest(at) for axis, at in zip(shown.axes, (x, y), strict=True)] if shown else [None]
+            point = (
+                [axis.nearest(at) for axis, at in zip(shown.axes, (x, y), strict=True)]
+                if shown
+                else [None]
+            )
             if None not in point:
                 return shown, tuple(point)
         return None, None
@@ -372,7 +435,9 @@ class Page:
             self.motion.text = f"no motion: {html.escape(str(error))}"
         if coords is None:  # what the file holds nearest to it
             x, y = self.view.point
-            self.view.point = self.map.position(tuple(a.nearest(v) for a, v in zip(self.map.axes, (x, y), strict=True)))
+            self.view.point = self.map.position(
+                tuple(a.nearest(v) for a, v in zip(self.map.axes, (x, y), strict=True))
+            )
             coords = self.map.coords(self.view)
         point = survey.point(**coords)
         self.known.text = point._repr_html_()
@@ -387,7 +452,9 @@ class Page:
     def show_source(self):
         """Show the file of an untrusted scene, and offer to run it."""
         if self.untrusted:
-            self.source.text = widgets.text_of(self.untrusted.path, self.untrusted.digest, self.untrusted.text)
+            self.source.text = widgets.text_of(
+                self.untrusted.path, self.untrusted.digest, self.untrusted.text
+            )
             self.read.visible, self.run.visible = False, True
 
     def trust(self):

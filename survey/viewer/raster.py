@@ -1,6 +1,8 @@
-"""A window of a map -> the pixels of a screen, reading only what is needed: maps of 10^8 points and more.
+"""A window of a map -> the pixels of a screen, reading only what is needed: maps of 10^8 points and
+more.
 
-A pixel with many points represents all of them, as in `survey.file.overview`; one without any shows the nearest.
+A pixel with many points represents all of them, as in `survey.file.overview`; one without any shows
+the nearest.
 """
 
 from dataclasses import dataclass
@@ -27,7 +29,8 @@ viridis = colormaps["viridis"]
 class MapAxis:
     """One axis of the map: its increasing coordinates, on the scale on which they are drawn.
 
-    `values` (n,); `log`: is the scale logarithmic; `cells` (n + 1,): ends of the points' cells, on the scale.
+    `values` (n,); `log`: is the scale logarithmic; `cells` (n + 1,): ends of the points' cells, on
+    the scale.
     """
 
     def __init__(self, values):
@@ -36,7 +39,9 @@ class MapAxis:
         self.centres = self.scaled(self.values)
         middles = 0.5 * (self.centres[1:] + self.centres[:-1])
         half = 0.5 * np.diff(self.centres)[[0, -1]] if middles.size else np.full(2, 0.5)
-        self.cells = np.concatenate([[self.centres[0] - half[0]], middles, [self.centres[-1] + half[1]]])
+        self.cells = np.concatenate(
+            [[self.centres[0] - half[0]], middles, [self.centres[-1] + half[1]]]
+        )
 
     def scaled(self, values):
         """Coordinates on the scale."""
@@ -68,7 +73,9 @@ class MapAxis:
         return index if 0 <= index < self.values.size else None
 
     def pixels(self, low, high, number):
-        """The part of the window [low, high] on the map as `Pixels`, the window having `number`; None if outside."""
+        """The part of the window [low, high] on the map as `Pixels`, the window having `number`;
+        None if outside.
+        """
         if self.log:
             low, high = max(low, self.ends[0]), max(high, self.ends[0])
         low, high = self.scaled(low), self.scaled(high)
@@ -79,14 +86,17 @@ class MapAxis:
         edges = np.linspace(*seen, number + 1)
         inside = np.searchsorted(self.centres, edges)
         middles = 0.5 * (edges[1:] + edges[:-1])
-        near = np.clip(np.searchsorted(self.cells, middles, side="right") - 1, 0, self.values.size - 1)
+        near = np.clip(
+            np.searchsorted(self.cells, middles, side="right") - 1, 0, self.values.size - 1
+        )
         starts = np.where(inside[1:] > inside[:-1], inside[:-1], near)
         return Pixels(self, edges, starts, max(int(inside[-1]), int(starts[-1]) + 1))
 
 
 @dataclass(frozen=True)
 class Pixels:
-    """Pixels along an axis: pixel i, from edges[i] to edges[i + 1] on the scale, shows the points from starts[i].
+    """Pixels along an axis: pixel i, from edges[i] to edges[i + 1] on the scale, shows the points
+    from starts[i].
 
     Its points end before the next start, those of the last pixel before `stop`.
     """
@@ -118,14 +128,17 @@ class Pixels:
 
 
 class Layer(Points):
-    """One variable of a survey over two of its axes, for drawing; `others` is {other dimension: index}.
+    """One variable of a survey over two of its axes, for drawing; `others` is {other dimension:
+    index}.
 
     `colours` is {kind: colour} of what a point may be.
     """
 
     def __init__(self, ds, name, dims, others):
         values, states = (
-            ds[key].isel({dim: at for dim, at in others.items() if dim in ds[key].dims}).transpose(*dims)
+            ds[key]
+            .isel({dim: at for dim, at in others.items() if dim in ds[key].dims})
+            .transpose(*dims)
             for key in (name, "status")
         )
         super().__init__(values, states, scene_statuses(ds))
@@ -145,16 +158,25 @@ class Layer(Points):
         return (_large(xs, ys) or not self.flagged) and self.overview.share < 1
 
     def pixels(self, xs, ys):
-        """(mask, value), each (len(ys), len(xs)): the kinds that occur in each pixel; value None for flags."""
+        """(mask, value), each (len(ys), len(xs)): the kinds that occur in each pixel; value None
+        for flags.
+        """
         if _large(xs, ys):
             fx, fy = self.overview.factors
-            window = slice(xs.span.start // fx, -(-xs.stop // fx)), slice(ys.span.start // fy, -(-ys.stop // fy))
-            parts = [part if part is None else part[window] for part in (self.overview.mask, self.overview.rank)]
+            window = (
+                slice(xs.span.start // fx, -(-xs.stop // fx)),
+                slice(ys.span.start // fy, -(-ys.stop // fy)),
+            )
+            parts = [
+                part if part is None else part[window]
+                for part in (self.overview.mask, self.overview.rank)
+            ]
         else:
             fx, fy, parts = 1, 1, self.read(xs.span, ys.span)
         starts = [pixels.starts // f - pixels.span.start // f for pixels, f in ((xs, fx), (ys, fy))]
         mask, rank = (
-            part if part is None else over(union, part, *starts).T for union, part in zip(UNIONS, parts, strict=True)
+            part if part is None else over(union, part, *starts).T
+            for union, part in zip(UNIONS, parts, strict=True)
         )
         return mask, rank if rank is None else unranked(rank)
 
@@ -196,11 +218,14 @@ class CellLayer(Layer):
     def pixels(self, xs, ys):
         """(mask, None): the kinds of the cells that overlap each pixel; of points only where they failed."""
         mask = super().pixels(xs, ys)[0] & sum(self.bits[kind] for kind in (*NO_ANSWER, UNREAD))
-        x, y = (_covered(*ends, pixels.edges) for ends, pixels in zip(self.ends, (xs, ys), strict=True))
+        x, y = (
+            _covered(*ends, pixels.edges) for ends, pixels in zip(self.ends, (xs, ys), strict=True)
+        )
         seen = (x[0] < x[1]) & (y[0] < y[1])
         for flag, code in self.flags.items():
             here = seen & (self.codes == code)
-            # each cell adds 1 to its rectangle of pixels: by differences at the corners, summed along both axes
+            # each cell adds 1 to its rectangle of pixels: by differences at the corners, summed
+            # along both axes
             corners = np.zeros((ys.starts.size + 1, xs.starts.size + 1), np.int32)
             for i, j, sign in ((0, 0, 1), (0, 1, -1), (1, 0, -1), (1, 1, 1)):
                 np.add.at(corners, (y[i][here], x[j][here]), sign)
@@ -209,14 +234,17 @@ class CellLayer(Layer):
 
 
 def _covered(low, high, edges):
-    """The pixels that the intervals overlap: the first, and the one after the last (equal if there is none)."""
+    """The pixels that the intervals overlap: the first, and the one after the last (equal if there
+    is none).
+    """
     position = [(end - edges[0]) / (edges[1] - edges[0]) for end in (low, high)]
     first, stop = np.floor(position[0]), np.ceil(position[1])
     return tuple(np.clip(end, 0, edges.size - 1).astype(int) for end in (first, stop))
 
 
 def paint(mask, value, layer, limits=None):
-    """(colours, {kind: number of pixels with it}): uint32 RGBA (rows, columns) of each pixel's kind or value.
+    """(colours, {kind: number of pixels with it}): uint32 RGBA (rows, columns) of each pixel's kind
+    or value.
 
     `limits` of the colours: by default the layer's own.
     """

@@ -1,6 +1,7 @@
 """The server behind `survey view`: on the loopback interface, and only for whoever has the token.
 
-The token comes first in the path of the address, so that a request without it finds neither page nor socket.
+The token comes first in the path of the address, so that a request without it finds neither page
+nor socket.
 """
 
 import asyncio
@@ -35,24 +36,30 @@ HOST = "127.0.0.1"  # loopback: no other machine reaches it
 def serve(path, port, link="", say=print, browser=False, trust_scene=False):
     """Serve the survey in the file `path` to this machine, until interrupted (Ctrl-C).
 
-    `link` is the address of an earlier view, or its query; that view is opened, also in the user's browser if
-    `browser`. `say` is called with lines for the user. `trust_scene`: an untrusted scene may run. Raises BadInput,
-    Damaged.
+    `link` is the address of an earlier view, or its query; that view is opened, also in the user's
+    browser if `browser`. `say` is called with lines for the user. `trust_scene`: an untrusted scene
+    may run. Raises BadInput, Damaged.
     """
     shown = Map(path)
     if trust_scene:
         trust.allow(shown.ds.attrs.get("scene_hash", ""))
     query = urlsplit(link).query if "?" in link else link
     if query and "=" not in query:
-        raise BadInput(f"--link {short(link)}: this is not the address of a view; copy it from the browser")
+        raise BadInput(
+            f"--link {short(link)}: this is not the address of a view; copy it from the browser"
+        )
     query = f"?{shown.link(shown.read(query))}" if query else ""
 
     async def run():
         server, address = start(shown, port)
         say(f"{path}: {counted(shown.ds.status.size, 'point')} at {address}{query}")
-        say("Only this machine can reach it, and only with the token in that address. Ctrl-C stops it.")
+        say(
+            "Only this machine can reach it, and only with the token in that address. Ctrl-C stops it."
+        )
         at = urlsplit(address).port
-        say(f"From another machine: ssh -L {at}:{HOST}:{at} THIS_MACHINE, and open the same address there.")
+        say(
+            f"From another machine: ssh -L {at}:{HOST}:{at} THIS_MACHINE, and open the same address there."
+        )
         with _redirect(address + query) if browser else nullcontext() as page:
             if browser:
                 webbrowser.open(page)
@@ -69,7 +76,9 @@ def serve(path, port, link="", say=print, browser=False, trust_scene=False):
 
 
 def start(shown, port):
-    """(server, its address with a new token), on the running event loop; raises BadInput if the port is taken."""
+    """(server, its address with a new token), on the running event loop; raises BadInput if the
+    port is taken.
+    """
     token, port = secrets.token_urlsafe(24), port or _free()
     try:
         server = Server(
@@ -79,7 +88,9 @@ def start(shown, port):
             default_handler_class=Refused,
         )  # fmt: skip
     except OSError as error:
-        raise BadInput(f"--port {port}: {error.strerror}; choose another, or 0 for any free port") from None
+        raise BadInput(
+            f"--port {port}: {error.strerror}; choose another, or 0 for any free port"
+        ) from None
     server.start()
     return server, f"http://{HOST}:{port}/{token}/"
 
@@ -88,7 +99,8 @@ def start(shown, port):
 def _redirect(address):
     """The address of a file, readable only by this user, that redirects to `address`.
 
-    The browser is given this one, since everyone on this machine can read the arguments of its processes.
+    The browser is given this one, since everyone on this machine can read the arguments of its
+    processes.
     """
     with tempfile.NamedTemporaryFile("w", suffix=".html") as file:
         file.write(f'<meta http-equiv="refresh" content="0; url={html.escape(address)}">')
@@ -108,4 +120,6 @@ class Refused(RequestHandler):
 
     def prepare(self):
         self.set_status(403)
-        self.finish("403: this address lacks the token of the running survey view; open the address that it printed.\n")
+        self.finish(
+            "403: this address lacks the token of the running survey view; open the address that it printed.\n"
+        )

@@ -25,7 +25,9 @@ LINES = 6  # outputs shown for the point under the pointer
 
 @dataclass
 class View:
-    """A variable, the window [(x low, high), (y low, high)], indices along other dimensions, the chosen position."""
+    """A variable, the window [(x low, high), (y low, high)], indices along other dimensions, the
+    chosen position.
+    """
 
     name: str
     boundaries: bool = True
@@ -35,7 +37,8 @@ class View:
 
 
 class Map:
-    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file without a map.
+    """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file
+    without a map.
 
     Or a survey `ds` in memory.
     """
@@ -52,19 +55,31 @@ class Map:
         self.ds = ds.isel({dim: slice(None, None, -1) for dim in down})
         self.axes = [raster.MapAxis(self.ds[dim].values) for dim in self.dims]
         dims = set(ds.status.dims)
-        self.names = [name for name, v in ds.data_vars.items() if dims <= set(v.dims) and not name.endswith("_error")]
+        self.names = [
+            name
+            for name, v in ds.data_vars.items()
+            if dims <= set(v.dims) and not name.endswith("_error")
+        ]
         self.title, self.options = plain(ds.attrs.get("title", "")), options_in_words(ds)
         # further dimensions: of the survey, and of some outputs
-        self.others = list(dict.fromkeys(dim for name in self.names for dim in ds[name].dims if dim not in self.dims))
+        self.others = list(
+            dict.fromkeys(
+                dim for name in self.names for dim in ds[name].dims if dim not in self.dims
+            )
+        )
         self._layers = lru_cache(maxsize=8)(self._layer)
 
     def layer(self, view):
         """The view's variable, ready to be drawn; the last few are cached."""
-        return self._layers(view.name, tuple((dim, view.others[dim]) for dim in self.further_dims(view.name)))
+        return self._layers(
+            view.name, tuple((dim, view.others[dim]) for dim in self.further_dims(view.name))
+        )
 
     def like(self, view):
         """The View of this map that shows what the view of another does."""
-        return replace(view, others={dim: at for dim, at in view.others.items() if dim in self.others})
+        return replace(
+            view, others={dim: at for dim, at in view.others.items() if dim in self.others}
+        )
 
     def further_dims(self, name):
         """The dimensions of a variable other than the map's two."""
@@ -87,26 +102,38 @@ class Map:
         view.boundaries = given.get("boundaries") != "0"
         for at, axis in zip("xy", self.axes, strict=True):
             view.window.append(_numbers(at, given[at], 2) if at in given else axis.ends)
-            if not view.window[-1][0] < view.window[-1][1] or axis.pixels(*view.window[-1], 1) is None:
-                raise BadInput(f"{at} = {given[at]}: give low,high of a range that overlaps the map's, {axis.range}")
+            if (
+                not view.window[-1][0] < view.window[-1][1]
+                or axis.pixels(*view.window[-1], 1) is None
+            ):
+                raise BadInput(
+                    f"{at} = {given[at]}: give low,high of a range that overlaps the map's, {axis.range}"
+                )
         if "point" in given:
             numbers = _numbers("point", given["point"], 2)
             view.point = numbers
-            if None in [axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True)]:
+            if None in [
+                axis.nearest(value) for axis, value in zip(self.axes, numbers, strict=True)
+            ]:
                 raise BadInput(
                     f"point = {given['point']}: it lies outside the map, {' by '.join(a.range for a in self.axes)}"
                 )
         for dim in self.others:
             (value,) = _numbers(f"at_{dim}", given.get(f"at_{dim}", "0"), 1)
             if value not in range(self.ds.sizes[dim]):
-                raise BadInput(f"at_{dim} = {value:g}: it must be an index of that axis, 0 to {self.ds.sizes[dim] - 1}")
+                raise BadInput(
+                    f"at_{dim} = {value:g}: it must be an index of that axis, 0 to {self.ds.sizes[dim] - 1}"
+                )
             view.others[dim] = int(value)
         return view
 
     def link(self, view):
         """The query that `read` reads."""
         query = {"var": view.name}
-        query |= {at: ",".join(repr(float(end)) for end in ends) for at, ends in zip("xy", view.window, strict=True)}
+        query |= {
+            at: ",".join(repr(float(end)) for end in ends)
+            for at, ends in zip("xy", view.window, strict=True)
+        }
         query |= {} if view.boundaries else {"boundaries": 0}
         query |= {f"at_{dim}": at for dim, at in view.others.items() if at}
         if view.point is not None:
@@ -119,19 +146,30 @@ class Map:
         if name == "verdict" and "area_fraction" in ds:
             schema.areas(ds)
             shares = zip(
-                flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, ds.area_fraction_error.values, strict=True
+                flag_codes(ds.area_verdict.attrs),
+                ds.area_fraction.values,
+                ds.area_fraction_error.values,
+                strict=True,
             )
-            return {flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares}
+            return {
+                flag: f" ({percent(share, bar)})".replace("+-", "±") for flag, share, bar in shares
+            }
         texts = [str(ds.attrs.get(f"{key}_counts", "")) for key in ("status", name)]
         counts = (part.rpartition(": ") for part in ", ".join(texts).split(", "))
-        return {flag: f" ({int(number):,} in all)" for flag, _, number in counts if re.fullmatch("[0-9]{1,18}", number)}
+        return {
+            flag: f" ({int(number):,} in all)"
+            for flag, _, number in counts
+            if re.fullmatch("[0-9]{1,18}", number)
+        }
 
     def position(self, point):
         """The coordinates (x, y) of a point's indices."""
         return tuple(float(axis.values[at]) for axis, at in zip(self.axes, point, strict=True))
 
     def coords(self, view):
-        """{axis: value} of the map's point at the chosen position, for the survey's accessor; None if there is none."""
+        """{axis: value} of the map's point at the chosen position, for the survey's accessor; None
+        if there is none.
+        """
         point = [axis.nearest(at) for axis, at in zip(self.axes, view.point, strict=True)]
         if None in point or self.position(point) != tuple(view.point):
             return None
@@ -147,8 +185,13 @@ class Map:
         names = dict.fromkeys([view.name, *(["verdict"] if "verdict" in ds else []), *self.names])
         names = [name for name in names if name != "status"][:LINES]
         bars = [f"{name}_error" for name in names if f"{name}_error" in ds]
-        others = {dim: at for dim, at in view.others.items() if dim in ds.dims}  # a window solved afresh has fewer
-        here = ds[[*names, *bars, "status"]].isel(dict(zip(self.dims, point, strict=True)) | others).load()
+        # a window solved afresh has fewer
+        others = {dim: at for dim, at in view.others.items() if dim in ds.dims}
+        here = (
+            ds[[*names, *bars, "status"]]
+            .isel(dict(zip(self.dims, point, strict=True)) | others)
+            .load()
+        )
         yield ", ".join(f"{dim} = {short(here[dim].values)}" for dim in ds.status.dims)
         if view.name == "verdict" and "cell_verdict" in ds:
             yield from self._cell(*self.position(point))
@@ -158,18 +201,26 @@ class Map:
             if name == "verdict" and not has_verdict(here):
                 continue
             value = reading(here, name, f"{name}_error" in bars).replace("+-", "±")
-            yield f"{name}: {value.replace('_', ' ')}" if "flag_values" in here[name].attrs else f"{name} = {value}"
+            yield (
+                f"{name}: {value.replace('_', ' ')}"
+                if "flag_values" in here[name].attrs
+                else f"{name} = {value}"
+            )
 
     def _cell(self, *position):
         """Yield the verdict of the cell of a refined map that contains the point."""
         inside, ds = True, self.ds
         for dim, value in zip(self.dims, position, strict=True):
-            inside &= (ds[f"cell_{dim}_low"].values <= value) & (value <= ds[f"cell_{dim}_high"].values)
+            inside &= (ds[f"cell_{dim}_low"].values <= value) & (
+                value <= ds[f"cell_{dim}_high"].values
+            )
         yield from (f"cell: {meaning(found)}" for found in ds.cell_verdict[inside][:1])
 
 
 def _check(path, ds):
-    """Raise BadInput or Damaged unless the axes have values, the first two monotonic, and the cells are consistent."""
+    """Raise BadInput or Damaged unless the axes have values, the first two monotonic, and the cells
+    are consistent.
+    """
     for dim in ds.status.dims:
         if dim not in ds.coords:
             raise BadInput(f"{path}: the axis {dim} has no values, so there is no map to view")
@@ -177,13 +228,19 @@ def _check(path, ds):
         schema.cells(ds)
     for dim in ds.status.dims[:2]:
         if ds[dim].dtype.kind not in "iuf":
-            raise BadInput(f"{path}: the axis {dim} holds names, and a viewer shows axes of numbers; use survey plot")
+            raise BadInput(
+                f"{path}: the axis {dim} holds names, and a viewer shows axes of numbers; use survey plot"
+            )
         values = ds[dim].values.astype(float)
         if abs(values).max() > FAR:
-            raise Damaged(f"{path}: the axis {dim} extends beyond {FAR:g}, so there is no map to view")
+            raise Damaged(
+                f"{path}: the axis {dim} extends beyond {FAR:g}, so there is no map to view"
+            )
         steps = np.diff(values)
         if not ((steps > 0).all() or (steps < 0).all()):
-            raise Damaged(f"{path}: the values of the axis {dim} are not monotonic, so there is no map to view")
+            raise Damaged(
+                f"{path}: the values of the axis {dim} are not monotonic, so there is no map to view"
+            )
 
 
 def short(value):
@@ -198,5 +255,7 @@ def _numbers(key, text, number):
     except ValueError:
         found = ()
     if len(found) != number or not all(map(isfinite, found)):
-        raise BadInput(f"{key} = {text}: it must be {number} number{'s, separated by a comma' * (number > 1)}")
+        raise BadInput(
+            f"{key} = {text}: it must be {number} number{'s, separated by a comma' * (number > 1)}"
+        )
     return found

@@ -32,7 +32,11 @@ def curve(plot, name):
     """A renderer of the boundaries of a class, drawn as in `survey.show.boundaries`."""
     _, line = CURVES[name]
     if "marker" in line:
-        style = {"marker": MARKERS[line["marker"]], "size": 1.6 * line["ms"], "line_color": line["mec"]}
+        style = {
+            "marker": MARKERS[line["marker"]],
+            "size": 1.6 * line["ms"],
+            "line_color": line["mec"],
+        }
         return plot.scatter("x", "y", source={"x": [], "y": []}, fill_color=line["mfc"], **style)
     dash = "solid" if line["ls"] == "-" else list(line["ls"][1])
     style = {"line_dash": dash, "line_width": 1.5 * line["lw"], "line_color": line["color"]}
@@ -51,7 +55,10 @@ def legend(entries):
 def _swatch(kind, colour):
     if kind not in raster.NO_ANSWER:
         return colour
-    lines = [f"repeating-linear-gradient({angle}deg,#777 0 1px,transparent 1px 4px)" for angle in (45, 135)]
+    lines = [
+        f"repeating-linear-gradient({angle}deg,#777 0 1px,transparent 1px 4px)"
+        for angle in (45, 135)
+    ]
     return ",".join(lines[: 2 if kind == "failed" else 1]) + ",white"
 
 
@@ -64,7 +71,9 @@ def picture(drawn):
 
 def labels(values):
     """A slider's formatter, from positions to the values there."""
-    return CustomJSTickFormatter(args={"values": [short(value) for value in values]}, code="return values[tick]")
+    return CustomJSTickFormatter(
+        args={"values": [short(value) for value in values]}, code="return values[tick]"
+    )
 
 
 def literal(text):
@@ -76,7 +85,9 @@ def text_of(path, digest, text):
     """HTML of a scene's file, for a reader who must decide whether it may run: nothing is hidden."""
     style = "max-height:360px;overflow:auto;background:#f4f4f4;border:1px solid #888;padding:6px;white-space:pre-wrap"
     content = html.escape(plain(text, len(text), lines=True))
-    return f"<b>{html.escape(plain(path))}</b><br>sha256 {digest}<pre style='{style}'>{content}</pre>"
+    return (
+        f"<b>{html.escape(plain(path))}</b><br>sha256 {digest}<pre style='{style}'>{content}</pre>"
+    )
 
 
 def code(text):
@@ -89,6 +100,11 @@ def label(variable, tex=True):
     """`long name, symbol (unit)`."""
     symbol, units = variable.attrs.get("symbol", ""), literal(variable.attrs.get("units", "1"))
     text = literal(variable.attrs.get("long_name", variable.name))
-    if symbol and tex and not re.search(r"[\\${}^~]", text + units) and formula(symbol, "") == f"${symbol}$":
+    if (
+        symbol
+        and tex
+        and not re.search(r"[\\${}^~]", text + units)
+        and formula(symbol, "") == f"${symbol}$"
+    ):
         text = re.sub(r"([_%&#])", r"\\\1", text) + f", $${symbol}$$"  # TeX reads the text, too
     return text + ("" if units in ("1", "") else f" ({units})")

@@ -1,4 +1,6 @@
-"""`survey verify` solves points again by another method: sound maps have no complaints, a planted value has one."""
+"""`survey verify` solves points again by another method: sound maps have no complaints, a planted
+value has one.
+"""
 
 from pathlib import Path
 
@@ -25,7 +27,9 @@ def maps():
     """(scene, options, axes) of small maps of every scene and every value of its options."""
     for case in questions():
         scene, options = case.values
-        axes = {key: np.sort(np.atleast_1d(v)).tolist() for key, v in draw(scene, options, 5).items()}
+        axes = {
+            key: np.sort(np.atleast_1d(v)).tolist() for key, v in draw(scene, options, 5).items()
+        }
         slow = [pytest.mark.slow] * (case.id == "gyrostat-fate")
         yield pytest.param(scene.__name__.rpartition(".")[2], options, axes, id=case.id, marks=slow)
     for scene, options, axes in OTHERS:
@@ -33,14 +37,23 @@ def maps():
 
 
 @pytest.mark.parametrize(("scene", "options", "axes"), list(maps()))
-def test_a_sound_map_has_no_complaints_and_every_planted_value_is_found(scene, options, axes, tmp_path):
-    listed = {key: {"values": values} if len(values) > 1 else values[0] for key, values in axes.items()}
-    ds = survey.run({"scene": scene, "options": options, "axes": listed}, output=tmp_path / "map.nc")
+def test_a_sound_map_has_no_complaints_and_every_planted_value_is_found(
+    scene, options, axes, tmp_path
+):
+    listed = {
+        key: {"values": values} if len(values) > 1 else values[0] for key, values in axes.items()
+    }
+    ds = survey.run(
+        {"scene": scene, "options": options, "axes": listed}, output=tmp_path / "map.nc"
+    )
     healthy = audit(ds, 12)
-    assert healthy["complaints"] == [] and healthy["points"] >= min(ds.status.size, 12) // 2, healthy
+    assert healthy["complaints"] == [] and healthy["points"] >= min(ds.status.size, 12) // 2, (
+        healthy
+    )
     names = {name for name in ds.data_vars if not name.endswith("_error") and name != "status"}
     fills = {o.name: o.fill for o in find(scene)[1].OUTPUTS if o.flags is None}
-    for some in (names & {"verdict"}, names - {"verdict"}):  # beside a wrong verdict counts say nothing
+    # beside a wrong verdict counts say nothing
+    for some in (names & {"verdict"}, names - {"verdict"}):
         planted = ds.copy(deep=True)
         wrong = {name for name in some if _plant(planted, name, fills.get(name))}
         found = {line.split(" at ")[0] for line in audit(planted, 1000)["complaints"]}
@@ -51,7 +64,9 @@ def test_a_sound_map_has_no_complaints_and_every_planted_value_is_found(scene, o
 def _plant(ds, name, fill):
     """Is there a known value of `name`, now wrong: just beyond its bar, or another code?"""
     values = ds[name].values
-    known = np.argwhere(np.isfinite(values) if name in error_bars(ds) else (values >= 0) & (values != fill))
+    known = np.argwhere(
+        np.isfinite(values) if name in error_bars(ds) else (values >= 0) & (values != fill)
+    )
     if not len(known):
         return False
     where = tuple(known[len(known) // 2])
@@ -66,13 +81,23 @@ def _plant(ds, name, fill):
 def test_edges_and_cells_are_solved_again(tmp_path):
     axes = {"a": {"start": 0.5, "stop": 9.5, "num": 5}, "q": {"start": 0.5, "stop": 5.0, "num": 4}}
     workflow = {"scene": "mathieu", "axes": axes, "output": {"variables": ["verdict"]}}
-    ds = survey.run(workflow | {"boundaries": {"axis": "a"}, "refine": {"width": 0.05}}, output=tmp_path / "map.nc")
+    ds = survey.run(
+        workflow | {"boundaries": {"axis": "a"}, "refine": {"width": 0.05}},
+        output=tmp_path / "map.nc",
+    )
     sound = audit(ds, 30)
-    assert sound["complaints"] == [] and sound["cells"] == 30 and sound["edges"] == ds.sizes["edge"] > 10
+    assert (
+        sound["complaints"] == []
+        and sound["cells"] == 30
+        and sound["edges"] == ds.sizes["edge"] > 10
+    )
     planted = ds.copy(deep=True)
     planted.edge_position[5] += 1e-7
     (line,) = audit(planted, 1000)["complaints"]
-    assert line.startswith("edge_position at q = ") and "has no zero within its error bar, by dop853" in line
+    assert (
+        line.startswith("edge_position at q = ")
+        and "has no zero within its error bar, by dop853" in line
+    )
     planted = ds.copy(deep=True)
     largest = ((ds.cell_a_high - ds.cell_a_low) * (ds.cell_verdict != -1)).values.argmax()
     planted.cell_verdict[largest] = 1 - ds.cell_verdict[largest]

@@ -1,4 +1,6 @@
-"""Boundaries along a line and margins of points, against the files' [boundaries], closed forms and kept values."""
+"""Boundaries along a line and margins of points, against the files' [boundaries], closed forms and
+kept values.
+"""
 
 import csv
 import sys
@@ -20,7 +22,11 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_edges_of_a_row_are_those_of_boundaries(tmp_path):
-    asked = {"scene": "mathieu", "axes": {"q": 1.5, "a": {"start": -3.0, "stop": 30.0, "num": 3}}, "boundaries": {}}
+    asked = {
+        "scene": "mathieu",
+        "axes": {"q": 1.5, "a": {"start": -3.0, "stop": 30.0, "num": 3}},
+        "boundaries": {},
+    }
     ds = survey.run(asked, output=tmp_path / "m.nc")
     found = survey.edge("mathieu", along="a", a=(-3.0, 30.0), q=1.5)
     np.testing.assert_array_equal(found.edge, ds.edge_position)
@@ -30,9 +36,16 @@ def test_edges_of_a_row_are_those_of_boundaries(tmp_path):
 
 
 def test_characteristic_values_of_mathieu():
-    """DLMF 28.8 / Abramowitz-Stegun table 20.1: a_0, b_1, a_1, b_2 at q = 5 (to the ten digits given there)."""
+    """DLMF 28.8 / Abramowitz-Stegun table 20.1: a_0, b_1, a_1, b_2 at q = 5 (to the ten digits
+    given there).
+    """
     special = pytest.importorskip("scipy.special")
-    exact = sorted([*(special.mathieu_a(r, 5.0) for r in range(4)), *(special.mathieu_b(r, 5.0) for r in range(1, 4))])
+    exact = sorted(
+        [
+            *(special.mathieu_a(r, 5.0) for r in range(4)),
+            *(special.mathieu_b(r, 5.0) for r in range(1, 4)),
+        ]
+    )
     found = survey.edge("mathieu", along="a", a=(-7.0, 12.0), q=5.0)
     np.testing.assert_allclose(found.edge, [a for a in exact if a < 12.0], atol=1e-9)
     assert (found.edge_error < 1e-12).all()
@@ -41,10 +54,15 @@ def test_characteristic_values_of_mathieu():
 def test_near_gives_the_neighbours():
     everything = survey.edge("satellite", along="rho", rho=(0.6, 2.5), k=0.5)
     near = survey.edge("satellite", along="rho", near=1.2, k=0.5)
-    below, above = everything.edge[everything.edge < 1.2].max(), everything.edge[everything.edge > 1.2].min()
+    below, above = (
+        everything.edge[everything.edge < 1.2].max(),
+        everything.edge[everything.edge > 1.2].min(),
+    )
     bar = float(everything.edge_error.max()) + float(near.edge_error.max())
     np.testing.assert_allclose(near.edge, [below, above], atol=bar, rtol=0)
-    verdicts = survey.evaluate("satellite", k=0.5, rho=[float(near.edge[0]) + s for s in (-1e-9, 1e-9)]).verdict
+    verdicts = survey.evaluate(
+        "satellite", k=0.5, rho=[float(near.edge[0]) + s for s in (-1e-9, 1e-9)]
+    ).verdict
     assert set(verdicts.values) == {0, 1}
 
 
@@ -52,7 +70,9 @@ def test_the_whole_domain_of_an_amplitude():
     found = survey.edge("satellite", along="amplitude", inertia_ratio=0.19)
     assert (np.diff(found.edge) > 0).all() and found.edge.size > 5
     at = float(found.edge[0])
-    verdicts = survey.evaluate("satellite", amplitude=[at - 1e-9, at + 1e-9], inertia_ratio=0.19).verdict.values
+    verdicts = survey.evaluate(
+        "satellite", amplitude=[at - 1e-9, at + 1e-9], inertia_ratio=0.19
+    ).verdict.values
     assert set(verdicts) == {0, 1}
 
 
@@ -62,13 +82,23 @@ def test_danbys_curves_agree_with_the_kept_table(tmp_path):
     found = survey.edge("libration_elliptic", along="mu", mu=(0.001, 0.06), e=0.1)
     names = found.edge_class.attrs["flag_meanings"].split()
     assert [names[code] for code in found.edge_class.values] == ["B", "A", "KC"]
-    for name, at, bar in zip(["B", "A", "KC"], found.edge.values, found.edge_error.values, strict=True):
+    for name, at, bar in zip(
+        ["B", "A", "KC"], found.edge.values, found.edge_error.values, strict=True
+    ):
         row = kept[name, "0.1"]
         assert abs(at - float(row["mu"])) <= bar + float(row["mu_error"]) and bar < 1e-12
-    axes = {"e": {"start": 0.0, "stop": 0.4, "num": 3}, "mu": {"start": 0.001, "stop": 0.06, "num": 3}}
-    ds = survey.run({"scene": "libration_elliptic", "axes": axes, "boundaries": {}}, output=tmp_path / "d.nc")
+    axes = {
+        "e": {"start": 0.0, "stop": 0.4, "num": 3},
+        "mu": {"start": 0.001, "stop": 0.06, "num": 3},
+    }
+    ds = survey.run(
+        {"scene": "libration_elliptic", "axes": axes, "boundaries": {}}, output=tmp_path / "d.nc"
+    )
     table = ds.survey.boundary(kind="KC")
-    sides = [survey.evaluate("libration_elliptic", e=table.e, mu=table.mu + s).verdict.values for s in (-1e-9, 1e-9)]
+    sides = [
+        survey.evaluate("libration_elliptic", e=table.e, mu=table.mu + s).verdict.values
+        for s in (-1e-9, 1e-9)
+    ]
     inside = (table.e.values > 0.0) & (table.e.values < 0.31)
     assert inside.sum() > 10 and (sides[0][inside] == 1).all() and (sides[1][inside] == 0).all()
 
@@ -78,12 +108,15 @@ def test_the_line_of_closed_curves_and_a_run_of_one_axis(tmp_path):
     found = survey.edge("brun", along="l", l=(-2.0, 3.0), sign="1", **numbers)
     axes = {"l": {"start": -2.0, "stop": 3.0, "num": 5}, **numbers}
     ds = survey.run(
-        {"scene": "brun", "options": {"sign": "1"}, "axes": axes, "boundaries": {}}, output=tmp_path / "b.nc"
+        {"scene": "brun", "options": {"sign": "1"}, "axes": axes, "boundaries": {}},
+        output=tmp_path / "b.nc",
     )
     np.testing.assert_array_equal(ds.edge_position, found.edge)
     assert ds.survey.boundary(kind="separatrix").sizes["place"] == 1
     at = float(found.edge[found.edge_class == 1][0])
-    near = survey.evaluate("brun", l=[at - 1e-6, at + 1e-6], sign="1", **numbers).separatrix_distance
+    near = survey.evaluate(
+        "brun", l=[at - 1e-6, at + 1e-6], sign="1", **numbers
+    ).separatrix_distance
     assert (abs(near) < 3e-6).all()
 
 
@@ -94,13 +127,17 @@ def test_three_axes_have_boundaries_on_every_plane(tmp_path):
     )
     axes = {"c": {"values": [0.0, 0.5]}, "q": {"start": 0.5, "stop": 1.5, "num": 3},
             "a": {"start": -1.0, "stop": 5.0, "num": 3}}  # fmt: skip
-    ds = survey.run({"scene": str(tmp_path / "z.py"), "axes": axes, "boundaries": {}}, output=tmp_path / "o.nc")
+    ds = survey.run(
+        {"scene": str(tmp_path / "z.py"), "axes": axes, "boundaries": {}}, output=tmp_path / "o.nc"
+    )
     assert ds.edge_count.dims == ("c", "q") and int(ds.edge_count.sum()) == ds.sizes["edge"]
     table = ds.survey.boundary()
     planes = [table.isel(place=np.flatnonzero(table.c.values == c)) for c in (0.0, 0.5)]
     for c, plane in zip((0.0, 0.5), planes, strict=True):
         special = pytest.importorskip("scipy.special")
-        at = plane.isel(place=np.flatnonzero((plane["index"].values == 1) & (plane.kind.values == 0)))
+        at = plane.isel(
+            place=np.flatnonzero((plane["index"].values == 1) & (plane.kind.values == 0))
+        )
         expected = special.mathieu_a(1, at.q.values)
         other = special.mathieu_b(1, at.q.values)
         off = np.minimum(abs(at.a.values + c - expected), abs(at.a.values + c - other))
@@ -116,7 +153,11 @@ def test_a_plane_that_crosses_those_of_the_curves_holds_none(tmp_path, monkeypat
         parameters=("a", "q", "r"),
         even=True,
     )
-    axes = {"a": {"start": 0.0, "stop": 4.0, "num": 9}, "q": {"values": [0.5, 1.0]}, "r": {"values": [0.0, 1.0]}}
+    axes = {
+        "a": {"start": 0.0, "stop": 4.0, "num": 9},
+        "q": {"values": [0.5, 1.0]},
+        "r": {"values": [0.0, 1.0]},
+    }
     ds = survey.run({"scene": hill, "axes": axes, "boundaries": {}}, output=tmp_path / "o.nc")
     assert ds.attrs["boundaries"] == "r" and (ds.curve_r.values == 1.0).any()
     assert not boundaries.curves_of(boundaries.in_plane(ds, ds.verdict.isel(r=1)))
@@ -127,11 +168,15 @@ def test_a_plane_that_crosses_those_of_the_curves_holds_none(tmp_path, monkeypat
     np.testing.assert_array_equal(part.curve_a, here.curve_a)
     assert part.survey.boundary().sizes["place"] == here.sizes["curve_point"]
     assert len(part.survey.map().lines) == here.sizes["curve"]
-    assert ds.survey.slice(r=1.0).sizes["curve"] == 0 and "curve_count" not in ds.survey.slice(q=1.0, r=1.0)
+    assert ds.survey.slice(r=1.0).sizes["curve"] == 0 and "curve_count" not in ds.survey.slice(
+        q=1.0, r=1.0
+    )
     chosen = point.plane(ds, {"q": "1"})  # as --at q=1 does
     assert chosen.status.dims == ("a", "r", "q")
     seen = []
-    monkeypatch.setattr(page, "_curves", lambda ds, axes: seen.append(ds) or {"curves": [], "edges": []})
+    monkeypatch.setattr(
+        page, "_curves", lambda ds, axes: seen.append(ds) or {"curves": [], "edges": []}
+    )
     monkeypatch.setattr(page, "_series", lambda *_: (None, "of points"))
     page.made(chosen)
     assert len(seen) == 1 and (seen[0].curve_q.values == 1.0).all()
@@ -146,12 +191,17 @@ def test_margins_are_the_distances_to_the_edges():
     assert float(found.edge.sel(parameter="rho")) == near[abs(near - 1.2).argmin()]
     np.testing.assert_array_equal(found.distance, found.edge - found.value)
     text = repr(ds.survey.point(k=0.5))
-    assert f"rho = {float(found.edge.sel(parameter='rho')):.6g} +- " in text and "nearest boundaries" in text
+    assert (
+        f"rho = {float(found.edge.sel(parameter='rho')):.6g} +- " in text
+        and "nearest boundaries" in text
+    )
 
 
 def test_margins_that_take_long_have_a_bar(monkeypatch, capsys):
     monkeypatch.setattr(announce, "is_watched", lambda: True)
-    monkeypatch.setattr(announce, "console", lambda: Console(file=sys.stderr, force_terminal=True, width=120))
+    monkeypatch.setattr(
+        announce, "console", lambda: Console(file=sys.stderr, force_terminal=True, width=120)
+    )
     ds = survey.evaluate("mathieu", a=2.0, q=1.5)
     capsys.readouterr()
     ds.survey.margin()
@@ -169,28 +219,41 @@ def test_boundaries_of_a_gyrostats_fates():
     assert (found.edge_error < 1e-9).all() and found.edge_class.values.tolist() == [0, 0]
     w0 = [low - 1e-7, low + 1e-7, high - 1e-7, high + 1e-7]
     fates = survey.evaluate("gyrostat", w0=w0, question="fate", **system)
-    below, first, last, above = zip(fates.verdict.values, fates.limit_phi.values.round(6), strict=True)
+    below, first, last, above = zip(
+        fates.verdict.values, fates.limit_phi.values.round(6), strict=True
+    )
     assert first == last and below != first and above != last
 
 
 @pytest.mark.slow
 def test_folds_of_a_gyrostats_equilibria_lie_on_the_astroid():
     """g = -d cos sin + s2 cos - s3 sin: equilibria meet where s2^(2/3) + s3^(2/3) = d^(2/3)."""
-    found = survey.edge("gyrostat", along="s2", s2=(0.2, 1.0), question="portrait", b12=0.7, b31=-0.4, d=1.0, s3=0.1)
+    found = survey.edge(
+        "gyrostat", along="s2", s2=(0.2, 1.0), question="portrait", b12=0.7, b31=-0.4, d=1.0, s3=0.1
+    )
     names = found.edge_class.attrs["flag_meanings"].split()
     (fold,) = [k for k, code in enumerate(found.edge_class.values) if names[code] == "fold"]
-    assert abs(found.edge.values[fold] - (1.0 - 0.1 ** (2 / 3)) ** 1.5) <= found.edge_error.values[fold] < 1e-10
+    assert (
+        abs(found.edge.values[fold] - (1.0 - 0.1 ** (2 / 3)) ** 1.5)
+        <= found.edge_error.values[fold]
+        < 1e-10
+    )
 
 
 @pytest.mark.slow
 def test_the_homoclinic_curve_of_an_own_abel_equation():
-    """I = 0.2545..., the current at which a junction's branch returns to its saddle: the bracket of josephson_curve."""
+    """I = 0.2545..., the current at which a junction's branch returns to its saddle: the bracket of
+    josephson_curve.
+    """
     rows = (ROOT / "results" / "josephson_curve.md").read_text().splitlines()
     (row,) = [line.split("|") for line in rows if line.startswith("| 0.2 |")]
     scene = str(ROOT / "workflows" / "josephson.py")
     found = survey.edge(scene, along="I", I=(0.2, 0.3), question="portrait", a=0.2)
     assert found.edge.size == 1
-    assert abs(float(found.edge[0]) - float(row[2])) <= float(row[3]) + float(found.edge_error[0]) + 1e-10
+    assert (
+        abs(float(found.edge[0]) - float(row[2]))
+        <= float(row[3]) + float(found.edge_error[0]) + 1e-10
+    )
 
 
 def test_what_has_no_boundaries_is_told():
@@ -207,8 +270,12 @@ def test_what_has_no_boundaries_is_told():
         survey.edge("gyrostat_body", along="lambda1")
     with pytest.raises(BadInput, match="boundaries are known along mu alone, not on periods"):
         survey.edge("libration", along="periods", near=1e9, mu=0.01, order="8")
-    with pytest.raises(BadInput, match="known of the scene gyrostat, whose parameters the outputs reduced_NAME are"):
-        survey.edge("gyrostat_integrable", along="w0", near=1.0, case="elliptic", C22=0.5, C33=0.3, S2=0.2)
+    with pytest.raises(
+        BadInput, match="known of the scene gyrostat, whose parameters the outputs reduced_NAME are"
+    ):
+        survey.edge(
+            "gyrostat_integrable", along="w0", near=1.0, case="elliptic", C22=0.5, C33=0.3, S2=0.2
+        )
 
 
 def test_margins_of_own_linear_periodic_systems():
@@ -218,17 +285,24 @@ def test_margins_of_own_linear_periodic_systems():
     found = survey.edge(scene, along="omega", omega=(15.0, 25.0), damping=4000.0, lost=1.0)
     assert found.edge.size == 1 and found.edge_error < 1e-6
     at, bar = float(found.edge[0]), float(found.edge_error[0])
-    sides = survey.evaluate(scene, **point | {"omega": [at - 2.0 * bar, at + 2.0 * bar]}).verdict.values
+    sides = survey.evaluate(
+        scene, **point | {"omega": [at - 2.0 * bar, at + 2.0 * bar]}
+    ).verdict.values
     assert sides.tolist() == [1, 0]
 
 
 def test_a_margin_is_that_of_the_nearest_boundary():
-    """Further pieces do not lose what nearer ones found: scanned by the verdict of Mathieu's damped equations."""
+    """Further pieces do not lose what nearer ones found: scanned by the verdict of Mathieu's damped
+    equations.
+    """
     scene = str(ROOT / "workflows" / "ion_trap.py")
     point = {"q": 0.7, "a": 0.1, "k": 0.05}
     margin = survey.evaluate(scene, **point).survey.margin()
     for name, value in point.items():
-        at, bar = float(margin.edge.sel(parameter=name)), float(margin.edge_error.sel(parameter=name))
+        at, bar = (
+            float(margin.edge.sel(parameter=name)),
+            float(margin.edge_error.sel(parameter=name)),
+        )
         side = np.sign(at - value)
         line = [at - 3e-9 * side - bar * side, at + 3e-9 * side + bar * side]
         assert survey.evaluate(scene, **point | {name: line}).verdict.values.tolist() == [1, 0]
@@ -256,14 +330,32 @@ def _verdict_changes(point, along, low, high):
 @pytest.mark.parametrize("epsilon", [1.0, -1.0])
 def test_permanent_rotations_in_clebschs_case(epsilon):
     """Along each parameter: (7) for Omega, and where the verdicts change, no more and no fewer."""
-    # with C the least moment and epsilon < 0, or A the largest and epsilon > 0, there is a critical rate
-    point = {"A": 2.0, "B": 1.5, "C": 1.0, "epsilon": epsilon, "Omega": 0.98, "axis": "A" if epsilon > 0.0 else "C"}
-    ranges = {"A": (0.51, 2.49), "B": (1.01, 2.99), "C": (0.51, 2.6), "epsilon": (-3.0, 3.0), "Omega": (-3.0, 3.0)}
+    # with C the least moment and epsilon < 0, or A the largest and epsilon > 0, there is a critical
+    # rate
+    point = {
+        "A": 2.0,
+        "B": 1.5,
+        "C": 1.0,
+        "epsilon": epsilon,
+        "Omega": 0.98,
+        "axis": "A" if epsilon > 0.0 else "C",
+    }
+    ranges = {
+        "A": (0.51, 2.49),
+        "B": (1.01, 2.99),
+        "C": (0.51, 2.6),
+        "epsilon": (-3.0, 3.0),
+        "Omega": (-3.0, 3.0),
+    }
     for along, (low, high) in ranges.items():
         fixed = {name: value for name, value in point.items() if name != along}
         found = survey.edge("brun_triaxial", along=along, **fixed, **{along: (low, high)})
         expected = _verdict_changes(point, along, low, high)
-        assert found.edge.size == len(expected) and found.attrs["complete"] == 1 and (found.edge_error < 1e-12).all()
+        assert (
+            found.edge.size == len(expected)
+            and found.attrs["complete"] == 1
+            and (found.edge_error < 1e-12).all()
+        )
         np.testing.assert_allclose(found.edge, expected, atol=1e-11, rtol=0)
     rate = float(survey.evaluate("brun_triaxial", **point).critical_rate)
     exact = np.sin(np.arcsin(np.sqrt(0.75)) + np.arcsin(np.sqrt(0.5)))
@@ -275,10 +367,14 @@ def test_permanent_rotations_in_clebschs_case(epsilon):
 
 @pytest.mark.slow
 def test_margins_of_orbits_along_all_parameters():
-    """From a fold in the damping, or the force, that in the frequency, along which orbits are continued, is back."""
+    """From a fold in the damping, or the force, that in the frequency, along which orbits are
+    continued, is back.
+    """
     scene = str(ROOT / "workflows" / "duffing.py")
     margin = survey.evaluate(scene, omega=1.5, F=0.3, zeta=0.05).survey.margin()
-    assert set(margin.parameter.values) == {"omega", "F", "zeta"} and (margin.edge_error < 1e-12).all()
+    assert (
+        set(margin.parameter.values) == {"omega", "F", "zeta"} and (margin.edge_error < 1e-12).all()
+    )
     for name in ("F", "zeta"):
         at = {"F": 0.3, "zeta": 0.05} | {name: float(margin.edge.sel(parameter=name))}
         back = survey.edge(scene, along="omega", omega=(1.2, 1.8), **at)
@@ -287,7 +383,10 @@ def test_margins_of_orbits_along_all_parameters():
 
 def test_a_margin_that_cannot_be_found_says_why():
     motion = survey.evaluate("brun_triaxial", question="trajectory", A=1.0, B=1.5, C=2.0, t=3.0)
-    with pytest.raises(BadInput, match=r"brun_triaxial no boundaries are known along A: question = trajectory has no"):
+    with pytest.raises(
+        BadInput,
+        match=r"brun_triaxial no boundaries are known along A: question = trajectory has no",
+    ):
         motion.survey.margin()
 
 
@@ -298,8 +397,11 @@ def test_edge_takes_physical_input_and_says_what_it_searched():
     np.testing.assert_array_equal(found.edge, expected.edge)
     low, high = found.attrs["searched"]
     assert low == 0.0 and 0.99 * np.pi / 2 < high < np.pi / 2
-    beyond = survey.edge("satellite", along="amplitude", amplitude=(1.2, 0.9999999 * np.pi / 2), **shape)
-    assert beyond.edge.max() > high and found.attrs["complete"] == 1  # they accumulate at the end of the domain
+    beyond = survey.edge(
+        "satellite", along="amplitude", amplitude=(1.2, 0.9999999 * np.pi / 2), **shape
+    )
+    # they accumulate at the end of the domain
+    assert beyond.edge.max() > high and found.attrs["complete"] == 1
     assert survey.edge("libration_elliptic", along="e", body="Earth-Moon").edge.size == 1
     near = survey.edge("satellite", along="rho", near=1.2, k=0.5).attrs["searched"]
     assert near[0] < 1.03 and near[1] > 1.6
@@ -323,12 +425,25 @@ def test_danbys_curves_are_named_where_the_verdict_changes_alone(e, names):
 
 @pytest.mark.parametrize("along", ["s3", "b12"])
 def test_the_exact_edge_of_a_gyrostats_ends_is_found_whatever_the_signs(along):
-    """K = b12 s3 - b31 s2 = 0, a hyperbola whose border on the line's narrow map is reached by rounding alone."""
-    for b12, b31, s2 in ((-0.85, 0.42, -1.05), (0.85, 0.42, -1.05), (-1.38, 0.086, 0.42), (0.28, -0.72, 0.033)):
+    """K = b12 s3 - b31 s2 = 0, a hyperbola whose border on the line's narrow map is reached by
+    rounding alone.
+    """
+    for b12, b31, s2 in (
+        (-0.85, 0.42, -1.05),
+        (0.85, 0.42, -1.05),
+        (-1.38, 0.086, 0.42),
+        (0.28, -0.72, 0.033),
+    ):
         exact = b31 * s2 / b12
-        given = {"b31": b31, "d": 0.92, "c23": 1.39, "s2": s2} | ({"b12": b12} if along == "s3" else {"s3": exact})
+        given = {"b31": b31, "d": 0.92, "c23": 1.39, "s2": s2} | (
+            {"b12": b12} if along == "s3" else {"s3": exact}
+        )
         at = exact if along == "s3" else b12
-        found = survey.edge("gyrostat", question="portrait", along=along, **{along: (at - 0.1, at + 0.15)}, **given)
+        found = survey.edge(
+            "gyrostat", question="portrait", along=along, **{along: (at - 0.1, at + 0.15)}, **given
+        )
         names = found.edge_class.attrs["flag_meanings"].split()
-        ends = found.edge.values[found.edge_class.values == found.edge_class.attrs["flag_values"][names.index("ends")]]
+        ends = found.edge.values[
+            found.edge_class.values == found.edge_class.attrs["flag_values"][names.index("ends")]
+        ]
         assert abs(ends - at).min(initial=np.inf) < 1e-12

@@ -1,4 +1,6 @@
-"""Surveys joined along an axis: the same values as one run of all points, and what does not fit is refused."""
+"""Surveys joined along an axis: the same values as one run of all points, and what does not fit is
+refused.
+"""
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ def parts(small, tmp_path, monkeypatch):
     values = np.linspace(0.5, 2.0, 6)
     paths = []
     for name, chosen in (("whole", values), ("high", values[2:]), ("low", values[:3])):
-        text = base.replace("w0  = { start = 0.5, stop = 2.0, num = 6 }", f"w0 = {{ values = {chosen.tolist()} }}")
+        text = base.replace(
+            "w0  = { start = 0.5, stop = 2.0, num = 6 }", f"w0 = {{ values = {chosen.tolist()} }}"
+        )
         (tmp_path / f"{name}.toml").write_text(text)
         survey.run(f"{name}.toml", output=f"{name}.nc")
         paths.append(tmp_path / f"{name}.nc")
@@ -31,7 +35,9 @@ def test_the_whole_is_what_one_run_gives(parts):
     xr.testing.assert_identical(joined.drop_attrs(), whole.drop_attrs())
     for key in ("points", "status_counts", "accuracy_missed", "scene", "options", "rtol"):
         assert joined.attrs[key] == whole.attrs[key]
-    assert joined.attrs["wall_time_s"] == pytest.approx(high.attrs["wall_time_s"] + low.attrs["wall_time_s"])
+    assert joined.attrs["wall_time_s"] == pytest.approx(
+        high.attrs["wall_time_s"] + low.attrs["wall_time_s"]
+    )
     again = survey.run({**_parsed(joined.attrs["workflow"]), "output": {"path": "again.nc"}})
     xr.testing.assert_equal(again.drop_attrs(), whole.drop_attrs())
 
@@ -46,14 +52,21 @@ def _parsed(text):
 def test_the_command_writes_a_sound_file_and_replaces_none(parts, program):
     whole, high, low = parts
     done = program("merge", low, high, "-o", "joined.nc")
-    assert done.returncode == 0 and done.stdout == "joined.nc\n" and "24 points of 2 files" in done.stderr
+    assert (
+        done.returncode == 0
+        and done.stdout == "joined.nc\n"
+        and "24 points of 2 files" in done.stderr
+    )
     assert reading.check("joined.nc") == []
     xr.testing.assert_equal(survey.open("joined.nc").drop_attrs(), survey.open(whole).drop_attrs())
     assert survey.open("joined.nc").w.attrs == survey.open(whole).w.attrs
     assert program("verify", "joined.nc", "--points", "3").returncode == 0
     again = program("merge", low, high, "-o", "joined.nc")
     assert again.returncode == 2 and "joined.nc exists" in again.stderr
-    assert {file.name for file in program.folder.glob("*joined*")} == {"joined.nc", "joined.nc.sha256"}
+    assert {file.name for file in program.folder.glob("*joined*")} == {
+        "joined.nc",
+        "joined.nc.sha256",
+    }
 
 
 def test_what_belongs_to_the_parts_is_left_out_with_a_word(tmp_path, monkeypatch):
@@ -61,7 +74,10 @@ def test_what_belongs_to_the_parts_is_left_out_with_a_word(tmp_path, monkeypatch
     for name, start in (("low", 0.0), ("high", 2.0)):
         axes = {"q": {"values": [0.3, 0.5]}, "a": {"start": start, "stop": start + 1.5, "num": 4}}
         survey.run({"scene": "mathieu", "axes": axes, "boundaries": {}}, output=f"{name}.nc")
-    with pytest.warns(UserWarning, match=r"concat: what \[boundaries\] found belongs to the parts, and is left out"):
+    with pytest.warns(
+        UserWarning,
+        match=r"concat: what \[boundaries\] found belongs to the parts, and is left out",
+    ):
         joined = survey.concat(["low.nc", "high.nc"])
     assert "curve_count" not in joined and joined.sizes["a"] == 8
     assert join.merge(["low.nc", "high.nc"], "both.nc")[1].startswith("what [boundaries] found")
@@ -89,11 +105,17 @@ def test_what_does_not_fit_is_refused():
     refused("two or more")
     refused("have another scene: 'mathieu' and 'libration'", survey.evaluate("libration", mu=0.01))
     refused("have another rtol", survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, rtol=1e-6))
-    refused("only one of the surveys has", survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, variables=["verdict"]))
+    refused(
+        "only one of the surveys has",
+        survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, variables=["verdict"]),
+    )
     refused("these differ in a, q", survey.evaluate("mathieu", a=[0.3, 1.5], q=0.5))
     refused("in none: they are of the same points", one)
     other = survey.evaluate("mathieu", a=[1.5, 1.6], q=0.4)
-    refused("different values at common points, such as a = 1.5", other.assign(discriminant=other.discriminant + 1))
+    refused(
+        "different values at common points, such as a = 1.5",
+        other.assign(discriminant=other.discriminant + 1),
+    )
     refused("was not written by survey", xr.Dataset())
     with pytest.raises(BadInput, match="give a list of surveys"):
         survey.concat(one)
@@ -102,7 +124,13 @@ def test_what_does_not_fit_is_refused():
 def test_bodies_are_joined_with_their_parameters():
     bodies = ["Sun-Jupiter", "Earth-Moon", "Sun-Earth"]
     whole = survey.evaluate("libration_elliptic", body=bodies, variables=["verdict", "a"])
-    for parts in ([whole.isel(body=[k]) for k in (2, 0, 1)], [whole.isel(body=[2, 0]), whole.isel(body=1)]):
+    for parts in (
+        [whole.isel(body=[k]) for k in (2, 0, 1)],
+        [whole.isel(body=[2, 0]), whole.isel(body=1)],
+    ):
         joined = survey.concat(parts)
-        assert joined.body.values.tolist() == [bodies[k] for k in (2, 0, 1)] and joined.attrs["points"] == 3
+        assert (
+            joined.body.values.tolist() == [bodies[k] for k in (2, 0, 1)]
+            and joined.attrs["points"] == 3
+        )
         xr.testing.assert_equal(joined.isel(body=[1, 2, 0]), whole)

@@ -12,21 +12,28 @@ matplotlib.use("Agg")
 @pytest.fixture(scope="module")
 def two():
     axes = {"a": np.linspace(-0.5, 2.0, 12), "q": np.linspace(0.0, 1.0, 9)}
-    return survey.evaluate("mathieu", **axes), survey.evaluate("mathieu", a=axes["a"], q=-axes["q"]).assign_coords(
-        q=axes["q"]
-    )
+    return survey.evaluate("mathieu", **axes), survey.evaluate(
+        "mathieu", a=axes["a"], q=-axes["q"]
+    ).assign_coords(q=axes["q"])
 
 
 def test_counts_masks_and_names_agree(two):
     ds = two[0]
     counts = ds.survey.counts()
-    assert counts["verdict"]["stable"] + counts["verdict"]["unstable"] + counts["verdict"]["marginal"] == 108
+    assert (
+        counts["verdict"]["stable"] + counts["verdict"]["unstable"] + counts["verdict"]["marginal"]
+        == 108
+    )
     for name, number in counts["verdict"].items():
         assert int(ds.survey.where(name).sum()) == number == int((ds.survey.names() == name).sum())
     assert int(ds.survey.where("ok").sum()) == 108
     means = ds.exponent.groupby(ds.survey.names()).mean()
-    assert float(means.sel(verdict_name="stable")) == 0.0 < float(means.sel(verdict_name="unstable"))
-    with pytest.raises(survey.BadInput, match="unknown verdict or status 'stabel'; did you mean 'stable'"):
+    assert (
+        float(means.sel(verdict_name="stable")) == 0.0 < float(means.sel(verdict_name="unstable"))
+    )
+    with pytest.raises(
+        survey.BadInput, match="unknown verdict or status 'stabel'; did you mean 'stable'"
+    ):
         ds.survey.where("stabel")
 
 
@@ -70,7 +77,10 @@ def test_axes_and_colours_of_a_map_are_chosen(two):
     for keywords, match in (
         ({"x": "aa"}, "x: unknown axis 'aa'; did you mean 'a'"),
         ({"x": "a", "y": "a"}, "x and y are both 'a'"),
-        ({"var": "exponent", "cmap": "viridi"}, "cmap: unknown colour map 'viridi'; did you mean 'viridis'"),
+        (
+            {"var": "exponent", "cmap": "viridi"},
+            "cmap: unknown colour map 'viridi'; did you mean 'viridis'",
+        ),
     ):
         with pytest.raises(survey.BadInput, match=match):
             ds.survey.map(**keywords)

@@ -1,4 +1,6 @@
-"""Where methods fail, on coarse planes: no lies; a wrong value, bar or verdict would be one; page, picture and JSON."""
+"""Where methods fail, on coarse planes: no lies; a wrong value, bar or verdict would be one; page,
+picture and JSON.
+"""
 
 import json
 from dataclasses import replace
@@ -21,7 +23,9 @@ KEYS = ("name", "method", "points", "refused", "missed", "lies")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scene", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in SCENES])
+@pytest.mark.parametrize(
+    "scene", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONG)) for name in SCENES]
+)
 def test_no_method_lies(scene):
     module = modules.load(planes, scene, "scene")
     of = module.planes(SHARE)
@@ -29,21 +33,36 @@ def test_no_method_lies(scene):
     for plane, results in zip(of, failures.measure(of), strict=True):
         records = [failures.record(plane, method, found) for method, found in results]
         assert not any(r.lies for r in records), records
-        assert not any(r.largest_error_where_met > failures.RTOL for r in records), plane.name  # NaN: none answered
+        # NaN: none answered
+        assert not any(r.largest_error_where_met > failures.RTOL for r in records), plane.name
         found = dict(results)
         auto = found["auto"]
         assert auto is not None and (auto.answered | plane_refused(found)).all(), plane.name
-        assert any(r.largest_error_over_bar > 1e-3 for r in records), f"{plane.name}: bars a thousand times the errors"
-        assert sum(r.unchecked for r in records) <= 0.25 * sum(r.points - r.refused for r in records)
+        assert any(r.largest_error_over_bar > 1e-3 for r in records), (
+            f"{plane.name}: bars a thousand times the errors"
+        )
+        assert sum(r.unchecked for r in records) <= 0.25 * sum(
+            r.points - r.refused for r in records
+        )
 
 
 def plane_refused(found):
     """Where every method refuses."""
-    return ~np.any([of.answered for method, of in found.items() if of is not None and method != MAP], axis=0)
+    return ~np.any(
+        [of.answered for method, of in found.items() if of is not None and method != MAP], axis=0
+    )
 
 
 def test_there_are_planes_of_every_scene_that_the_truths_cover():
-    assert {"satellite", "mathieu", "own", "libration_elliptic", "libration", "brun", "gyrostat"} <= set(SCENES)
+    assert {
+        "satellite",
+        "mathieu",
+        "own",
+        "libration_elliptic",
+        "libration",
+        "brun",
+        "gyrostat",
+    } <= set(SCENES)
 
 
 @pytest.fixture
@@ -92,16 +111,21 @@ def test_a_turning_point_is_held_against_the_true_one():
 
 
 def test_points_that_are_refused_one_by_one():
-    """Narrow spikes that are not named: a call that holds one is refused; the points beside it are answered."""
+    """Narrow spikes that are not named: a call that holds one is refused; the points beside it are
+    answered.
+    """
     plane = modules.load(planes, "own", "scene").planes(0.3)[0]
     found = compare.compared(plane, "auto", failures.RTOL)
     assert found.answered.any() and not found.answered.all() and not found.lie.any()
-    assert (~found.answered).all(axis=0).sum() == (~found.answered).any(axis=0).sum()  # by width alone
+    # by width alone
+    assert (~found.answered).all(axis=0).sum() == (~found.answered).any(axis=0).sum()
 
 
 def test_the_command(tmp_path):
     path = ROOT / "workflows/whittaker_hill.py"
-    done = CliRunner().invoke(cli.program, ["failures", str(path), "--share", "0.3", "-o", str(tmp_path)])
+    done = CliRunner().invoke(
+        cli.program, ["failures", str(path), "--share", "0.3", "-o", str(tmp_path)]
+    )
     assert done.exit_code == 0, done.output
     written = json.loads((tmp_path / "failures_whittaker_hill.json").read_text())
     assert written["planes"] and all(key in row for row in written["planes"] for key in KEYS)
@@ -120,7 +144,11 @@ def test_what_is_not_known_is_null(tmp_path, plane, monkeypatch):
     failures.write("mathieu", tmp_path)
     strict = {"parse_constant": lambda word: pytest.fail(f"{word} is not JSON")}
     rows = json.loads((tmp_path / "failures_mathieu.json").read_text(), **strict)["planes"]
-    assert rows[0]["largest_error"] is None and rows[0]["refused"] == plane.size and rows[1]["largest_error"] < 1e-9
+    assert (
+        rows[0]["largest_error"] is None
+        and rows[0]["refused"] == plane.size
+        and rows[1]["largest_error"] < 1e-9
+    )
 
 
 def test_what_has_no_planes_is_refused(tmp_path):
@@ -153,4 +181,8 @@ def test_a_lie_is_black_and_counted_in_the_page(tmp_path, plane, monkeypatch):
 
 def test_a_two_sided_axis():
     axis, offsets = two_sided("x", np.array([-3.0, -2.0, -1.0]))
-    assert offsets.tolist() == [-0.1, -0.01, -0.001, 0.001, 0.01, 0.1] and axis.size == 6 and axis.ticks[2.5] == "0"
+    assert (
+        offsets.tolist() == [-0.1, -0.01, -0.001, 0.001, 0.01, 0.1]
+        and axis.size == 6
+        and axis.ticks[2.5] == "0"
+    )

@@ -85,8 +85,14 @@ def test_a_point_without_an_answer_is_counted_by_its_status(copy):
     ds["verdict"][0], ds["status"][0, :2] = -1, status.STEP_LIMIT
     bare = ds.sizes[ds.status.dims[1]]
     ds = labels.count(ds)
-    assert ds.attrs["verdict_counts"] == f"undecided: {bare - 2}, stable: {ds.status.size - bare}, step_limit: 2"
-    for counts in (ds.attrs["verdict_counts"], f"undecided: {bare}, stable: {ds.status.size - bare}"):
+    assert (
+        ds.attrs["verdict_counts"]
+        == f"undecided: {bare - 2}, stable: {ds.status.size - bare}, step_limit: 2"
+    )
+    for counts in (
+        ds.attrs["verdict_counts"],
+        f"undecided: {bare}, stable: {ds.status.size - bare}",
+    ):
         ds.assign_attrs(verdict_counts=counts).to_netcdf(copy)
         assert not [complaint for complaint in reading.check(copy) if "verdict_counts" in complaint]
     ds.assign_attrs(verdict_counts=f"stable: {ds.status.size}").to_netcdf(copy)
@@ -115,10 +121,15 @@ def test_finished_blocks_are_used_again_and_give_the_same_bits(small, tmp_path, 
     assert len(cuts) == 6
     with blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
         for number in (1, 3, 4):
-            kept.save(number, solve.solve_block(checked.scene, checked.request, checked.grid, cuts[number]))
+            kept.save(
+                number,
+                solve.solve_block(checked.scene, checked.request, checked.grid, cuts[number]),
+            )
         _flip(kept._file(3))
     seen = []
-    engine.run(checked, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
+    engine.run(
+        checked, progress=lambda done, total, reused, **_: seen.append((done, total, reused))
+    )
     assert seen[0] == (2, 6, 2) and seen[-1] == (6, 6, 2)  # the damaged block was computed again
     xr.testing.assert_equal(whole.drop_attrs(), survey.open(checked.path).drop_attrs())
     assert not checked.path.with_name("again.nc.blocks").exists()
@@ -186,9 +197,17 @@ def test_a_complete_output_of_another_workflow_does_not(small, tmp_path, monkeyp
     survey.run(small, output=path)
     checked = workflow.read(small, ["title='other'"], path)
     with blocks.Blocks(path, fingerprint.fingerprint(checked)) as kept:
-        kept.save(0, solve.solve_block(checked.scene, checked.request, checked.grid, cost.blocks_of(checked)[0]))
+        kept.save(
+            0,
+            solve.solve_block(
+                checked.scene, checked.request, checked.grid, cost.blocks_of(checked)[0]
+            ),
+        )
     engine.run(checked)
-    assert survey.open(path).attrs["title"] == "other" and survey.open(path).attrs["blocks_reused"] == 1
+    assert (
+        survey.open(path).attrs["title"] == "other"
+        and survey.open(path).attrs["blocks_reused"] == 1
+    )
 
 
 def test_a_block_under_another_number_or_of_another_survey_is_not_taken(tmp_path):
@@ -209,7 +228,10 @@ def test_a_clean_up_that_fails_is_told_and_done_by_the_next_run(small, tmp_path,
         raise OSError(5, "Input/output error", str(folder))
 
     monkeypatch.setattr(os, "rmdir", refuse)
-    with pytest.raises(Stopped, match=r"o\.nc is complete, but .* \(Input/output error: .*o\.nc\.blocks\); fix this"):
+    with pytest.raises(
+        Stopped,
+        match=r"o\.nc is complete, but .* \(Input/output error: .*o\.nc\.blocks\); fix this",
+    ):
         survey.run(small, output=path)
     monkeypatch.setattr(os, "rmdir", rmdir)
     assert not (tmp_path / "o.nc.lock").exists()
@@ -266,19 +288,33 @@ def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where
         with pytest.raises(Stopped, match=r"copy\.nc.*(No space left|HDF5: an|Input/output)"):
             survey.run(small, output=copy, fresh=True)
     assert copy.read_bytes() == before and reading.check(copy) == []
-    assert [file.name for file in copy.parent.rglob("*") if file.name.endswith((".part", "output.nc"))] == []
-    assert survey.run(small, output=copy).status.size == 24  # the lock is free, and what is there is of use
+    assert [
+        file.name for file in copy.parent.rglob("*") if file.name.endswith((".part", "output.nc"))
+    ] == []
+    # the lock is free, and what is there is of use
+    assert survey.run(small, output=copy).status.size == 24
 
 
-CALLS = [(os, "fsync"), (os, "replace"), (blocks, "pack"), (map_file.MapFile, "write"), (netcdf.File, "define")]
+CALLS = [
+    (os, "fsync"),
+    (os, "replace"),
+    (blocks, "pack"),
+    (map_file.MapFile, "write"),
+    (netcdf.File, "define"),
+]
 
 
 @pytest.mark.parametrize(
     ("where", "name"),
-    [pytest.param(*call, marks=[pytest.mark.slow] * (call[1] in ("fsync", "write"))) for call in CALLS],
+    [
+        pytest.param(*call, marks=[pytest.mark.slow] * (call[1] in ("fsync", "write")))
+        for call in CALLS
+    ],
     ids=lambda value: getattr(value, "__name__", value),
 )
-def test_an_error_at_each_write_call_in_turn_loses_nothing(copy, small, surveyed, monkeypatch, where, name):
+def test_an_error_at_each_write_call_in_turn_loses_nothing(
+    copy, small, surveyed, monkeypatch, where, name
+):
     """The k-th call fails, k = 1, 2, ...: the old file stands, or the new one does; the next run goes on."""
     monkeypatch.setattr(cost, "BLOCK_POINTS", 8)
     call, real, fail = 0, getattr(where, name), 0

@@ -1,4 +1,6 @@
-"""A finished file is never lost without being asked: the same workflow computes nothing, another one is refused."""
+"""A finished file is never lost without being asked: the same workflow computes nothing, another
+one is refused.
+"""
 
 import netCDF4
 import numpy as np
@@ -21,13 +23,17 @@ def test_the_same_workflow_computes_nothing_and_draws_again(ran, small, monkeypa
     picture.unlink()
     small.write_text("# a comment\n" + small.read_text().replace('"w"', '"w", "phi"'))
     survey.run(small)  # comments, paths and figures change no value of the file
-    assert ran.read_bytes() == before and picture.exists() and ran.with_name("small_phi.png").exists()
+    assert (
+        ran.read_bytes() == before and picture.exists() and ran.with_name("small_phi.png").exists()
+    )
     assert {file.name for file in ran.parent.glob("small.nc*")} == {"small.nc", "small.nc.sha256"}
 
 
 def test_the_command_says_so_and_exits_with_0(ran, small, program):
     done = program("run", small)
-    assert done.returncode == 0 and "small.nc: already complete; nothing was computed" in done.stderr
+    assert (
+        done.returncode == 0 and "small.nc: already complete; nothing was computed" in done.stderr
+    )
     assert "wrote small.png" in done.stderr and "kernels" not in done.stderr
 
 
@@ -66,20 +72,28 @@ def test_a_run_that_was_to_replace_it_is_resumed_without_asking_again(ran, small
         patch.setattr(engine.dispatch, "on_threads", stop)
         engine.run(other, fresh=True)
     engine.run(other)
-    assert survey.open("small.nc").attrs["rtol"] == 1e-6 and survey.open("small.nc").attrs["blocks_reused"] == 1
+    assert (
+        survey.open("small.nc").attrs["rtol"] == 1e-6
+        and survey.open("small.nc").attrs["blocks_reused"] == 1
+    )
 
 
 def test_other_code_is_told(ran, small, monkeypatch):
     monkeypatch.chdir(ran.parent)
     _change(ran, fingerprint="old", version_numba="0.1")
-    with pytest.raises(BadInput, match=r"24 points from another version of the code \(numba 0\.1 -> \d"):
+    with pytest.raises(
+        BadInput, match=r"24 points from another version of the code \(numba 0\.1 -> \d"
+    ):
         engine.run(workflow.read(small))
 
 
 def test_files_of_other_programs_are_not_lost(small, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     xr.Dataset({"x": ("t", np.arange(3.0))}).to_netcdf("small.nc")
-    with pytest.raises(BadInput, match=r"small\.nc: this netCDF file was not written by survey; write another with -o"):
+    with pytest.raises(
+        BadInput,
+        match=r"small\.nc: this netCDF file was not written by survey; write another with -o",
+    ):
         survey.run(small)
     assert list(xr.load_dataset("small.nc")) == ["x"]
 

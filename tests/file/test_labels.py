@@ -1,4 +1,6 @@
-"""The file's contract: CF and ACDD attributes, flags, error variables, provenance, checksummed compression."""
+"""The file's contract: CF and ACDD attributes, flags, error variables, provenance, checksummed
+compression.
+"""
 
 import subprocess
 import sys
@@ -36,7 +38,9 @@ def test_every_variable_says_what_it_is(ds):
         assert variable.attrs["units"] and variable.attrs["symbol"], name
         assert not np.iscomplexobj(variable), name
     assert set(labels.error_bars(ds)) == {
-        name for name in ds.data_vars if ds[name].dtype == np.float64 and labels.fill_of(ds[name]) is None
+        name
+        for name in ds.data_vars
+        if ds[name].dtype == np.float64 and labels.fill_of(ds[name]) is None
     }
 
 

@@ -1,4 +1,6 @@
-"""One run at a time on an output: its lock names it, is taken from a run that is gone, and goes with the run."""
+"""One run at a time on an output: its lock names it, is taken from a run that is gone, and goes
+with the run.
+"""
 
 import json
 import multiprocessing
@@ -45,7 +47,9 @@ def _end_without_release(path):
 
 
 def test_a_lock_whose_holder_is_gone_says_whose_it_was_and_is_taken(path):
-    process = multiprocessing.get_context("spawn").Process(target=_end_without_release, args=(path,))
+    process = multiprocessing.get_context("spawn").Process(
+        target=_end_without_release, args=(path,)
+    )
     process.start()
     process.join()
     assert path.exists() and lock.holder(path) is None

@@ -1,4 +1,6 @@
-"""Integers that do not apply: `_FillValue` in the file, NaN once it is open, with survey or without; words for -1."""
+"""Integers that do not apply: `_FillValue` in the file, NaN once it is open, with survey or
+without; words for -1.
+"""
 
 import netCDF4
 import numpy as np
@@ -28,14 +30,19 @@ def path(tmp_path_factory):
 
 def evaluated(ds, **starts):
     fixed = {name: float(ds[name]) for name in ("b12", "b31", "d", "c23", "s2", "s3")}
-    return survey.evaluate("gyrostat", question="fate", **{"phi0": ds.phi0, "w0": ds.w0} | starts, **fixed)
+    return survey.evaluate(
+        "gyrostat", question="fate", **{"phi0": ds.phi0, "w0": ds.w0} | starts, **fixed
+    )
 
 
 def test_the_file_holds_integers_with_a_fill_value(path):
     with netCDF4.Dataset(path) as file:
         turns = file["net_turns"]
-        assert turns.dtype == np.int32 and turns._FillValue == labels.fill_of(xr.open_dataset(path).net_turns)
-        assert np.ma.count_masked(turns[:]) == (file["verdict"][:] > 4).sum() > 0  # spun up: no number of turns
+        assert turns.dtype == np.int32 and turns._FillValue == labels.fill_of(
+            xr.open_dataset(path).net_turns
+        )
+        # spun up: no number of turns
+        assert np.ma.count_masked(turns[:]) == (file["verdict"][:] > 4).sum() > 0
         assert "_FillValue" not in file["verdict"].ncattrs()  # -1 is undecided there
 
 
@@ -53,7 +60,9 @@ def test_what_is_evaluated_is_what_is_read_and_can_be_written_again(path, tmp_pa
         assert made[name].dtype == ours[name].dtype and made[name].equals(ours[name]), name
     made.to_netcdf(tmp_path / "again.nc")
     again = xr.open_dataset(tmp_path / "again.nc", mask_and_scale=False)
-    np.testing.assert_array_equal(again.net_turns, xr.open_dataset(path, mask_and_scale=False).net_turns)
+    np.testing.assert_array_equal(
+        again.net_turns, xr.open_dataset(path, mask_and_scale=False).net_turns
+    )
     assert again.net_turns.dtype == np.int32
 
 
@@ -68,11 +77,15 @@ def test_what_was_joined_and_what_was_reused_is_stored_as_integers(path, tmp_pat
     ours = survey.open(path)
     halves = [tmp_path / "low.nc", tmp_path / "high.nc"]
     for half, part in zip(halves, (slice(0, 5), slice(5, 9)), strict=True):
-        table = WORKFLOW | {"axes": WORKFLOW["axes"] | {"w0": {"values": ours.w0.values[part].tolist()}}}
+        table = WORKFLOW | {
+            "axes": WORKFLOW["axes"] | {"w0": {"values": ours.w0.values[part].tolist()}}
+        }
         survey.run(table, output=half, reuse=path)
     join.merge(halves, tmp_path / "whole.nc")
     for name in ("net_turns", "turnings"):
-        raw = [xr.open_dataset(p, mask_and_scale=False)[name] for p in (path, tmp_path / "whole.nc")]
+        raw = [
+            xr.open_dataset(p, mask_and_scale=False)[name] for p in (path, tmp_path / "whole.nc")
+        ]
         assert raw[1].dtype == np.int32 and raw[1].attrs["_FillValue"] == raw[0].attrs["_FillValue"]
         np.testing.assert_array_equal(*raw)
 

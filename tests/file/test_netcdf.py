@@ -11,8 +11,20 @@ import xarray as xr
 from survey.file import netcdf, tiles
 
 RNG = np.random.default_rng(3)
-MEANING = {"units": "1", "long_name": "Länge", "flag_values": np.array([0, 1], np.int8), "number": 3, "empty": ""}
-MEANING |= {"rtol": 1e-10, "small": np.float32(2), "names": ["a", "bé"], "numbers": [1, 2], "long": "x" * 100_000}
+MEANING = {
+    "units": "1",
+    "long_name": "Länge",
+    "flag_values": np.array([0, 1], np.int8),
+    "number": 3,
+    "empty": "",
+}
+MEANING |= {
+    "rtol": 1e-10,
+    "small": np.float32(2),
+    "names": ["a", "bé"],
+    "numbers": [1, 2],
+    "long": "x" * 100_000,
+}
 VARIABLES = {  # name: (dimensions, values, lengths of a tile)
     "k": (("k",), np.linspace(0, 1, 5), None),
     "alone": ((), np.float64(3.5), None),
@@ -31,10 +43,17 @@ def theirs(path):
             for dim, size in zip(dims, values.shape, strict=True):
                 if dim not in file.dimensions:
                     file.createDimension(dim, size)
-            packed = {"compression": "zlib", "complevel": 1, "shuffle": True, "fletcher32": True, "chunksizes": tile}
+            packed = {
+                "compression": "zlib",
+                "complevel": 1,
+                "shuffle": True,
+                "fletcher32": True,
+                "chunksizes": tile,
+            }
             fill = np.nan if values.dtype.kind == "f" and tile else None
             kind = str if values.dtype.kind == "O" else values.dtype
-            if kind is str or not (tile and values.size):  # HDF5 packs no strings, and old netCDF does not know that
+            # HDF5 packs no strings, and old netCDF does not know that
+            if kind is str or not (tile and values.size):
                 packed = {"chunksizes": tile} if kind is str else {}
             made = file.createVariable(name, kind, dims, fill_value=fill, **packed)
             made.setncatts(MEANING)
@@ -45,7 +64,15 @@ def theirs(path):
 def ours(path):
     file = netcdf.File(path)
     for name, (dims, values, tile) in VARIABLES.items():
-        file.define(name, dims, values.shape, values.dtype, MEANING, tile, values=None if name == "status" else values)
+        file.define(
+            name,
+            dims,
+            values.shape,
+            values.dtype,
+            MEANING,
+            tile,
+            values=None if name == "status" else values,
+        )
     file.write(tiles.write, "status", VARIABLES["status"][1], ())
     file.describe(MEANING)
     file.close()
@@ -58,18 +85,27 @@ def attributes(of):
 def test_files_are_read_as_those_of_netcdf_itself(tmp_path):
     ours(tmp_path / "ours.nc")
     theirs(tmp_path / "theirs.nc")
-    with netCDF4.Dataset(tmp_path / "ours.nc") as one, netCDF4.Dataset(tmp_path / "theirs.nc") as other:
+    with (
+        netCDF4.Dataset(tmp_path / "ours.nc") as one,
+        netCDF4.Dataset(tmp_path / "theirs.nc") as other,
+    ):
         assert attributes(one) == attributes(other) and list(one.variables) == list(other.variables)
         assert {name: len(dim) for name, dim in one.dimensions.items()} == {
             name: len(dim) for name, dim in other.dimensions.items()
         }
         for name in VARIABLES:
             own, known = one[name], other[name]
-            assert (own.dtype, own.dimensions, own.shape) == (known.dtype, known.dimensions, known.shape)
+            assert (own.dtype, own.dimensions, own.shape) == (
+                known.dtype,
+                known.dimensions,
+                known.shape,
+            )
             assert attributes(own) == attributes(known)
             if name not in ("word", "none"):  # strings and nothing are not packed here
                 assert (own.filters(), own.chunking()) == (known.filters(), known.chunking())
-    xr.testing.assert_identical(*(xr.load_dataset(tmp_path / name) for name in ("ours.nc", "theirs.nc")))
+    xr.testing.assert_identical(
+        *(xr.load_dataset(tmp_path / name) for name in ("ours.nc", "theirs.nc"))
+    )
     with netCDF4.Dataset(tmp_path / "ours.nc", "a") as file:  # whoever wants to may go on
         file.createVariable("more", float, ("k", "rho"))[...] = 1.0
 

@@ -25,7 +25,10 @@ def large():
     state.flat[rare[8:]] = status.STEP_LIMIT
     state[-30:], verdict[-30:] = status.INVALID_PARAMETERS, -1
     exponent = np.where(state == 0, rng.standard_normal(verdict.shape), np.nan)
-    flags = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "undecided unstable stable marginal"}
+    flags = {
+        "flag_values": np.array([-1, 0, 1, 2], np.int8),
+        "flag_meanings": "undecided unstable stable marginal",
+    }
     data = {"verdict": (("k", "rho"), verdict, flags), "exponent": (("k", "rho"), exponent),
             "status": (("k", "rho"), state)}  # fmt: skip
     coords = {"k": np.geomspace(1e-2, 1e2, LONG), "rho": np.linspace(0, 1, 70)}
@@ -37,7 +40,9 @@ def drawn(ds, name):
     axes = ds.survey.map(name, ax=Figure(dpi=150).subplots())
     mesh = axes.collections[0]
     edges = mesh.get_coordinates()
-    legend = {text.get_text() for text in axes.get_legend().get_texts()} if axes.get_legend() else set()
+    legend = (
+        {text.get_text() for text in axes.get_legend().get_texts()} if axes.get_legend() else set()
+    )
     marks = {str(line.get_markerfacecolor()): line.get_xydata() for line in axes.lines}
     return mesh.get_array().T, edges[0, :, 0], edges[:, 0, 1], legend, marks
 
@@ -51,7 +56,9 @@ def places(ds, where):
 @pytest.mark.parametrize("lazy", [False, True])
 def test_no_point_of_a_large_map_is_lost(large, lazy):
     ds = (
-        large.copy(data={name: da.from_array(v.values, chunks=(300, 40)) for name, v in large.items()})
+        large.copy(
+            data={name: da.from_array(v.values, chunks=(300, 40)) for name, v in large.items()}
+        )
         if lazy
         else large
     )
@@ -64,7 +71,9 @@ def test_no_point_of_a_large_map_is_lost(large, lazy):
         ("#000000", (large.verdict == -1) & (large.status == 0)), ("white", large.status == status.STEP_LIMIT)
     ):  # fmt: skip
         for px, py in zip(*places(large, where), strict=True):
-            near = np.hypot(np.log(marks[colour][:, 0] / px) / np.log(1e4), marks[colour][:, 1] - py)
+            near = np.hypot(
+                np.log(marks[colour][:, 0] / px) / np.log(1e4), marks[colour][:, 1] - py
+            )
             assert near.min() < 0.01
     for px, py in zip(*places(large, large.verdict == 2), strict=True):
         i, j = np.searchsorted(x, px) - 1, np.searchsorted(y, py) - 1
@@ -78,7 +87,9 @@ def test_a_cell_of_numbers_shows_the_largest_of_its_points(large):
     assert legend == {"failed (4)", "outside the domain (2,100)"}
     factor = -(-LONG // cells.shape[0])
     assert factor == 4 and cells.shape[1] == 70
-    points = np.pad(large.exponent.values, ((0, cells.shape[0] * factor - LONG), (0, 0)), constant_values=np.nan)
+    points = np.pad(
+        large.exponent.values, ((0, cells.shape[0] * factor - LONG), (0, 0)), constant_values=np.nan
+    )
     points = points.reshape(-1, factor, 70)
     largest = np.nan_to_num(abs(points), nan=-1).argmax(axis=1, keepdims=True)
     expected = np.take_along_axis(points, largest, axis=1)[:, 0]

@@ -24,7 +24,11 @@ def written(path, values, tile, by_us, **packing):
     with netCDF4.Dataset(path, "w") as file:
         for number, size in enumerate(values.shape):
             file.createDimension(f"x{number}", size)
-        how = PACKED | {"chunksizes": tile, "endian": "big" if values.dtype.byteorder == ">" else "little"} | packing
+        how = (
+            PACKED
+            | {"chunksizes": tile, "endian": "big" if values.dtype.byteorder == ">" else "little"}
+            | packing
+        )
         made = file.createVariable("x", values.dtype, tuple(file.dimensions), **how)
         if not by_us:
             made[:] = values
@@ -45,14 +49,19 @@ def read(path):
 def test_hdf5_undoes_what_is_packed_here(tmp_path, values, packing):
     """HDF5 refuses tiles of another checksum. Tiles at the edges reach over them."""
     tile = (17, 9, 2)[: values.ndim]
-    np.testing.assert_array_equal(read(written(tmp_path / "x.nc", values, tile, True, **packing)), values)
+    np.testing.assert_array_equal(
+        read(written(tmp_path / "x.nc", values, tile, True, **packing)), values
+    )
 
 
 @pytest.mark.parametrize("values", CONTENTS.values(), ids=CONTENTS)
 def test_without_deflate_a_tile_has_the_very_bytes_that_hdf5_gives_it(tmp_path, values):
     """But for what lies beyond the edges: tiles that fit."""
     values, tile = values[:34, :27], (17, 9, 2)[: values.ndim]
-    paths = [written(tmp_path / f"{by_us}.nc", values, tile, by_us, compression=None) for by_us in (True, False)]
+    paths = [
+        written(tmp_path / f"{by_us}.nc", values, tile, by_us, compression=None)
+        for by_us in (True, False)
+    ]
     with h5py.File(paths[0]) as ours, h5py.File(paths[1]) as theirs:
         for place in [(0,) * values.ndim, (17, 18, 0)[: values.ndim]]:
             assert ours["x"].id.read_direct_chunk(place) == theirs["x"].id.read_direct_chunk(place)
@@ -73,7 +82,11 @@ def test_pieces_come_to_their_places_in_any_order(tmp_path):
     values = RNG.normal(size=(40, 31))
     path = written(tmp_path / "x.nc", np.zeros_like(values), (8, 9), True)
     with h5py.File(path, "r+") as file:
-        for where in [(slice(16, 40), slice(18, 31)), (slice(0, 16),), (slice(16, 40), slice(0, 18))]:
+        for where in [
+            (slice(16, 40), slice(18, 31)),
+            (slice(0, 16),),
+            (slice(16, 40), slice(0, 18)),
+        ]:
             tiles.write(file["x"], values[where], where)
     np.testing.assert_array_equal(read(path), values)
 

@@ -1,4 +1,6 @@
-"""What an unfinished run has left: how much is done, how to resume, what differs from the run that is asked for."""
+"""What an unfinished run has left: how much is done, how to resume, what differs from the run that
+is asked for.
+"""
 
 import json
 import re
@@ -42,25 +44,41 @@ def refusal(small, *overrides):
 
 def test_what_is_left_is_told(left, small):
     answer = unfinished.summary("small.nc")
-    assert (answer["blocks_done"], answer["blocks"], answer["points_done"], answer["points"]) == (3, 6, 12, 24)
+    assert (answer["blocks_done"], answer["blocks"], answer["points_done"], answer["points"]) == (
+        3,
+        6,
+        12,
+        24,
+    )
     assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ", answer["last_written"])
     assert answer["resume"] == "survey run small.nc.blocks/workflow.toml -o small.nc"
     with pytest.raises(
-        Damaged, match=r"does not exist yet; .* 3 of 6 blocks \(12 of 24 points\).* resume with: survey run"
+        Damaged,
+        match=r"does not exist yet; .* 3 of 6 blocks \(12 of 24 points\).* resume with: survey run",
     ):
         survey.open("small.nc")
-    again = workflow.read(left / "workflow.toml", output="small.nc")  # the command that `resume` names
+    # the command that `resume` names
+    again = workflow.read(left / "workflow.toml", output="small.nc")
     seen = []
     engine.run(again, progress=lambda done, total, reused, **_: seen.append((done, total, reused)))
-    assert seen[0] == (3, 6, 3) and reading.check("small.nc") == [] and unfinished.summary("small.nc") == {}
+    assert (
+        seen[0] == (3, 6, 3)
+        and reading.check("small.nc") == []
+        and unfinished.summary("small.nc") == {}
+    )
 
 
 def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, monkeypatch):
     holder = json.loads((left / "holder.json").read_text())
-    (left / "holder.json").write_text(json.dumps(holder | {"resume_command": "survey run small.toml --workers 2"}))
+    (left / "holder.json").write_text(
+        json.dumps(holder | {"resume_command": "survey run small.toml --workers 2"})
+    )
     assert unfinished.summary("small.nc")["resume"] == "survey run small.toml --workers 2"
     monkeypatch.chdir("/")
-    assert unfinished.summary(tmp_path / "small.nc")["resume"] == f"cd {tmp_path} && survey run small.toml --workers 2"
+    assert (
+        unfinished.summary(tmp_path / "small.nc")["resume"]
+        == f"cd {tmp_path} && survey run small.toml --workers 2"
+    )
 
 
 def test_a_run_at_work_is_told_and_not_disturbed(left, small):
@@ -95,15 +113,18 @@ def test_other_code_is_told_plainly(left, small):
         with open(file, "wb") as opened:
             blocks.pack(arrays, opened, "of that version")
     now = manifest["code"] | {"survey": survey.__version__}
-    assert f"blocks from another version of the code (survey 0.0.9 -> {now['survey']}); go back to that" in refusal(
-        small
+    assert (
+        f"blocks from another version of the code (survey 0.0.9 -> {now['survey']}); go back to that"
+        in refusal(small)
     )
     answer = refusal(small, "solver.rtol=1e-6")
     assert "-> 1e-06)" in answer and "go back to that version and that workflow" in answer
 
 
 @pytest.mark.parametrize("damage", ["flipped", "gone", "another"])
-def test_a_damaged_manifest_costs_nothing_as_blocks_say_of_which_survey_they_are(left, small, damage):
+def test_a_damaged_manifest_costs_nothing_as_blocks_say_of_which_survey_they_are(
+    left, small, damage
+):
     manifest = left / "manifest.json"
     bits = bytearray(manifest.read_bytes())
     bits[3] ^= 128
@@ -114,7 +135,9 @@ def test_a_damaged_manifest_costs_nothing_as_blocks_say_of_which_survey_they_are
 
 def test_without_a_manifest_blocks_of_another_survey_are_not_taken(left, small):
     (left / "manifest.json").unlink()
-    with pytest.raises(Damaged, match=r"manifest\.json is missing or damaged, .* --fresh deletes them"):
+    with pytest.raises(
+        Damaged, match=r"manifest\.json is missing or damaged, .* --fresh deletes them"
+    ):
         engine.run(workflow.read(small, ["solver.rtol=1e-6"]))
     assert len(list(left.glob("*.block"))) == 3
     assert not (left.parent / "small.nc.lock").exists()
@@ -128,7 +151,10 @@ def test_blocks_of_an_older_format_are_kept_and_told(left, small):
         body = file.read_bytes()[:-8].split(b"\n", 1)[1]
         head = b'{"w": ["<f8", [4]], "status": ["|i1", [4]], "w_error": ["<f4", [4]]}\n'
         file.write_bytes(head + body + zlib.crc32(head + body).to_bytes(8, "little"))
-    assert "small.nc.blocks contains 3 finished blocks from another version of the code (format)" in refusal(small)
+    assert (
+        "small.nc.blocks contains 3 finished blocks from another version of the code (format)"
+        in refusal(small)
+    )
     assert len(list(left.glob("*.block"))) == 3
 
 
@@ -147,7 +173,9 @@ def test_what_is_there_already_needs_no_more_room(left, small, monkeypatch):
 def test_the_kept_workflow_finds_a_scene_that_lay_beside_it(tmp_path, monkeypatch):
     away = tmp_path / "away"
     away.mkdir()
-    (away / "own.py").write_text("PARAMETERS = ('a',)\nPERIOD = 1.0\n\n\ndef z(u, p):\n    return p[0]\n")
+    (away / "own.py").write_text(
+        "PARAMETERS = ('a',)\nPERIOD = 1.0\n\n\ndef z(u, p):\n    return p[0]\n"
+    )
     (away / "own.toml").write_text('scene = "own.py"\naxes = { a = { values = [1.0, 2.0] } }\n')
     monkeypatch.chdir(tmp_path)
 
@@ -162,7 +190,9 @@ def test_the_kept_workflow_finds_a_scene_that_lay_beside_it(tmp_path, monkeypatc
         away / "own.toml", "axes.a.values=[1.5]"
     )
     kept = workflow.read("own.nc.blocks/workflow.toml", output="own.nc")
-    assert fingerprint.fingerprint(kept) == fingerprint.fingerprint(workflow.read(away / "own.toml"))
+    assert fingerprint.fingerprint(kept) == fingerprint.fingerprint(
+        workflow.read(away / "own.toml")
+    )
 
 
 def test_where_nothing_is_finished_another_survey_begins(left, small):

@@ -30,8 +30,12 @@ def compiled(seen):
     return jit.fresh(lambda x: asked(x[0]))(np.zeros(1))
 
 
-@pytest.mark.parametrize("given, meanwhile", [((700, 10, 10), (10_000, 20, 20)), ((30_000, 5, 90), (30_000, 20, 90))])
-def test_the_collector_runs_seldom_while_kernels_are_compiled_and_as_before_afterwards(usual, given, meanwhile):
+@pytest.mark.parametrize(
+    "given, meanwhile", [((700, 10, 10), (10_000, 20, 20)), ((30_000, 5, 90), (30_000, 20, 90))]
+)
+def test_the_collector_runs_seldom_while_kernels_are_compiled_and_as_before_afterwards(
+    usual, given, meanwhile
+):
     seen = []
     gc.set_threshold(*given)
     compiled(seen)

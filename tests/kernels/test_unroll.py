@@ -16,7 +16,9 @@ def inner(x, y):
 
 @unroll
 def some(table, i, pair, scale, out):
-    """Every operation, in both orders, with numbers, loops, lists, tuples, places and another such function."""
+    """Every operation, in both orders, with numbers, loops, lists, tuples, places and another such
+    function.
+    """
     u, v = pair
     series = [table[0, i], u]
     for n in range(5):
@@ -37,7 +39,9 @@ def many(table, us, vs, scale, out):
 def test_compiled_as_plain():
     rng = np.random.default_rng(7)
     special = np.array([0.0, -0.0, 1.0, -1e-310, inf, -inf, nan])
-    us, vs = (values.ravel() for values in np.meshgrid(special, np.append(special, rng.normal(size=9))))
+    us, vs = (
+        values.ravel() for values in np.meshgrid(special, np.append(special, rng.normal(size=9)))
+    )
     table = rng.normal(size=(4, us.size))
     compiled, plain = np.zeros((6, us.size)), np.zeros((6, us.size))
     many(table, us, vs, 0.3, compiled)

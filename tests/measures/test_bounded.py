@@ -22,7 +22,11 @@ def inputs():
 def worst(found, exact):
     """The largest true error over the bar."""
     bars = np.broadcast_to(found.bar, found.value.shape)
-    off = [abs(mp.mpf(v) - e) / mp.mpf(b) for v, b, e in zip(found.value, bars, exact, strict=True) if b < np.inf]
+    off = [
+        abs(mp.mpf(v) - e) / mp.mpf(b)
+        for v, b, e in zip(found.value, bars, exact, strict=True)
+        if b < np.inf
+    ]
     assert len(off) > SIZE // 3
     return max(off)
 
@@ -44,7 +48,11 @@ def test_roots_and_means():
         x, y = (Bounded(abs(n.value), n.bar) for n in (x, y))
         a, b = ([abs(v) for v in n] for n in (a, b))
         assert 0.1 < worst(x.sqrt(), [mp.sqrt(v) for v in a]) <= 1.0
-        assert 0.1 < worst(bounded.mean(x, y), [mp.agm(u, v) for u, v in zip(a, b, strict=True)]) <= 1.0
+        assert (
+            0.1
+            < worst(bounded.mean(x, y), [mp.agm(u, v) for u, v in zip(a, b, strict=True)])
+            <= 1.0
+        )
 
 
 def test_what_may_vanish_has_no_finite_quotient_and_no_sign():
@@ -52,7 +60,11 @@ def test_what_may_vanish_has_no_finite_quotient_and_no_sign():
     with np.errstate(all="ignore"):
         assert np.isfinite((1.0 / near).bar).tolist() == [False, True, True]
         assert near.sign().tolist() == [0.0, 1.0, -1.0]
-        assert near.sqrt().value[0] == 0.0 and near.sqrt().bar[0] >= np.sqrt(3e-3) and np.isnan(near.sqrt().value[2])
+        assert (
+            near.sqrt().value[0] == 0.0
+            and near.sqrt().bar[0] >= np.sqrt(3e-3)
+            and np.isnan(near.sqrt().value[2])
+        )
 
 
 def test_arrays_and_numbers_count_as_exact():

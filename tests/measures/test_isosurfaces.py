@@ -1,4 +1,6 @@
-"""Triangulated surfaces in a box: closed where they should be, every corner certain, nothing where nothing is."""
+"""Triangulated surfaces in a box: closed where they should be, every corner certain, nothing where
+nothing is.
+"""
 
 import numpy as np
 import pytest
@@ -59,7 +61,9 @@ def test_a_sphere():
     centre, radius = np.array([0.52, 0.47, 0.5]), 0.37
     found = find(lambda x: ((x - centre) ** 2).sum(axis=1) - radius**2)
     assert found.kind.tolist() == [7] and found.left_out == 0
-    assert found.vertices.tolist() == [len(found.x)] and found.triangles.tolist() == [len(found.corners)]
+    assert found.vertices.tolist() == [len(found.x)] and found.triangles.tolist() == [
+        len(found.corners)
+    ]
     assert len(found.x) - len(sides(found.corners)) // 2 + len(found.corners) == 2  # Euler
     off = np.hypot(*(found.x - centre).T[:2])
     off = abs(np.hypot(off, found.x[:, 2] - centre[2]) - radius)
@@ -68,7 +72,10 @@ def test_a_sphere():
         own = found.axis == k
         along = np.zeros((own.sum(), 3))
         along[:, k] = found.error[own]
-        signs = [np.sign(((found.x[own] + s * along - centre) ** 2).sum(axis=1) - radius**2) for s in (-1, 1)]
+        signs = [
+            np.sign(((found.x[own] + s * along - centre) ** 2).sum(axis=1) - radius**2)
+            for s in (-1, 1)
+        ]
         assert own.any() and (signs[0] * signs[1] <= 0).all()
     one, two, three = found.x[found.corners].transpose(1, 0, 2)
     volume = (np.cross(one - centre, two - centre) * (three - centre)).sum() / 6
@@ -78,12 +85,19 @@ def test_a_sphere():
 
 def test_two_pieces_one_on_a_plane_of_the_lattice():
     """A plane on which the lattice's own points lie is whole; where a second function says so it ends."""
-    found = find(lambda x: (x[:, 0] - 0.5) * (x[:, 0] - 0.81), passes=lambda x: (x[:, 0] < 0.6) | (x[:, 1] > 0.5))
+    found = find(
+        lambda x: (x[:, 0] - 0.5) * (x[:, 0] - 0.81),
+        passes=lambda x: (x[:, 0] < 0.6) | (x[:, 1] > 0.5),
+    )
     assert found.triangles.tolist() == [2 * 16 * 16, 2 * 16 * 7] and found.left_out == 0
     whole = np.arange(len(found.x)) < found.vertices[0]
     assert (abs(found.x[:, 0] - np.where(whole, 0.5, 0.81)) <= found.error).all()
     assert found.x[~whole, 1].min() > 0.5
-    assert found.corners[: found.triangles[0]].max() < found.vertices[0] <= found.corners[found.triangles[0] :].min()
+    assert (
+        found.corners[: found.triangles[0]].max()
+        < found.vertices[0]
+        <= found.corners[found.triangles[0] :].min()
+    )
 
 
 @pytest.mark.parametrize(
@@ -137,4 +151,6 @@ def test_the_bits_do_not_depend_on_who_works_and_what_is_kept():
     for other in (again, third):
         for name in ("x", "error", "corners", "axis", "vertices"):
             np.testing.assert_array_equal(getattr(plain, name), getattr(other, name))
-    assert len(kept) == 17 + -(-len(plain.x) // isosurfaces.TOGETHER) + (len(plain.x) % isosurfaces.TOGETHER == 0)
+    assert len(kept) == 17 + -(-len(plain.x) // isosurfaces.TOGETHER) + (
+        len(plain.x) % isosurfaces.TOGETHER == 0
+    )

@@ -1,4 +1,6 @@
-"""Pieces of curves are followed on from their ends, past holes of the lattice, and made one where they meet."""
+"""Pieces of curves are followed on from their ends, past holes of the lattice, and made one where
+they meet.
+"""
 
 import numpy as np
 
@@ -24,7 +26,9 @@ def piece(low, high):
 def test_pieces_that_meet_are_one_and_reach_the_border():
     ((x, error),) = tips.followed(parabola, [piece(0.55, 0.7), piece(0.1, 0.3)], 1e-16)
     order = x if x[0, 0] < x[-1, 0] else x[::-1]
-    assert np.allclose(order[[0, -1]], [[0.0, 0.2], [1.0, 0.8]]) and (np.diff(order[:, 0]) > 0.0).all()
+    assert (
+        np.allclose(order[[0, -1]], [[0.0, 0.2], [1.0, 0.8]]) and (np.diff(order[:, 0]) > 0.0).all()
+    )
     assert (abs(x[:, 1] - height(x[:, 0])) <= error + 1e-15).all() and (error < 1e-6).all()
 
 

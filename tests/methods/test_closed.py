@@ -20,7 +20,9 @@ NO_FORM, EQUILIBRIUM, TURNING = 19, 17, 16
 
 
 def at(row, *times):
-    floats, turnings, status = solution.trajectories(closed, np.array([row], float), np.array([times], float), 1e-10)
+    floats, turnings, status = solution.trajectories(
+        closed, np.array([row], float), np.array([times], float), 1e-10
+    )
     return floats[0], turnings[0], status[0]
 
 
@@ -37,7 +39,9 @@ def check(found, wanted, widest):
 
 @pytest.mark.parametrize("case", REFERENCE["closed50"], ids=lambda case: case["case"])
 def test_the_three_cases_of_50(case):
-    A11, B12, B31, theta, n, phi0, t = (float(case[k]) for k in ("A11", "B12", "B31", "theta0", "n", "phi0", "t"))
+    A11, B12, B31, theta, n, phi0, t = (
+        float(case[k]) for k in ("A11", "B12", "B31", "theta0", "n", "phi0", "t")
+    )
     b12, b31 = B12 * np.sin(theta) / A11, B31 * np.sin(theta) / A11
     w0 = b12 * np.sin(phi0) + b31 * np.cos(phi0) + n / A11
     found, turnings, status = at([b12, b31, 0, 0, 0, 0, phi0, w0], t)
@@ -45,12 +49,18 @@ def test_the_three_cases_of_50(case):
     check(found[0] + [0, 0, 1e-15, 1e-15], [float(case["phi"]), float(case["w"])], 1e-12)
 
 
-@pytest.mark.parametrize("case", REFERENCE["elliptic"] + REFERENCE["multiple_root"], ids=lambda case: case["note"][:20])
+@pytest.mark.parametrize(
+    "case", REFERENCE["elliptic"] + REFERENCE["multiple_root"], ids=lambda case: case["note"][:20]
+)
 def test_elliptic_references(case):
     row = [*map(float, case["p"]), float(case["phi0"]), float(case["w0"])]
     found, _n, status = at(row, float(case["t"]))
-    if "near-degenerate" in case["note"] or case.get("variant") in (1, 3):  # a double root: digits are lost
-        assert status[0] == 3 or (np.abs(found[0, :2] - [float(case["phi"]), float(case["w"])]) <= found[0, 2:]).all()
+    # a double root: digits are lost
+    if "near-degenerate" in case["note"] or case.get("variant") in (1, 3):
+        assert (
+            status[0] == 3
+            or (np.abs(found[0, :2] - [float(case["phi"]), float(case["w"])]) <= found[0, 2:]).all()
+        )
         return
     assert status[0] == 0
     check(found[0], [float(case["phi"]), float(case["w"])], 3e-12)
@@ -58,7 +68,9 @@ def test_elliptic_references(case):
 
 @pytest.mark.parametrize("case", REFERENCE["trig61"])
 def test_61(case):
-    b12, b31, d, c23, s2, s3, phi0 = (float(case[k]) for k in ("b12", "b31", "d", "c23", "s2", "s3", "phi0"))
+    b12, b31, d, c23, s2, s3, phi0 = (
+        float(case[k]) for k in ("b12", "b31", "d", "c23", "s2", "s3", "phi0")
+    )
     F = b12 * np.sin(phi0) + b31 * np.cos(phi0)
     row = [b12, b31, d, c23, s2, s3, phi0, float(case["mu"]) * F + float(case["n"])]
     found, _n, status = at(row, float(case["t"]))
@@ -148,7 +160,9 @@ def quadrature(row, a, b):
     def V(x):
         return d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
 
-    return mp.quad(lambda x: 1 / mp.sqrt(w0**2 + 2 * (V(phi0) - V(x))), mp.linspace(mp.mpf(a), mp.mpf(b), 9))
+    return mp.quad(
+        lambda x: 1 / mp.sqrt(w0**2 + 2 * (V(phi0) - V(x))), mp.linspace(mp.mpf(a), mp.mpf(b), 9)
+    )
 
 
 @pytest.mark.parametrize("name", ELLIPTIC)
@@ -175,7 +189,9 @@ def test_elliptic_against_taylor(name):
 
 
 def test_turning_points():
-    """A pendulum from the bottom turns where cos phi = 1 - w0^2/2, after K/omega; phase and turnings at large t."""
+    """A pendulum from the bottom turns where cos phi = 1 - w0^2/2, after K/omega; phase and
+    turnings at large t.
+    """
     row = [0, 0, 0, 0, 0, 1.0, 0.0, 1.0]
     quarter = float(mp.ellipk(0.25))
     found, status = passing(row, 0.5, 2.0)
@@ -191,7 +207,13 @@ def test_turning_points():
 def test_random_points_agree_with_taylor_within_both_bars(kind):
     random = np.random.default_rng(5)
     rows = random.normal(size=(150, 8)) * [1, 1, 2, 2, 2, 2, 3, 2]
-    zero = {"g = 0": [2, 3, 4, 5], "b = 0": [0, 1], "pendulum": [0, 1, 2, 3], "s = 0": [0, 1, 4, 5], "61": []}[kind]
+    zero = {
+        "g = 0": [2, 3, 4, 5],
+        "b = 0": [0, 1],
+        "pendulum": [0, 1, 2, 3],
+        "s = 0": [0, 1, 4, 5],
+        "61": [],
+    }[kind]
     rows[:, zero] = 0.0
     if kind == "61":
         b12, b31, n, mu = rows[:, 0], rows[:, 1], random.normal(size=150), random.normal(size=150)
@@ -217,20 +239,29 @@ NAMES = (*gyrostat._SYSTEM, "phi0", "w0")
 
 def solve(question, method, **values):
     point = {
-        name: np.atleast_1d(np.asarray(values.get(name, 0.0), float)) for name in (*gyrostat._SYSTEM, "phi0", "w0")
+        name: np.atleast_1d(np.asarray(values.get(name, 0.0), float))
+        for name in (*gyrostat._SYSTEM, "phi0", "w0")
     }
-    point |= {name: np.atleast_1d(np.asarray(values[name], float)) for name in ("t", "phi") if name in values}
+    point |= {
+        name: np.atleast_1d(np.asarray(values[name], float))
+        for name in ("t", "phi")
+        if name in values
+    }
     return gyrostat.solve(point, Request({"question": question}, method, 1e-10))
 
 
 def test_auto_takes_the_closed_form_point_by_point():
     b12, t = np.array([0.0, 0.3, 0.0]), np.array([4.0])
     system = {"b12": b12, "d": 1.0, "s3": 0.5, "phi0": 0.4, "w0": [1.0, 1.0, np.sqrt(2.0)], "t": t}
-    auto, by_name, steps = (solve("trajectory", method, **system) for method in ("auto", "closed", "taylor"))
+    auto, by_name, steps = (
+        solve("trajectory", method, **system) for method in ("auto", "closed", "taylor")
+    )
     assert by_name["status"].tolist()[:2] == [0, NO_FORM] and (auto["status"] == 0).all()
     assert auto["phi"][0] == by_name["phi"][0] and auto["phi"][1] == steps["phi"][1]
     for i in range(3):
-        alone = solve("trajectory", "auto", **(system | {"b12": b12[i : i + 1], "w0": [system["w0"][i]]}))
+        alone = solve(
+            "trajectory", "auto", **(system | {"b12": b12[i : i + 1], "w0": [system["w0"][i]]})
+        )
         assert all(alone[name][0] == auto[name][i] for name in auto)
 
 

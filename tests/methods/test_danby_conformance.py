@@ -15,7 +15,9 @@ from survey.methods import rk4, taylor16
 
 METHODS = [modules.load(survey.methods, name, "method") for name in modules.names(survey.methods)]
 CHAINS = [m for m in METHODS if "danby" in m.SERVES and not getattr(m, "ADAPTIVE", False)]
-POINTS = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())["points"]
+POINTS = json.loads(
+    resources.files("survey.reference").joinpath("libration_elliptic.json").read_text()
+)["points"]
 POINTS = [row for row in POINTS if row["e"] < 0.7]
 EXACT = np.array([[float(row[name]) for name in ("A", "B", "C", "D", "t")] for row in POINTS])
 E = np.array([row["e"] for row in POINTS])
@@ -44,14 +46,20 @@ def one_step(f, h, parts=1):
     """A to t of one step from f by midpoint Taylor, in `parts` steps."""
     ends, out = f + h * np.arange(parts) / parts, np.empty((1, 10))
     v = 1 + np.cos(ends[:, None] + np.array(taylor16.NODES) * h / parts)
-    taylor16.danby_chain(v, np.full(parts, h / parts), np.full(1, 0.3), *danby.rates(np.full(1, 0.02)), out)
+    taylor16.danby_chain(
+        v, np.full(parts, h / parts), np.full(1, 0.3), *danby.rates(np.full(1, 0.02)), out
+    )
     return out[0, :5]
 
 
 def test_the_order_of_midpoint_taylor():
-    """Of one step, over 16 places: the determinants see some of its errors one order later, so it is a lower bound."""
+    """Of one step, over 16 places: the determinants see some of its errors one order later, so it
+    is a lower bound.
+    """
     sizes, places = np.geomspace(0.2, 3.0, 40), np.linspace(0.0, 3.0, 16)
-    error = np.array([sum(abs(one_step(f, h) - one_step(f, h, 24)).sum() for f in places) for h in sizes])
+    error = np.array(
+        [sum(abs(one_step(f, h) - one_step(f, h, 24)).sum() for f in places) for h in sizes]
+    )
     window = (error > 3e-12) & (error < 1e-3)
     assert window.sum() >= 8
     measured = np.polyfit(np.log(sizes[window]), np.log(error[window]), 1)[0] - 1

@@ -14,7 +14,11 @@ from survey.kernels.math import runge_kutta
 from survey.measures.cylinder import solution
 
 FOUND = [modules.load(methods, name, "method") for name in modules.names(methods)]
-FLOWS = [pytest.param(m, id=m.__name__.split(".")[-1]) for m in FOUND if "cylinder" in m.SERVES and m.ORDER]
+FLOWS = [
+    pytest.param(m, id=m.__name__.split(".")[-1])
+    for m in FOUND
+    if "cylinder" in m.SERVES and m.ORDER
+]
 STEPS = [m for m in FLOWS if hasattr(m.values[0], "flow_at")]  # those that step in (phi, w)
 each, each_step = pytest.mark.parametrize("method", FLOWS), pytest.mark.parametrize("method", STEPS)
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
@@ -32,9 +36,13 @@ def test_there_is_a_choice():
 
 
 def widened(function, **names):
-    """The same source in mpmath's arithmetic: binary64 leaves high orders no room between too coarse and rounding."""
+    """The same source in mpmath's arithmetic: binary64 leaves high orders no room between too
+    coarse and rounding.
+    """
     plain = getattr(function, "py_func", function)
-    source = inspect.getsource(plain).partition("\n")[2].replace("1.0 / (n + 1)", "mp.mpf(1) / (n + 1)")
+    source = (
+        inspect.getsource(plain).partition("\n")[2].replace("1.0 / (n + 1)", "mp.mpf(1) / (n + 1)")
+    )
     scope = {**plain.__globals__, "math": mp, "mp": mp, **names}
     exec(source, scope)
     return scope[function.__name__]
@@ -51,9 +59,18 @@ def wide_end(method, span, steps):
     if hasattr(method, "_flow_classical"):
         slope = widened(method._flow_slope, values=values)
         step = widened(runge_kutta.classical)
-        inner["_flow_classical"] = widened(method._flow_classical, classical=step, _flow_slope=slope)
-    at, T = widened(method.flow_at, **inner), np.full((flow.LAST + 1, flow.ROWS), mp.mpf(0), dtype=object)
-    p, (phi, w), h = [mp.mpf(str(x)) for x in SIX], (mp.mpf("1.5"), mp.mpf("0.8")), mp.mpf(span) / steps
+        inner["_flow_classical"] = widened(
+            method._flow_classical, classical=step, _flow_slope=slope
+        )
+    at, T = (
+        widened(method.flow_at, **inner),
+        np.full((flow.LAST + 1, flow.ROWS), mp.mpf(0), dtype=object),
+    )
+    p, (phi, w), h = (
+        [mp.mpf(str(x)) for x in SIX],
+        (mp.mpf("1.5"), mp.mpf("0.8")),
+        mp.mpf(span) / steps,
+    )
     for _ in range(steps):
         series(p, phi, w, T, flow.ORDER if method.ORDER > flow.LOW else 1)
         phi, w, _e, _y = at(p, T, h)
@@ -65,7 +82,11 @@ def test_measured_order(method):
     """On a nonlinear orbit with turning points, by equal steps."""
     span, first, second = {4: (3, 40, 80), 8: (12, 128, 180), 20: (1, 50, 100)}[method.ORDER]
     with mp.workdps(60):
-        end = np.array([mp.mpf(x) for x in TWELVE]) if span == 12 else wide_end(best_method(), span, 200)
+        end = (
+            np.array([mp.mpf(x) for x in TWELVE])
+            if span == 12
+            else wide_end(best_method(), span, 200)
+        )
         error = [mp.norm(list(wide_end(method, span, n) - end)) for n in (first, second)]
         order = mp.log(error[0] / error[1]) / mp.log(mp.mpf(second) / first)
     assert abs(order - method.ORDER) < 0.15
@@ -102,7 +123,9 @@ def test_reference_trajectories_lie_within_their_bars(method, rtol):
             if case.get("form", "time") != "time":
                 continue
             row = np.array([[*map(float, case["p"]), float(case["phi0"]), float(case["w0"])]])
-            floats, _n, status = solution.trajectories(method, row, np.array([[float(case["t"])]]), rtol)
+            floats, _n, status = solution.trajectories(
+                method, row, np.array([[float(case["t"])]]), rtol
+            )
             error = np.abs(floats[0, 0, :2] - [float(case["phi"]), float(case["w"])])
             assert status[0, 0] == 0
             assert (error <= floats[0, 0, 2:] + 1e-12 * (1 + np.abs(floats[0, 0, :2]))).all()

@@ -15,7 +15,8 @@ from survey.methods import full, taylor
 
 SIX, START = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), (1.5, 0.8)
 (REFERENCE,) = json.loads((files("survey.reference") / "gyrostat.json").read_text())["sixd"]
-# (A22, A23, A33, B22, B23, B33, C11, lambda1) / A11: axis 1 has the largest, the middle, the smallest inertia
+# (A22, A23, A33, B22, B23, B33, C11, lambda1) / A11: axis 1 has the largest, the middle, the
+# smallest inertia
 LARGEST = (0.5, 0.07, 0.6, 0.3, 0.07, -0.2, 0.1, 3.0)
 MIDDLE = (0.6, 0.07, 1.4, 0.3, 0.07, -0.2, 0.1, 0.0)
 SMALLEST = (1.7, 0.07, 1.4, 0.3, 0.07, -0.2, 0.1, 0.0)
@@ -60,7 +61,9 @@ def slopes(G, state):
         - (c11 * v1 + c12 * v2 + c31 * v3) * v2 + (c12 * v1 + c22 * v2 + c23 * v3) * v1 + s1 * v2 - s2 * v1,
     ]  # fmt: skip
     turn = [v2 * w3 - v3 * w2, v3 * w1 - v1 * w3, v1 * w2 - v2 * w1]
-    return np.concatenate([np.linalg.solve(G[:3].astype(float), np.array(torque, float)), np.array(turn, float)])
+    return np.concatenate(
+        [np.linalg.solve(G[:3].astype(float), np.array(torque, float)), np.array(turn, float)]
+    )
 
 
 def random_system(seed):
@@ -126,12 +129,21 @@ def test_energy_is_no_integral():
 
 
 def test_reference_in_the_rotated_frame():
-    case = {k: float(v) for k, v in REFERENCE.items() if k in ("lambda1", "s2", "s3", "phi0", "w0", "t", "phi", "w")}
+    case = {
+        k: float(v)
+        for k, v in REFERENCE.items()
+        if k in ("lambda1", "s2", "s3", "phi0", "w0", "t", "phi", "w")
+    }
     A, B, C = ({k: float(v) for k, v in REFERENCE[name].items()} for name in "ABC")
     a = A["A11"]
     six = np.array([B["B12"], B["B31"], C["C22"] - C["C33"], C["C23"], case["s2"], case["s3"]]) / a
     shift = (0.75 * C["C33"] + 0.25 * C["C22"]) / a  # C + x I moves nothing, as nu x nu = 0
-    free = np.array([A["A22"], A["A23"], A["A33"], B["B22"], B["B23"], B["B33"], C["C11"], case["lambda1"]]) / a
+    free = (
+        np.array(
+            [A["A22"], A["A23"], A["A33"], B["B22"], B["B23"], B["B33"], C["C11"], case["lambda1"]]
+        )
+        / a
+    )
     free[gyrostat.C11] -= shift
     states, _ = motion(*system(free, six, (case["phi0"], case["w0"])), np.array([case["t"]]))
     w1, w2, w3, nu1, nu2, nu3 = aligned(states)[0]
@@ -140,9 +152,13 @@ def test_reference_in_the_rotated_frame():
 
 
 def residual(free, six=SIX, start=START):
-    """Largest distance of the full motion to the reduced one over t <= 20, and the largest growth of a deviation."""
+    """Largest distance of the full motion to the reduced one over t <= 20, and the largest growth
+    of a deviation.
+    """
     states, tangent = motion(*system(free, six, start))
-    floats, _n, status = solution.trajectories(taylor, np.array([[*six, *start]]), TIMES[None], 1e-13)
+    floats, _n, status = solution.trajectories(
+        taylor, np.array([[*six, *start]]), TIMES[None], 1e-13
+    )
     assert (status == 0).all()
     phi, w = floats[0, :, 0], floats[0, :, 1]
     zero = np.zeros_like(phi)
@@ -177,7 +193,9 @@ def test_the_tangent_map_is_the_derivative():
     for i in range(6):
         kick = 1e-6 * np.eye(6)[i]
         ahead, behind = (motion(G, state + s * kick, np.array([2.0]))[0][0] for s in (1, -1))
-        np.testing.assert_allclose(tangent[0, :, i], (ahead - behind) / 2e-6, rtol=0, atol=1e-6 * np.abs(tangent).max())
+        np.testing.assert_allclose(
+            tangent[0, :, i], (ahead - behind) / 2e-6, rtol=0, atol=1e-6 * np.abs(tangent).max()
+        )
 
 
 def test_bars_hold_on_random_points():
@@ -193,10 +211,15 @@ def test_bars_hold_on_random_points():
     assert known.mean() > 0.9 and np.array_equal(count[known], truth[known])
 
 
-@pytest.mark.parametrize("scale", [(1, 1, 1, 1, 1, 1, 3, 0), (0, 0, 1, 0, 0, 1, 3, 0), (10, 10, 1, 1, 1, 1, 3, 1)])
+@pytest.mark.parametrize(
+    "scale", [(1, 1, 1, 1, 1, 1, 3, 0), (0, 0, 1, 0, 0, 1, 3, 0), (10, 10, 1, 1, 1, 1, 3, 1)]
+)
 def test_bars_hold_and_are_narrow_at_coarse_tolerances(scale):
     """From rest every second term vanishes; steps are shorter than the tolerance asks, and the bars know."""
-    rows, times = np.random.default_rng(8).normal(size=(20, 8)) * scale, np.tile([0.3, 2.0, 8.0], (20, 1))
+    rows, times = (
+        np.random.default_rng(8).normal(size=(20, 8)) * scale,
+        np.tile([0.3, 2.0, 8.0], (20, 1)),
+    )
     mine, _count, ok = solution.trajectories(full, rows, times, 1e-4)
     best, _truth, fine = solution.trajectories(taylor, rows, times, 1e-13)
     assert (ok == 0).all() and (fine == 0).all()
@@ -208,7 +231,11 @@ def test_bars_hold_and_are_narrow_at_coarse_tolerances(scale):
 @pytest.mark.parametrize("growth", [0.1, 1.0, 5.0])
 def test_errors_that_add_up_lie_within_the_bars(steps, growth):
     """The local errors of all six components, each with its worst sign, by equal steps that mix them."""
-    G, T, V = np.zeros((14, 3)), np.zeros((gyrostat.LAST + 1, 12)), np.zeros((gyrostat.LOW + 1, 6, 12))
+    G, T, V = (
+        np.zeros((14, 3)),
+        np.zeros((gyrostat.LAST + 1, 12)),
+        np.zeros((gyrostat.LOW + 1, 6, 12)),
+    )
     T[gyrostat.LAST, 0] = local = 1e-12
     _G, state = system(LARGEST)
     s, c = np.sin(START[0]), np.cos(START[0])
@@ -219,7 +246,12 @@ def test_errors_that_add_up_lie_within_the_bars(steps, growth):
         signs = np.where(weight < 0, -1.0, 1.0)
         matrix = np.eye(6) + np.expm1(growth / steps) * np.outer(signs, signs) / 6
         V[0, :, :6] = matrix.T
-        squares, J, work, out = local**2 * np.eye(6), np.empty((6, 6)), np.empty((6, 6)), np.empty(4)
+        squares, J, work, out = (
+            local**2 * np.eye(6),
+            np.empty((6, 6)),
+            np.empty((6, 6)),
+            np.empty(4),
+        )
         worst, rows = 0.0, weight
         for _ in range(steps):
             gyrostat.carry(G, T, V, 0.0, squares, J, work)

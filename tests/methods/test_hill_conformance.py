@@ -1,4 +1,5 @@
-"""What every method in the folder promises of Hill's equation: its order, and bars that hold the error.
+"""What every method in the folder promises of Hill's equation: its order, and bars that hold the
+error.
 
 The equation is Mathieu's, whose z varies strongly in time.
 """
@@ -17,7 +18,11 @@ from survey.kernels.lanes import chain
 from survey.measures.hill import pointwise
 from survey.methods import magnus6, rk4, taylor16
 
-HILL = [n for n in modules.names(survey.methods) if "hill" in modules.load(survey.methods, n, "method").SERVES]
+HILL = [
+    n
+    for n in modules.names(survey.methods)
+    if "hill" in modules.load(survey.methods, n, "method").SERVES
+]
 ZERO = np.zeros(1, np.int64)
 PROBLEM = mathieu([np.linspace(8.0, 16.0, 8)], [5.0], half_periods=8)
 
@@ -26,7 +31,9 @@ def fixed(method, steps):
     """Results of a chain of `steps` equal steps of the method."""
     out = np.empty((8, 10))
     samples = PROBLEM.sample(np.zeros(1, int), np.array(method.NODES), steps)
-    method.hill_chain(samples, 0.0, PROBLEM.lengths(ZERO, steps), PROBLEM.p[0], np.arange(8), ZERO, ZERO + 8, out)
+    method.hill_chain(
+        samples, 0.0, PROBLEM.lengths(ZERO, steps), PROBLEM.p[0], np.arange(8), ZERO, ZERO + 8, out
+    )
     return out
 
 
@@ -42,17 +49,23 @@ def step(method, start, h, parts=1):
         a, b, c, d, *_ = method.hill_step(samples[0, 0, 0] + 1.0, h)
         return np.array([a, c, b, d])
     out = np.empty((1, 10))
-    method.hill_chain(samples, 0.0, np.full((1, parts), h / parts), np.ones(1), ZERO, ZERO, ZERO + 1, out)
+    method.hill_chain(
+        samples, 0.0, np.full((1, parts), h / parts), np.ones(1), ZERO, ZERO, ZERO + 1, out
+    )
     return out[0, :4]
 
 
 def measured_order(method):
-    """Slope of the logarithm of one step's error, less 1, over 16 places, where rounding does not reach.
+    """Slope of the logarithm of one step's error, less 1, over 16 places, where rounding does not
+    reach.
 
-    One step, because it leaves high orders a range of 3 in h between rounding and the realm of higher terms.
+    One step, because it leaves high orders a range of 3 in h between rounding and the realm of
+    higher terms.
     """
     sizes, places = np.geomspace(0.02, 4.0, 80), np.linspace(0.0, 3.0, 16)
-    error = np.array([sum(norm(step(method, t, h) - step(taylor16, t, h, 24)) for t in places) for h in sizes])
+    error = np.array(
+        [sum(norm(step(method, t, h) - step(taylor16, t, h, 24)) for t in places) for h in sizes]
+    )
     window = (error < 1e-3) & (error > 3e-13)
     assert window.sum() >= 10
     return np.polyfit(np.log(sizes[window]), np.log(error[window]), 1)[0] - 1
@@ -81,7 +94,9 @@ def bars_hold(method):
     return all(held) and len(held) > 10
 
 
-CHAINS = [n for n in HILL if not getattr(modules.load(survey.methods, n, "method"), "ADAPTIVE", False)]
+CHAINS = [
+    n for n in HILL if not getattr(modules.load(survey.methods, n, "method"), "ADAPTIVE", False)
+]
 
 
 @pytest.mark.parametrize("name", CHAINS)

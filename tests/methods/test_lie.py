@@ -1,4 +1,6 @@
-"""Lie series at L4: within the bars of the closed forms and of Deprit's triangle, and the algebra that it rests on."""
+"""Lie series at L4: within the bars of the closed forms and of Deprit's triangle, and the algebra
+that it rests on.
+"""
 
 import json
 from importlib.resources import files
@@ -19,7 +21,9 @@ MASSES = np.random.default_rng(6).uniform(1e-4, MU_R, 100)
 SMALL = np.array([1e-7, 1e-5, 9.5388e-4])
 # by `lie_twin.normal_form(mpf(mu), 8)`, 40 digits
 DATA = json.loads((files("survey.reference") / "libration_order_8.json").read_text())
-ORDER_8 = {row["mu"]: {tuple(map(int, name)): c for name, c in row["c8"].items()} for row in DATA["points"]}
+ORDER_8 = {
+    row["mu"]: {tuple(map(int, name)): c for name, c in row["c8"].items()} for row in DATA["points"]
+}
 
 
 def name(label):
@@ -38,7 +42,9 @@ def ratios(mu, order=6):
     return errors
 
 
-@pytest.mark.parametrize("mu", [MASSES, exact.masses(12, seed=3)], ids=["random", "small and near the critical values"])
+@pytest.mark.parametrize(
+    "mu", [MASSES, exact.masses(12, seed=3)], ids=["random", "small and near the critical values"]
+)
 def test_the_bars_hold(mu):
     values, bars = lie.coefficients(mu, 6)
     assert (np.isfinite(values) == np.isfinite(bars)).all() and np.isfinite(values[:6]).mean() > 0.9
@@ -52,7 +58,8 @@ def test_the_bars_are_not_absurd():
     assert np.median(relative) < 1e-11
 
 
-# what plain float64 leaves of the digits at (place, distance): worst of order 4, worst of order 6 without c003, c003
+# what plain float64 leaves of the digits at (place, distance): worst of order 4, worst of order 6
+# without c003, c003
 MU_1, MU_2 = map(float, exact.CRITICAL[:2])
 DIGITS = {
     (0, 1e-7): (5.0, -6, -6), (0, 1e-5): (8.2, 3.5, -0.2), (0, 9.5388e-4): (11.3, 8.2, 6.1),
@@ -113,7 +120,9 @@ def test_imaginary_parts_vanish(order):
 
 
 def test_exchanging_the_modes_exchanges_the_indices():
-    """c_jik of (w1, w2) is c_ijk of (-w2, -w1): the kernel run with the two modes' linear forms and rates exchanged."""
+    """c_jik of (w1, w2) is c_ijk of (-w2, -w1): the kernel run with the two modes' linear forms and
+    rates exchanged.
+    """
     mu = MASSES[:8]
     plain, exchanged = lie_plan.solved(kernel.normal_forms, mu, 8)[0], solved_exchanged(mu, 8)
     for m, (i, j, k) in enumerate(lie.labels(8)):
@@ -141,7 +150,9 @@ def solved_exchanged(mu, order):
 
 
 def test_brackets_are_canonical():
-    """The tables' {z_j, zbar_l} = i on all pairs, and Leibniz on monomials: {z1 zbar1, m} has the eigenvalue i k_1."""
+    """The tables' {z_j, zbar_l} = i on all pairs, and Leibniz on monomials: {z1 zbar1, m} has the
+    eigenvalue i k_1.
+    """
     ones, squares = monomials(1, True), brackets(2, 2)
     quadratic = monomials(2)
     assert len(ones.keys) == 4
@@ -155,7 +166,9 @@ def test_brackets_are_canonical():
 
 
 def test_twice_the_bracket_of_a_cubic_is_antisymmetric():
-    """{F, i G} over representatives equals -{G, i F} where both are whole functions of random real coefficients."""
+    """{F, i G} over representatives equals -{G, i F} where both are whole functions of random real
+    coefficients.
+    """
     random = np.random.default_rng(0)
     m, out = monomials(3), monomials(4)
     parts = []
@@ -173,11 +186,15 @@ def test_twice_the_bracket_of_a_cubic_is_antisymmetric():
 def test_a_mass_has_the_same_bits_in_any_batch():
     together = lie_plan.solved(kernel.normal_forms, MASSES, 8)[0]
     for part in (slice(0, 1), slice(37, 80), slice(50, 99)):
-        np.testing.assert_array_equal(lie_plan.solved(kernel.normal_forms, MASSES[part], 8)[0], together[:, :, part])
+        np.testing.assert_array_equal(
+            lie_plan.solved(kernel.normal_forms, MASSES[part], 8)[0], together[:, :, part]
+        )
 
 
 def test_outside_the_domain_and_at_a_resonance():
-    values, bars = lie.coefficients(np.array([0.0, -0.01, MU_R * 1.001, 0.3, np.nan, float(exact.CRITICAL[0])]), 6)
+    values, bars = lie.coefficients(
+        np.array([0.0, -0.01, MU_R * 1.001, 0.3, np.nan, float(exact.CRITICAL[0])]), 6
+    )
     assert np.isnan(values[:, :5]).all() and np.isnan(bars[:, :5]).all()
     assert np.isnan(values[1:3, 5]).all()
     with pytest.raises(ValueError, match="even"):

@@ -1,4 +1,6 @@
-"""Lie series in double-double: within bars that are those of rounding, where those of float64 hold nothing any more."""
+"""Lie series in double-double: within bars that are those of rounding, where those of float64 hold
+nothing any more.
+"""
 
 import json
 from importlib.resources import files
@@ -23,7 +25,9 @@ HARD = (2e-5, 0.032622406831841425 * (1 + 1e-9), 0.0285954792089683170661 * (1 -
 
 
 def over_bars(mu, order, known):
-    """|error| / bar (M, N) with coefficients `known`, {label: value} at each mu; NaN where there is no answer."""
+    """|error| / bar (M, N) with coefficients `known`, {label: value} at each mu; NaN where there is
+    no answer.
+    """
     values, bars = lie_double.coefficients(mu, order)
     found = np.full(values.shape, np.nan)
     for n, exactly in enumerate(known):
@@ -36,7 +40,10 @@ def over_bars(mu, order, known):
 @pytest.mark.parametrize("mu", [MASSES, BESIDE], ids=["random", "beside poles, mu_R and 0"])
 def test_order_6_against_the_closed_forms(mu):
     with mp.workdps(45):
-        known = [{tuple(map(int, k)): v for k, v in exact.forms(one).items() if k.isdigit()} for one in mu]
+        known = [
+            {tuple(map(int, k)): v for k, v in exact.forms(one).items() if k.isdigit()}
+            for one in mu
+        ]
         off, relative = over_bars(mu, 6, known)
     assert np.nanmax(off) < 1.0 and np.isfinite(off).mean() > 0.98 and np.nanmedian(off) > 0.1
     if mu is MASSES:
@@ -48,7 +55,9 @@ def test_order_8_against_deprits_triangle():
         known = [{tuple(map(int, k)): mpf(v) for k, v in row["c8"].items()} for row in DATA]
         for row, exactly in zip(DATA, known, strict=True):
             values, bars = lie_double.coefficients(np.array([row["mu"]]), 8)
-            found = dict(zip(lie.labels(8), zip(values[:, 0], bars[:, 0], strict=True), strict=True))
+            found = dict(
+                zip(lie.labels(8), zip(values[:, 0], bars[:, 0], strict=True), strict=True)
+            )
             for label, c in exactly.items():
                 value, bar = found[label]
                 assert abs(mpf(value) - c) <= bar < 2e-16 * abs(value)
@@ -67,16 +76,30 @@ def test_order_8_beside_resonances_against_deprits_triangle():
 def test_the_parts_behind_the_point_are_right():
     """The high and the low part together are within the bar that leaves the rounding to float64 out."""
     what, mu = lie_plan.plan(6), MASSES[: kernel.LANES]
-    big, divisors = np.zeros((what.rows, kernel.WIDTH)), np.empty((len(what.harmonics), 3 * kernel.LANES))
+    big, divisors = (
+        np.zeros((what.rows, kernel.WIDTH)),
+        np.empty((len(what.harmonics), 3 * kernel.LANES)),
+    )
     for i, one in enumerate(mu):
         kernel.start(one, i, what.harmonics, big, divisors)
-    kernel.run(what.code, what.indices, what.numbers, divisors, big, np.empty((0, 2, 3, mu.size)), 0, mu.size)
+    kernel.run(
+        what.code,
+        what.indices,
+        what.numbers,
+        divisors,
+        big,
+        np.empty((0, 2, 3, mu.size)),
+        0,
+        mu.size,
+    )
     with mp.workdps(45):
         off = []
         for i, one in enumerate(mu):
             known = exact.forms(one)
             for row, label in zip(what.diagonal, lie.labels(6), strict=True):
-                high, low, bar = (big[row, part + i] for part in (kernel.RE, kernel.RE_LOW, kernel.BAR))
+                high, low, bar = (
+                    big[row, part + i] for part in (kernel.RE, kernel.RE_LOW, kernel.BAR)
+                )
                 off.append(abs(mpf(high) + mpf(low) - known["".join(map(str, label))]) / mpf(bar))
     assert max(off) < 1.0 and np.median(np.array(off, dtype=float)) > 1e-7
 
@@ -84,14 +107,18 @@ def test_the_parts_behind_the_point_are_right():
 def test_constants_have_their_second_halves():
     """sqrt(3) and 1/n! are given to 30 digits: of the multiples some are no float64."""
     what = lie_plan.plan(6)
-    terms = [t for op, *_, first, last in what.code if op == lie_plan.LINEAR for t in range(first, last)]
+    terms = [
+        t for op, *_, first, last in what.code if op == lie_plan.LINEAR for t in range(first, last)
+    ]
     high, low = what.numbers[:, terms]
     assert (abs(low) <= 2.0**-51 * abs(high)).all() and np.count_nonzero(low) > 100
 
 
 def test_auto_meets_the_accuracy_at_order_8():
     mu = np.array([0.001, 0.01, 0.02, 0.03, 0.0354, 0.038])
-    one, other = (survey.evaluate("libration", mu=mu, order="8", method=method) for method in ("lie", "auto"))
+    one, other = (
+        survey.evaluate("libration", mu=mu, order="8", method=method) for method in ("lie", "auto")
+    )
     assert (one.c8_error > 1e-10 * (1 + abs(one.c8))).any("monomial8").all()
     assert (other.c8_error <= 1e-10 * (1 + abs(other.c8))).all()
     assert (abs(one.c8 - other.c8) <= one.c8_error + other.c8_error).all()

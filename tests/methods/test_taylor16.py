@@ -1,4 +1,6 @@
-"""The order of the midpoint Taylor step, proved on power series in h: double precision leaves no room to measure 16."""
+"""The order of the midpoint Taylor step, proved on power series in h: double precision leaves no
+room to measure 16.
+"""
 
 import numpy as np
 
@@ -8,7 +10,9 @@ DEGREE = 20
 
 
 class Series:
-    """A power series in h, cut after h^20, perhaps over h; abs and division by anything but h serve bounds only."""
+    """A power series in h, cut after h^20, perhaps over h; abs and division by anything but h serve
+    bounds only.
+    """
 
     def __init__(self, coefficients):
         self.c = np.zeros(DEGREE + 2)
@@ -80,6 +84,8 @@ def test_local_error_is_h_to_the_17():
     first = 0.0
     for mine, wanted in zip(got, exact(z), strict=True):
         difference = abs(mine.c - wanted.c)
-        assert np.all(difference[: taylor16.ORDER + 1] < 1e-14 * abs(wanted.c[: taylor16.ORDER + 1]) + 1e-18)
+        assert np.all(
+            difference[: taylor16.ORDER + 1] < 1e-14 * abs(wanted.c[: taylor16.ORDER + 1]) + 1e-18
+        )
         first = max(first, difference[taylor16.ORDER + 1])
     assert first > 1e-17

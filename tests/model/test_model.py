@@ -1,4 +1,6 @@
-"""Models of maps: true errors within the bars, verdicts that never contradict, and files that other programs read."""
+"""Models of maps: true errors within the bars, verdicts that never contradict, and files that other
+programs read.
+"""
 
 import hashlib
 import json
@@ -49,7 +51,12 @@ def z(u, p):
 
 def workflow(scene, axes, **more):
     table = {name: {"start": a, "stop": b, "num": 40} for name, (a, b) in axes.items()}
-    return {"scene": str(scene), "axes": table, "solver": {"rtol": 1e-12}, "output": {"path": "unused.nc"}} | more
+    return {
+        "scene": str(scene),
+        "axes": table,
+        "solver": {"rtol": 1e-12},
+        "output": {"path": "unused.nc"},
+    } | more
 
 
 @pytest.fixture(scope="module")
@@ -70,11 +77,17 @@ def satellite(folder):
 
 MAPS = {
     "mathieu": lambda at: workflow("mathieu", {"a": (0.0, 20.0), "q": (0.0, 10.0)}),
-    "libration_elliptic": lambda at: workflow("libration_elliptic", {"mu": (0.0, 0.055), "e": (0.0, 0.7)}),
-    "rotations": lambda at: workflow("satellite", {"k": (1.2, 2.5), "rho": (-1.5, 1.5)}, options={"body": "oblate"}),
+    "libration_elliptic": lambda at: workflow(
+        "libration_elliptic", {"mu": (0.0, 0.055), "e": (0.0, 0.7)}
+    ),
+    "rotations": lambda at: workflow(
+        "satellite", {"k": (1.2, 2.5), "rho": (-1.5, 1.5)}, options={"body": "oblate"}
+    ),
     "odd": lambda at: workflow(at / "odd.py", {"a": (0.0, 5.0), "q": (0.0, 2.0)}),
     "pair": lambda at: workflow(at / "pair.py", {"w": (0.3, 1.2), "e": (0.0, 0.8)}),
-    "coupled": lambda at: workflow(ROOT / "workflows/coupled_mathieu.py", {"Omega": (1.0, 1.6), "epsilon": (0.0, 0.3)}),
+    "coupled": lambda at: workflow(
+        ROOT / "workflows/coupled_mathieu.py", {"Omega": (1.0, 1.6), "epsilon": (0.0, 0.3)}
+    ),
 }
 
 
@@ -92,7 +105,10 @@ def compared(checked, path, number, seed):
     rng = np.random.default_rng(seed)
     x, y = (rng.uniform(low, high, number) for low, high in zip(model.low, model.high, strict=True))
     found = model.at(x, y, model.outputs)
-    given = {name: xr.DataArray(values, dims="p") for name, values in zip(model.names, (x, y), strict=True)}
+    given = {
+        name: xr.DataArray(values, dims="p")
+        for name, values in zip(model.names, (x, y), strict=True)
+    }
     scene = checked.name if isinstance(checked.scene, type(sys)) else checked.scene
     more = dict(checked.request.options) | model.about["fixed"]
     return found, survey.evaluate(scene, rtol=1e-13, method="auto", **more, **given)
@@ -125,11 +141,20 @@ def test_damped_hill_equations_have_models(folder, axes, number):
     assert {0, 1} <= set(found["verdict"].tolist())
     if number == {"a": 1.0}:
         off = abs(found["c1"] + ds.discriminant.values)
-        assert (off <= found["c1_error"] + ds.discriminant_error.values).all() and found["c1_error"].max() < 1e-9
+        assert (off <= found["c1_error"] + ds.discriminant_error.values).all() and found[
+            "c1_error"
+        ].max() < 1e-9
         c = ds.c.values
         for value, bar, own in zip(found["c2"], found["c2_error"], c, strict=True):
             with mpmath.workdps(30):
-                assert abs(mpmath.mpf(float(value)) - mpmath.exp(-2 * mpmath.mpf(float(own)) * mpmath.pi)) <= bar < 1e-9
+                assert (
+                    abs(
+                        mpmath.mpf(float(value))
+                        - mpmath.exp(-2 * mpmath.mpf(float(own)) * mpmath.pi)
+                    )
+                    <= bar
+                    < 1e-9
+                )
 
 
 def test_the_readmes_map_fits_into_300_kb_and_agrees(satellite):
@@ -166,7 +191,9 @@ def test_next_to_edges_verdicts_never_contradict(satellite):
     ds = survey.evaluate("satellite", k=0.9, rho=np.sort(near), body="prolate")
     true = ds.verdict.values[np.argsort(np.argsort(near))]
     decided = found["verdict"] >= 0
-    assert (found["verdict"][decided] == true[decided]).all() and decided[abs(near - rho) > 1e-10].all()
+    assert (found["verdict"][decided] == true[decided]).all() and decided[
+        abs(near - rho) > 1e-10
+    ].all()
     assert {0, 1} <= set(found["verdict"].tolist())
 
 
@@ -184,7 +211,9 @@ def test_grids_cells_and_points_give_the_same_within_their_bars(satellite):
     grid = model.grid(x[:60], y[:50], model.outputs)
     points = model.at(*np.meshgrid(x[:60], y[:50], indexing="ij"), model.outputs)
     for name, values in grid.items():
-        assert values.shape == (60, 50) and np.allclose(values, points[name], rtol=1e-9, atol=1e-9), name
+        assert values.shape == (60, 50) and np.allclose(
+            values, points[name], rtol=1e-9, atol=1e-9
+        ), name
 
 
 def test_gradients_are_those_of_the_values(satellite):
@@ -194,18 +223,29 @@ def test_gradients_are_those_of_the_values(satellite):
     for name in model.outputs:
         for p, dx, dy in (("k", h, 0.0), ("rho", 0.0, h)):
             ahead, behind = (model.at(x + s * dx, y + s * dy, name)[name] for s in (1, -1))
-            assert np.allclose(found[f"{name}_by_{p}"], (ahead - behind) / (2 * h), rtol=1e-6, atol=1e-6), (name, p)
+            assert np.allclose(
+                found[f"{name}_by_{p}"], (ahead - behind) / (2 * h), rtol=1e-6, atol=1e-6
+            ), (name, p)
 
 
 def test_the_call_follows_xarray(satellite):
     model = survey.Model(satellite)
     ds = model(k=np.linspace(0.1, 0.9, 5), rho=np.linspace(1.0, 3.0, 4))
-    assert ds.discriminant.dims == ("k", "rho") and {"verdict", "discriminant_error", "discriminant_by_k"} <= set(ds)
-    pairs = model(k=xr.DataArray([0.1, 0.5], dims="p"), rho=xr.DataArray([1.0, 2.0], dims="p"), gradient=False)
+    assert ds.discriminant.dims == ("k", "rho") and {
+        "verdict",
+        "discriminant_error",
+        "discriminant_by_k",
+    } <= set(ds)
+    pairs = model(
+        k=xr.DataArray([0.1, 0.5], dims="p"), rho=xr.DataArray([1.0, 2.0], dims="p"), gradient=False
+    )
     assert pairs.discriminant.dims == ("p",) and "discriminant_by_k" not in pairs
     assert float(model(k=0.1, rho=1.0).discriminant) == float(pairs.discriminant[0])
     evaluated = survey.evaluate("satellite", k=ds.k.values, rho=ds.rho.values, body="prolate")
-    assert (abs(ds.discriminant - evaluated.discriminant) <= ds.discriminant_error + evaluated.discriminant_error).all()
+    assert (
+        abs(ds.discriminant - evaluated.discriminant)
+        <= ds.discriminant_error + evaluated.discriminant_error
+    ).all()
 
 
 @pytest.mark.parametrize(
@@ -226,9 +266,18 @@ def test_places_outside_and_bad_arguments_are_refused(satellite, given, line):
 
 def test_around_a_singularity_there_is_no_answer(folder):
     path = folder / "through.model"
-    build.model(check(workflow("satellite", {"k": (0.9, 1.1), "rho": (0.5, 1.0)}, options={"body": "prolate"})), path)
+    build.model(
+        check(
+            workflow("satellite", {"k": (0.9, 1.1), "rho": (0.5, 1.0)}, options={"body": "prolate"})
+        ),
+        path,
+    )
     found = survey.Model(path).at([0.95, 1.0, 1.05], 0.7)
-    assert found["verdict"][1] == -1 and np.isnan(found["discriminant"][1]) and np.isnan(found["discriminant_error"][1])
+    assert (
+        found["verdict"][1] == -1
+        and np.isnan(found["discriminant"][1])
+        and np.isnan(found["discriminant_error"][1])
+    )
     assert np.isfinite(found["discriminant"][[0, 2]]).all()
 
 
@@ -260,9 +309,13 @@ def test_the_documented_reader_of_60_lines_gives_the_same(satellite):
     for k, rho in np.random.default_rng(9).uniform((0.0, 0.6), (0.99, 4.0), (40, 2)):
         found, own = scope["functions"](about, k, rho), model.at(k, rho, model.outputs)
         for name, (value, bar) in found.items():
-            assert value == pytest.approx(float(own[name]), rel=1e-13, abs=1e-13) and bar == float(own[f"{name}_error"])
+            assert value == pytest.approx(float(own[name]), rel=1e-13, abs=1e-13) and bar == float(
+                own[f"{name}_error"]
+            )
         verdict, d = scope["hill"](found)
-        assert verdict == own["verdict"] and d == pytest.approx(float(own["discriminant"]), abs=1e-11)
+        assert verdict == own["verdict"] and d == pytest.approx(
+            float(own["discriminant"]), abs=1e-11
+        )
     assert scope["functions"](about, 0.995, 1.0) is None
 
 
@@ -295,7 +348,10 @@ def test_damage_at_any_byte_is_refused_in_a_line(satellite, tmp_path):
     whole, rng = satellite.read_bytes(), np.random.default_rng(5)
     model = survey.Model(satellite)
     places = [*range(60), *rng.integers(len(whole), size=60), *range(len(whole) - 140, len(whole))]
-    copies = [bytes([*whole[:at], whole[at] ^ int(rng.integers(1, 256)), *whole[at + 1 :]]) for at in places]
+    copies = [
+        bytes([*whole[:at], whole[at] ^ int(rng.integers(1, 256)), *whole[at + 1 :]])
+        for at in places
+    ]
     for damaged in copies + [whole[:end] for end in rng.integers(len(whole), size=10)]:
         (tmp_path / "damaged").write_bytes(damaged)
         try:
@@ -313,7 +369,10 @@ def test_a_table_of_another_form_is_refused_in_a_line(satellite, tmp_path):
         table, series = json.loads(archive.read("model.json")), archive.read("series.f64")
     assert survey.Model(written(tmp_path / "m", table, series)).at(0.5, 1.2)["verdict"] == 1
     panel = table["panels"][0]
-    wrong = [{key: value for key, value in table.items() if key != left} for left in ("panels", "rule", "title")]
+    wrong = [
+        {key: value for key, value in table.items() if key != left}
+        for left in ("panels", "rule", "title")
+    ]
     wrong += [table | change for change in (
         {"rule": "danby"}, {"rule": []}, {"panels": []}, {"proof": {"areas": {}}},
         {"functions": table["functions"][:3]},
@@ -324,9 +383,16 @@ def test_a_table_of_another_form_is_refused_in_a_line(satellite, tmp_path):
         {"terms": panel["terms"][:3]}, {"bars": [1e-12] * 3}, {"bars": [-1.0] * 4}, {"bars": ["x"] * 4},
         {"bars": [float("nan")] * 4}, {"low": [0.0]}, {"low": panel["high"]},
     )]  # fmt: skip
-    wrong += [b"[]", b"null", b"[" * 100_000, table | {"panels": [panel | {"terms": [[1024] + [0] * 1023] * 4}] * 100}]
+    wrong += [
+        b"[]",
+        b"null",
+        b"[" * 100_000,
+        table | {"panels": [panel | {"terms": [[1024] + [0] * 1023] * 4}] * 100},
+    ]
     for one in wrong:
-        with pytest.raises(ValueError, match=r"not a model|not that of a model|its bits have changed") as refused:
+        with pytest.raises(
+            ValueError, match=r"not a model|not that of a model|its bits have changed"
+        ) as refused:
             survey.Model(written(tmp_path / "m", one, series))
         assert "\n" not in str(refused.value) and refused.value.__cause__ is None
     with pytest.raises(ValueError, match="would unpack to more than"):
@@ -337,7 +403,10 @@ def test_a_map_of_more_cells_than_can_be_numbered_is_answered_from_its_panels(tm
     """D = x + 3 y in strips: 67 x 66 edges make 70,752 cells."""
     places, numbers, n = [], [], 66
     for i in range(n):
-        places += [((0.5 * i / n, 0.0), (0.5 * (i + 1) / n, 1.0)), ((0.5, i / n), (1.0, (i + 1) / n))]
+        places += [
+            ((0.5 * i / n, 0.0), (0.5 * (i + 1) / n, 1.0)),
+            ((0.5, i / n), (1.0, (i + 1) / n)),
+        ]
     for (x0, y0), (x1, y1) in places:
         numbers += [0.5 * (x0 + x1) + 1.5 * (y0 + y1), 1.5 * (y1 - y0), 0.5 * (x1 - x0)]
     series = np.array(numbers).tobytes()
@@ -360,10 +429,18 @@ def test_progress_tells_how_much_of_the_map_is_served_and_budgets_end_the_search
     told = []
     content = build.packed(checked, None, 60_000, progress=lambda *given: told.append(given))
     done, totals, reused, _ = zip(*told, strict=True)
-    assert done[0] == 0 and min(done[1:]) >= 1 and list(done) == sorted(done) and 700 < done[-1] < totals[-1] == 1000
+    assert (
+        done[0] == 0
+        and min(done[1:]) >= 1
+        and list(done) == sorted(done)
+        and 700 < done[-1] < totals[-1] == 1000
+    )
     assert set(reused) == {0} and len(told) <= 60_000 // build.NODES**2 + 1
     fewer = build.packed(checked, None, 60_000, most=len(content) // 2)
-    tables = [json.loads(zipfile.ZipFile(BytesIO(own)).read(reader.TABLE))["panels"] for own in (content, fewer)]
+    tables = [
+        json.loads(zipfile.ZipFile(BytesIO(own)).read(reader.TABLE))["panels"]
+        for own in (content, fewer)
+    ]
     whole, part = ({(*own["low"], *own["high"]) for own in table} for table in tables)
     area = [np.prod(np.subtract(own[2:], own[:2])) for own in part]
     assert len(fewer) <= len(content) // 2 and part < whole
@@ -378,8 +455,18 @@ def test_the_same_map_has_the_same_bytes(folder):
 @pytest.mark.parametrize(
     ("scene", "axes", "numbers", "line"),
     [
-        ("brun", {"l": (0.0, 1.0), "alpha": (0.0, 1.0)}, {"beta": 0.5}, "is not answered by series"),
-        ("satellite_triaxial", {"roll_ratio": (0.1, 0.5), "C": (1.0, 2.0)}, {"k": 0.5, "yaw_ratio": 0.1}, "by series"),
+        (
+            "brun",
+            {"l": (0.0, 1.0), "alpha": (0.0, 1.0)},
+            {"beta": 0.5},
+            "is not answered by series",
+        ),
+        (
+            "satellite_triaxial",
+            {"roll_ratio": (0.1, 0.5), "C": (1.0, 2.0)},
+            {"k": 0.5, "yaw_ratio": 0.1},
+            "by series",
+        ),
         ("mathieu", {"a": (0.0, 5.0)}, {"q": 1.0}, "a model needs two"),
     ],
 )
@@ -395,9 +482,14 @@ def test_the_command_needs_no_folder_but_that_of_its_own_output(tmp_path):
     (tmp_path / "m.toml").write_text(tomli_w.dumps(table))
     program = [sys.executable, "-m", "survey", "model", "m.toml", "-o"]
     done = subprocess.run([*program, "m.model"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0 and survey.Model(tmp_path / "m.model").at(1.0, 0.5)["verdict"] == 0, done.stderr
+    assert (
+        done.returncode == 0 and survey.Model(tmp_path / "m.model").at(1.0, 0.5)["verdict"] == 0
+    ), done.stderr
     done = subprocess.run([*program, "none/m.model"], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 2 and "'none/m.model': there is no folder 'none'; create it first" in done.stderr
+    assert (
+        done.returncode == 2
+        and "'none/m.model': there is no folder 'none'; create it first" in done.stderr
+    )
 
 
 PLACES = (2.03, 0.51), (1.03, 0.51), (1.53, 0.51)  # within cells: the last of one that stays open
@@ -406,7 +498,10 @@ PLACES = (2.03, 0.51), (1.03, 0.51), (1.53, 0.51)  # within cells: the last of o
 def _page_says_what_is_proved(folder, digest):
     page.write(survey.open(folder / "p.nc"), folder / "p.html")
     text = (folder / "p.html").read_text()
-    assert "<strong>Proved</strong>" in text and f"sha256 {digest}: survey-check p.cert verifies it" in text
+    assert (
+        "<strong>Proved</strong>" in text
+        and f"sha256 {digest}: survey-check p.cert verifies it" in text
+    )
     if picture.missing():
         return
     with picture.browser() as driver:
@@ -416,7 +511,12 @@ def _page_says_what_is_proved(folder, digest):
         told = [driver.execute_script("return known(...arguments)", *at) for at in PLACES]
     ds = survey.open(folder / "p.nc")
     for (a, q), own in zip(PLACES, told, strict=True):
-        inside = (ds.cell_a_low <= a) & (a <= ds.cell_a_high) & (ds.cell_q_low <= q) & (q <= ds.cell_q_high)
+        inside = (
+            (ds.cell_a_low <= a)
+            & (a <= ds.cell_a_high)
+            & (ds.cell_q_low <= q)
+            & (q <= ds.cell_q_high)
+        )
         known = {int(code) for code in ds.cell_verdict[inside.values]} - {-1}
         assert own["proved"] == ({1: "stable", 0: "unstable"}[known.pop()] if known else None)
     assert [own["proved"] for own in told[:2]] == ["stable", "unstable"]
@@ -425,12 +525,16 @@ def _page_says_what_is_proved(folder, digest):
 @pytest.mark.slow
 def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     pytest.importorskip("flint")
-    table = workflow("mathieu", {"a": (0.0, 4.0), "q": (0.0, 1.0)}, refine={"width": {"a": 0.1, "q": 0.1}})
+    table = workflow(
+        "mathieu", {"a": (0.0, 4.0), "q": (0.0, 1.0)}, refine={"width": {"a": 0.1, "q": 0.1}}
+    )
     table["output"] = {"path": str(tmp_path / "m.nc")}
     (tmp_path / "m.toml").write_text(tomli_w.dumps(table))
     program = [sys.executable, "-m", "survey"]
     subprocess.run([*program, "prove", "m.toml", "-o", "p.nc", "--quiet"], cwd=tmp_path, check=True)
-    subprocess.run([*program, "model", "m.toml", "-o", "m.model", "--proof", "p.nc"], cwd=tmp_path, check=True)
+    subprocess.run(
+        [*program, "model", "m.toml", "-o", "m.model", "--proof", "p.nc"], cwd=tmp_path, check=True
+    )
     model = survey.Model(tmp_path / "m.model")
     assert "Stable: |D| < 2" in model.about["proof"]["statement"]
     assert model(a=1.0, q=0.1).attrs["proof"] == model.about["proof"]["statement"]
@@ -438,7 +542,10 @@ def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
     assert 0 < low < high < 4
     _page_says_what_is_proved(tmp_path, model.about["proof"]["sha256"])
     with pytest.raises(BadInput, match="another map"):
-        proved.matching(survey.open(tmp_path / "p.nc"), check(workflow("mathieu", {"a": (0.0, 5.0), "q": (0.0, 1.0)})))
+        proved.matching(
+            survey.open(tmp_path / "p.nc"),
+            check(workflow("mathieu", {"a": (0.0, 5.0), "q": (0.0, 1.0)})),
+        )
     ds = survey.open(tmp_path / "p.nc")
     wide = ds.cell_a_low.copy(data=ds.cell_a_high.values)
     for damaged in (
@@ -448,6 +555,8 @@ def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
         ds.assign(area_low=ds.area_low * np.nan), ds.assign(cell_a_low=wide),
         ds.assign(cell_verdict=ds.cell_verdict + np.int8(7)),
     ):  # fmt: skip
-        with pytest.raises(Damaged, match="what the file says of its proof is incomplete") as refused:
+        with pytest.raises(
+            Damaged, match="what the file says of its proof is incomplete"
+        ) as refused:
             proved.of(damaged)
         assert "\n" not in str(refused.value)

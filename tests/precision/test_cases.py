@@ -1,4 +1,6 @@
-"""Every chart in a quick form: each method's error is within what it was asked, on a few points of every work."""
+"""Every chart in a quick form: each method's error is within what it was asked, on a few points of
+every work.
+"""
 
 import json
 
@@ -29,7 +31,10 @@ SETTING = 1e-8
 
 def few(point, number=4):
     """A few rows and columns of a work."""
-    return {name: values[tuple(slice(number) for _ in np.shape(values))] for name, values in point.items()}
+    return {
+        name: values[tuple(slice(number) for _ in np.shape(values))]
+        for name, values in point.items()
+    }
 
 
 @pytest.fixture
@@ -55,7 +60,13 @@ def test_the_errors_of_a_chart_are_what_was_asked(name, quick, monkeypatch, tmp_
             assert r.error < 1e-6  # what the series' cancellation leaves, in float64
         elif r.method not in series:
             assert r.error <= SETTING and r.wrong_verdicts == 0, r
-    machine = {"least": [], "missing_peers": [], "cpu": "a core", "load": (1.0, 1.0, 1.0), "entry": "scene.solve"}
+    machine = {
+        "least": [],
+        "missing_peers": [],
+        "cpu": "a core",
+        "load": (1.0, 1.0, 1.0),
+        "entry": "scene.solve",
+    }
     machine |= {"outputs": precision.outputs(case), "works": precision.described(case)}
     json.dumps(machine)
     chart.draw(records, machine, name, case.ERROR, tmp_path / "chart.png")
@@ -72,7 +83,9 @@ def test_a_reference_is_the_truth():
         mathieu, {"a": np.array([2.0]), "q": np.array([0.0])}, {}, "discriminant"
     )
     assert point == {"a": 2.0, "q": 0.0} and options == {}
-    assert float(exact["discriminant"]) == pytest.approx(2 * np.cos(np.pi * np.sqrt(2.0)), abs=1e-15)
+    assert float(exact["discriminant"]) == pytest.approx(
+        2 * np.cos(np.pi * np.sqrt(2.0)), abs=1e-15
+    )
 
 
 @pytest.mark.slow
@@ -82,7 +95,9 @@ def test_the_bodies_of_the_chart_by_another_series():
         for body, _, exact, _ in modules.load(folder, "gyrostat_body", "chart").references():
             state = [mp.mpf(body[f"{name}{i}"]) for name in ("omega", "gamma") for i in (1, 2, 3)]
             size = mp.norm(state[3:])
-            end = body_truth.motion(body, [*state[:3], *(x / size for x in state[3:])], body["t"], digits=30)
+            end = body_truth.motion(
+                body, [*state[:3], *(x / size for x in state[3:])], body["t"], digits=30
+            )
             assert abs(end[0] - mp.mpf(exact["w1"])) < 1e-16
 
 
@@ -90,7 +105,10 @@ def test_the_bodies_of_the_chart_by_another_series():
 def test_a_chart_of_ones_own(quick, tmp_path):
     paths = precision.write(ROOT / "workflows/whittaker_hill.py", tmp_path)
     written = json.loads(paths[0].read_text())
-    assert paths[0].name == "precision_whittaker_hill.json" and written["machine"]["entry"] == "scene.solve"
+    assert (
+        paths[0].name == "precision_whittaker_hill.json"
+        and written["machine"]["entry"] == "scene.solve"
+    )
     assert {r["work"] for r in written["records"]} == {"row", "scattered", "map 60x80"}
     assert all(r["error"] <= SETTING and r["wrong_verdicts"] == 0 for r in written["records"])
     with pytest.raises(BadInput, match="name your own file"):

@@ -15,7 +15,11 @@ def test_operations_on_the_number_are_counted_and_no_others():
 
 def test_a_step_of_midpoint_taylor_is_some_hundred_operations():
     # the two series alone: each product of coefficients with its sum, for z to degree 9
-    assert 2 * 2 * sum(min(n - 1, 10) for n in range(2, 16)) < flops.operations(satellite._one_step) < 1000
+    assert (
+        2 * 2 * sum(min(n - 1, 10) for n in range(2, 16))
+        < flops.operations(satellite._one_step)
+        < 1000
+    )
 
 
 def test_the_rates_are_those_of_a_core(monkeypatch):

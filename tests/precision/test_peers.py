@@ -25,12 +25,19 @@ def test_a_peer_finds_the_references(peer, place):
 
 
 def test_points_keep_their_places(peer):
-    point = {"k": np.linspace(0.1, 0.9, 3)[:, None], "rho": np.array([[3.0, 0.7, 2.0, 1.0, 1.5, 0.6, 0.9, 2.5]])}
+    point = {
+        "k": np.linspace(0.1, 0.9, 3)[:, None],
+        "rho": np.array([[3.0, 0.7, 2.0, 1.0, 1.5, 0.6, 0.9, 2.5]]),
+    }
     together = satellite.outcome(peer.integrate(satellite.system(point, {}), 1e-9))["discriminant"]
     assert together.shape == (24,)
     for place in (0, 1, 23):
-        alone = {name: np.broadcast_to(values, (3, 8)).flat[place] for name, values in point.items()}
-        (value,) = satellite.outcome(peer.integrate(satellite.system(alone, {}), 1e-9))["discriminant"]
+        alone = {
+            name: np.broadcast_to(values, (3, 8)).flat[place] for name, values in point.items()
+        }
+        (value,) = satellite.outcome(peer.integrate(satellite.system(alone, {}), 1e-9))[
+            "discriminant"
+        ]
         assert abs(together[place] - value) < 1e-6
 
 
@@ -46,6 +53,8 @@ def test_a_peer_s_dense_output_holds_the_references(peer):
         if point["phi"] > 0.0:
             dense = {name: np.full((1, 1), value) for name, value in point.items()}
             dense |= {"phi": np.linspace(0.0, point["phi"], 4)[None]}
-            found = gyrostat_abel.outcome(peer.integrate(gyrostat_abel.system(dense, options), 1e-11))["w"]
+            found = gyrostat_abel.outcome(
+                peer.integrate(gyrostat_abel.system(dense, options), 1e-11)
+            )["w"]
             assert found.shape == (4,) and abs(found[0] - point["w0"]) < 1e-12
             np.testing.assert_allclose(found[3], exact["w"], rtol=1e-9)

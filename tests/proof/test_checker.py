@@ -58,7 +58,9 @@ def proof(system="mathieu"):
         kind, pieces, names = SYSTEMS[system]
         rectangle, depth, tolerance = RECTANGLES[system], DEPTH, 1e-6
     across, bits = [1] * len(names), 192 if system == "row" else search.BITS
-    prover = proofs.Prover({"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits)
+    prover = proofs.Prover(
+        {"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits
+    )
     return proofs.certificate("a test", prover, *prover(0)[1])
 
 
@@ -68,7 +70,9 @@ def signed(data):
 
 
 def true_factors(a, q):
-    """The factors of Mathieu's equation at pi/2 to 25 digits, by DLMF 28.2's equation and mpmath's Taylor series."""
+    """The factors of Mathieu's equation at pi/2 to 25 digits, by DLMF 28.2's equation and mpmath's
+    Taylor series.
+    """
     with mpmath.workdps(25):
         solution = mpmath.odefun(
             lambda t, y: [y[1], -(a - 2 * q * mpmath.cos(2 * t)) * y[0], y[3], -(a - 2 * q * mpmath.cos(2 * t)) * y[2]],
@@ -89,7 +93,11 @@ def test_node_values_enclose_the_solutions():
         point = {"a": arb(a), "q": arb(q)}
         for order in (12, 24):
             found = equation.factors(equation.steps(point, order), order, point)
-            assert all(inside(ball, value) for ball, value in zip(found, truth, strict=True)), (a, q, order)
+            assert all(inside(ball, value) for ball, value in zip(found, truth, strict=True)), (
+                a,
+                q,
+                order,
+            )
             sharp = 200 * arb(checker.FAR).exp() * checker.RATIO ** (0.886 * order)
             assert all(ball.rad() < sharp for ball in found)
 
@@ -117,15 +125,23 @@ def test_steps_of_few_terms_say_so():
 
 def errors(number, system="mathieu", nodes=8):
     """(true interpolation error, bound) of the factors at random points of a panel."""
-    equation, sides = checker.Equation(*SYSTEMS[system]), [tuple(map(Fraction, side)) for side in RECTANGLES[system]]
+    equation, sides = (
+        checker.Equation(*SYSTEMS[system]),
+        [tuple(map(Fraction, side)) for side in RECTANGLES[system]],
+    )
     plan = search.plan(equation, sides, 1e-6) | {"nodes": [nodes, nodes], "order": 32}
     panel = checker.Panel(equation, sides, plan)
     tables, bounds, _ = zip(*panel.factors, strict=True)
     rng, order = np.random.default_rng(1), 40
-    box = {name: centre + half * arb(0, 1) for name, (centre, half) in zip(equation.names, panel.sides, strict=True)}
+    box = {
+        name: centre + half * arb(0, 1)
+        for name, (centre, half) in zip(equation.names, panel.sides, strict=True)
+    }
     steps = equation.steps(box, order)
     for x, y in rng.uniform(-1, 1, (number, 2)):
-        place = [centre + half * arb(v) for (centre, half), v in zip(panel.sides, (x, y), strict=True)]
+        place = [
+            centre + half * arb(v) for (centre, half), v in zip(panel.sides, (x, y), strict=True)
+        ]
         truth = equation.factors(steps, order, dict(zip(equation.names, place, strict=True)))
         rows = [checker.bernstein([arb(v)] + [arb(0)] * (nodes - 1)) for v in (x, y)]
         for table, exact, bound in zip(tables, truth, bounds, strict=True):
@@ -158,7 +174,9 @@ def test_the_truncation_bound_exceeds_the_true_error(number, system, nodes, leas
 def test_a_wrong_growth_is_found(arguments, wrong, monkeypatch):
     """Danby's factors are bounded by its second and fourth powers."""
     right = checker.growth
-    monkeypatch.setattr(checker, "growth", lambda arc, w: [bound / wrong for bound in right(arc, w)])
+    monkeypatch.setattr(
+        checker, "growth", lambda arc, w: [bound / wrong for bound in right(arc, w)]
+    )
     assert any(error > bound for error, bound in errors(*arguments))
 
 
@@ -174,7 +192,9 @@ def slopes(nodes=8):
         ends = [equation.factors(steps, 70, {"a": centre + half * (x + d)}) for d in (-h, h)]
         rows = [checker.bernstein([x + d] + [arb(0)] * (nodes - 1)) for d in (-h, h)]
         for factor, (table, _, bound) in enumerate(panel.factors):
-            values = [(row * table)[0, 0] - end[factor] for row, end in zip(rows, ends, strict=True)]
+            values = [
+                (row * table)[0, 0] - end[factor] for row, end in zip(rows, ends, strict=True)
+            ]
             yield abs(values[1] - values[0]) / (2 * h), bound
 
 
@@ -184,7 +204,9 @@ def test_the_bound_of_slopes_exceeds_their_true_error():
 
 
 def test_a_row_is_proved():
-    """Its edges are the characteristic values a_1(5) and b_2(5) of DLMF 28.6, here from Fourier matrices in mpmath."""
+    """Its edges are the characteristic values a_1(5) and b_2(5) of DLMF 28.6, here from Fourier
+    matrices in mpmath.
+    """
     statement = checker.check(proof("row"))
     assert "exactly 2 points" in statement and "0 open" in statement
     assert "1.85818754154" in statement and "2.09946044548" in statement
@@ -198,13 +220,18 @@ def test_a_certificate_is_proved():
 
 @pytest.mark.slow
 def test_danbys_strip_is_proved():
-    """Against the package's own kernels; the strip between A and KC, which is thinner than the cells, is seen."""
+    """Against the package's own kernels; the strip between A and KC, which is thinner than the
+    cells, is seen.
+    """
     statement = checker.check(proof("danby"))
     assert (
-        "k22(u) = 1 - 3*(1 - sqrt(1 - 3*mu*(1 - mu)))/2*(1/(1 + e*cos(u)))" in statement and "L likewise" in statement
+        "k22(u) = 1 - 3*(1 - sqrt(1 - 3*mu*(1 - mu)))/2*(1/(1 + e*cos(u)))" in statement
+        and "L likewise" in statement
     )
     verdicts, mu, e = decided(proof("danby"), np.random.default_rng(4))
-    ds = survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="point"), e=xr.DataArray(e, dims="point"))
+    ds = survey.evaluate(
+        "libration_elliptic", mu=xr.DataArray(mu, dims="point"), e=xr.DataArray(e, dims="point")
+    )
     assert (ds.verdict == verdicts).all()
 
 
@@ -221,9 +248,13 @@ def decided(text, rng):
 
 
 def test_no_cell_contradicts_the_map():
-    """Against the package's own kernels, in binary64 with error bounds, which share nothing with the checker."""
+    """Against the package's own kernels, in binary64 with error bounds, which share nothing with
+    the checker.
+    """
     verdicts, a, q = decided(proof(), np.random.default_rng(2))
-    ds = survey.evaluate("mathieu", a=xr.DataArray(a, dims="point"), q=xr.DataArray(q, dims="point"))
+    ds = survey.evaluate(
+        "mathieu", a=xr.DataArray(a, dims="point"), q=xr.DataArray(q, dims="point")
+    )
     assert not (ds.verdict == ~verdicts).any()
     assert (ds.verdict == verdicts).mean() > 0.99
 
@@ -244,7 +275,9 @@ RESULTS = Path(__file__).parents[2] / "results"
 def test_some_panels_of_the_published_certificates(name):
     certificate = checker.Certificate((RESULTS / f"{name}.cert").read_text())
     assert sum(certificate.shares.values()) == 1
-    for number in np.random.default_rng(5).choice(len(certificate.panels), 2, replace=False).tolist():
+    for number in (
+        np.random.default_rng(5).choice(len(certificate.panels), 2, replace=False).tolist()
+    ):
         certificate.panels[number].check()
 
 
@@ -260,21 +293,31 @@ def test_the_theorem_that_the_documentation_prints():
     assert certificate.sides == [(0, Fraction(1, 2)), (0, Fraction(4, 5))]
 
 
-@pytest.mark.parametrize("body, number, end", [("rod", 6, Fraction("1.56")), ("disc", 1, Fraction("1.5"))])
+@pytest.mark.parametrize(
+    "body, number, end", [("rod", 6, Fraction("1.56")), ("disc", 1, Fraction("1.5"))]
+)
 def test_the_critical_amplitudes_that_the_documentation_prints(body, number, end):
-    """Every digit, in radians and degrees, follows from the certificate; and the table made by other methods agrees."""
+    """Every digit, in radians and degrees, follows from the certificate; and the table made by
+    other methods agrees.
+    """
     certificate = checker.Certificate((RESULTS / f"satellite_{body}_proved.cert").read_text())
     found = [(letter, *place[0]) for letter, place in certificate.cells if letter in checker.EDGES]
     assert len(found) == number and checker.OPEN not in certificate.letters
     assert certificate.sides == [(0, end)] and certificate.letters[0] == "s"
     page = (RESULTS.parent / "workflows" / "docs" / "proofs.md").read_text()
     ctx.prec = 128
-    listed = csv.DictReader((RESULTS / "satellite_critical_amplitudes.csv").read_text().splitlines())
+    listed = csv.DictReader(
+        (RESULTS / "satellite_critical_amplitudes.csv").read_text().splitlines()
+    )
     listed = [row for row in listed if row["body"].endswith(body) and row["motion"] == "librations"]
     for (letter, low, high), row in zip(found, listed, strict=False):
         ball = checker.exact(low).union(checker.exact(high))
-        radians, degrees = (nearest(x, digits) for x, digits in ((ball, 12), (ball * 180 / arb.pi(), 10)))
-        assert (f" {radians} | {degrees} | " if body == "rod" else f"{radians} rad $= {degrees}^") in page
+        radians, degrees = (
+            nearest(x, digits) for x, digits in ((ball, 12), (ball * 180 / arb.pi(), 10))
+        )
+        assert (
+            f" {radians} | {degrees} | " if body == "rod" else f"{radians} rad $= {degrees}^"
+        ) in page
         error = Fraction(row["amplitude_error_rad"])
         assert low - error <= Fraction(row["amplitude_rad"]) <= high + error
         assert row["class"] == proofs.EVEN_CLASSES[checker.EDGES.index(letter)][0]
@@ -282,7 +325,10 @@ def test_the_critical_amplitudes_that_the_documentation_prints(body, number, end
 
 def nearest(ball, digits):
     """The decimals to which every number of the ball is rounded."""
-    ends = {floor(Fraction(str(end.fmpq())) * 10**digits + Fraction(1, 2)) for end in (ball.lower(), ball.upper())}
+    ends = {
+        floor(Fraction(str(end.fmpq())) * 10**digits + Fraction(1, 2))
+        for end in (ball.lower(), ball.upper())
+    }
     assert len(ends) == 1
     return f"{Decimal(ends.pop()).scaleb(-digits):.{digits}f}"
 
@@ -295,12 +341,17 @@ def test_the_checker_needs_nothing_but_flint(tmp_path):
     (tmp_path / "alone.py").write_text(source)
     (tmp_path / "map.cert").write_text(proof())
     ran = subprocess.run(
-        [sys.executable, "-I", "alone.py", "map.cert", "-j", "2"], cwd=tmp_path, capture_output=True, text=True
+        [sys.executable, "-I", "alone.py", "map.cert", "-j", "2"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
     )
     assert ran.returncode == 0 and ran.stdout.startswith("PROVED\n"), ran
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="a pipe without a reader is another error there")
+@pytest.mark.skipif(
+    sys.platform == "win32", reason="a pipe without a reader is another error there"
+)
 def test_a_reader_may_leave(tmp_path):
     """As in survey-check OUT.cert | head -1: no traceback, and the certificate is proved."""
     (tmp_path / "map.cert").write_text(proof())
@@ -366,7 +417,9 @@ MUTATIONS = {
     "a z with code": formula("a - 2*q*cos(2*u) + __import__('os').system('true')"),
     "a z with an attribute": formula("a.real - 2*q*cos(2*u)"),
     "another half period": at("equation", "pieces", value=[["3/2", "a - 2*q*cos(2*u)"]]),
-    "a half period that is negative": at("equation", "pieces", value=[["-pi/2", "a - 2*q*cos(2*u)"]]),
+    "a half period that is negative": at(
+        "equation", "pieces", value=[["-pi/2", "a - 2*q*cos(2*u)"]]
+    ),
     "another kind of z": at("equation", "kind", value="periodic"),
     "another rectangle": at("rectangle", value=[["1", "5"], ["1/2", "3"]]),
     "a rectangle without area": at("rectangle", value=[["1", "1"], ["1/2", "3"]]),

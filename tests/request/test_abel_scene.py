@@ -1,4 +1,6 @@
-"""A user's own Abel equation goes through every command like a built-in scene; what is wrong is said in one line."""
+"""A user's own Abel equation goes through every command like a built-in scene; what is wrong is
+said in one line.
+"""
 
 import math
 
@@ -57,12 +59,20 @@ def test_every_command_takes_it(program, tmp_path, monkeypatch):
     run = program("run", "mine.toml", "-o", "mine.nc", "--workers", "1")
     assert run.returncode == 0, run.stderr
     assert (tmp_path / "mine.png").exists()
-    for words in (("plan", "mine.toml"), ("info", "mine.nc"), ("verify", "mine.nc"), ("plot", "mine.nc")):
+    for words in (
+        ("plan", "mine.toml"),
+        ("info", "mine.nc"),
+        ("verify", "mine.nc"),
+        ("plot", "mine.nc"),
+    ):
         done = program(*words)
         assert done.returncode == 0, done.stderr
     assert "Van der Pol's oscillator of my own" in program("scenes", "mine.py").stdout
     ds = survey.open("mine.nc")
-    assert ds.attrs["scene_text"] == SCENE and ds.attrs["title"] == "Van der Pol's oscillator of my own"
+    assert (
+        ds.attrs["scene_text"] == SCENE
+        and ds.attrs["title"] == "Van der Pol's oscillator of my own"
+    )
     same = survey.evaluate(scene(), mu=ds.mu.values, phi0=2.0, t=ds.t.values, question="trajectory")
     assert (ds.phi.values == same.phi.values).all() and (ds.status == 0).all()
     motion = ds.survey.trajectory(mu=ds.mu.values[2], t=0.0, time=5.0)
@@ -75,7 +85,11 @@ def test_every_command_takes_it(program, tmp_path, monkeypatch):
 def test_the_hash_tells_of_all_that_the_functions_depend_on():
     first = scene().HASH
     assert scene().HASH == first
-    others = [scene(g=lambda phi, p: -2 * phi), scene(f=lambda phi, p: -p[0]), scene(parameters="nu")]
+    others = [
+        scene(g=lambda phi, p: -2 * phi),
+        scene(f=lambda phi, p: -p[0]),
+        scene(parameters="nu"),
+    ]
     assert len({first, *(other.HASH for other in others)}) == 4
     swapped = scene(g, f)
     assert swapped.HASH != first
@@ -83,7 +97,10 @@ def test_the_hash_tells_of_all_that_the_functions_depend_on():
 
 @pytest.mark.slow
 def test_functions_from_python_run_in_other_processes(tmp_path):
-    given = {"scene": scene(), "axes": {"mu": {"values": [0.5, 1.0]}, "phi0": 2.0, "phi": {"values": [0.0, 1.0]}}}
+    given = {
+        "scene": scene(),
+        "axes": {"mu": {"values": [0.5, 1.0]}, "phi0": 2.0, "phi": {"values": [0.0, 1.0]}},
+    }
     given["options"] = {"question": "abel"}
     one = survey.run(given, output=tmp_path / "one.nc")
     two = survey.run(given, output=tmp_path / "two.nc", workers=1)
@@ -93,9 +110,13 @@ def test_functions_from_python_run_in_other_processes(tmp_path):
 
 def test_one_solution_serves_all_times_with_the_same_bits():
     t = np.array([3.0, -1.0, 0.5])
-    whole = survey.evaluate(scene(), mu=[0.5, 2.0], phi0=[1.0, 2.0, 3.0], w0=0.3, t=t, question="trajectory")
+    whole = survey.evaluate(
+        scene(), mu=[0.5, 2.0], phi0=[1.0, 2.0, 3.0], w0=0.3, t=t, question="trajectory"
+    )
     for i, time in enumerate(t):
-        one = survey.evaluate(scene(), mu=0.5, phi0=2.0, w0=0.3, t=float(time), question="trajectory")
+        one = survey.evaluate(
+            scene(), mu=0.5, phi0=2.0, w0=0.3, t=float(time), question="trajectory"
+        )
         for name in ("phi", "w", "phi_error", "turnings"):
             assert one[name] == whole[name][0, 1, i]
 
@@ -103,7 +124,12 @@ def test_one_solution_serves_all_times_with_the_same_bits():
 def test_a_point_without_a_value_costs_itself_alone():
     own = scene(lambda phi, p: math.log(p[0]), g)
     ds = survey.evaluate(own, mu=[1.0, -1.0, 2.0, np.nan], phi0=2.0, t=1.0, question="trajectory")
-    assert ds.status.values.tolist() == [0, 1, 0, 1] and np.isnan(ds.phi.values).tolist() == [False, True, False, True]
+    assert ds.status.values.tolist() == [0, 1, 0, 1] and np.isnan(ds.phi.values).tolist() == [
+        False,
+        True,
+        False,
+        True,
+    ]
 
 
 def bad(phi, p):

@@ -32,10 +32,19 @@ def by_scipy(a, q, c):
     return np.trace(matrix), np.log(abs(np.linalg.eigvals(matrix)).max())
 
 
-POINTS = [(1.0, 0.3, 0.05), (1.0, 0.3, 0.2), (2.5, 0.4, 0.1), (0.9, 0.5, -0.1), (4.1, 2.0, 0.01), (-0.3, 0.2, 0.3)]
+POINTS = [
+    (1.0, 0.3, 0.05),
+    (1.0, 0.3, 0.2),
+    (2.5, 0.4, 0.1),
+    (0.9, 0.5, -0.1),
+    (4.1, 2.0, 0.01),
+    (-0.3, 0.2, 0.3),
+]
 
 
-@pytest.mark.parametrize("point", [*POINTS[:2], *(pytest.param(point, marks=pytest.mark.slow) for point in POINTS[2:])])
+@pytest.mark.parametrize(
+    "point", [*POINTS[:2], *(pytest.param(point, marks=pytest.mark.slow) for point in POINTS[2:])]
+)
 def test_trace_exponent_and_verdict_are_those_of_the_damped_equation(point):
     a, q, c = point
     trace, growth = by_scipy(a, q, c)
@@ -44,7 +53,9 @@ def test_trace_exponent_and_verdict_are_those_of_the_damped_equation(point):
     assert abs(float(ds.exponent) - growth) <= float(ds.exponent_error) + 1e-9
     assert int(ds.verdict) == (1 if growth < 0 else 0) and float(ds.exponent_error) < 1e-8
     same = survey.evaluate(scene(damping=c), a=a, q=q)
-    assert abs(float(same.exponent) - float(ds.exponent)) <= float(ds.exponent_error) + float(same.exponent_error)
+    assert abs(float(same.exponent) - float(ds.exponent)) <= float(ds.exponent_error) + float(
+        same.exponent_error
+    )
     assert int(same.verdict) == int(ds.verdict)
 
 
@@ -54,7 +65,9 @@ def test_constant_coefficients_are_exact():
     c = np.array([0.1, 0.5, 2.0, 3.0])
     ds = survey.evaluate(own, s=2.0, c=c)
     exact = np.where(c * c < 2.0, -c, -(c - np.sqrt(np.maximum(c * c - 2.0, 0.0))))
-    assert (abs(ds.exponent - exact) <= ds.exponent_error + 4e-16).all() and (ds.exponent_error < 1e-9).all()
+    assert (abs(ds.exponent - exact) <= ds.exponent_error + 4e-16).all() and (
+        ds.exponent_error < 1e-9
+    ).all()
     assert (ds.verdict == 1).all()
 
 
@@ -74,7 +87,10 @@ def test_from_a_file_and_on_worker_processes(tmp_path):
         "from math import cos, pi\nPARAMETERS = ('a', 'q')\nPERIOD = pi\nEVEN = True\nDAMPING = 0.05\n"
         "def z(u, p):\n    return p[0] - 2 * p[1] * cos(2 * u)\n"
     )
-    asked = {"scene": str(tmp_path / "z.py"), "axes": {"a": {"start": 0.0, "stop": 2.0, "num": 5}, "q": 0.3}}
+    asked = {
+        "scene": str(tmp_path / "z.py"),
+        "axes": {"a": {"start": 0.0, "stop": 2.0, "num": 5}, "q": 0.3},
+    }
     ds = survey.run(asked, output=tmp_path / "o.nc", workers=1)
     point = survey.evaluate(scene(damping=0.05), a=ds.a, q=0.3)
     np.testing.assert_array_equal(ds.verdict, point.verdict)
@@ -89,9 +105,17 @@ def test_what_cannot_be_is_refused():
 
 @pytest.mark.parametrize("even", [True, False])
 def test_the_motion_in_time_and_its_multipliers(even):
-    """With z = a against y = e^(-c u) (cos w u + c sin w u / w); else the pair has the trace and the product known."""
+    """With z = a against y = e^(-c u) (cos w u + c sin w u / w); else the pair has the trace and
+    the product known.
+    """
     a, c = 1.7, 0.21
-    plain = survey.hill(lambda u, p: p[0] + p[1] * cos(2 * u), period=pi, parameters=("a", "q"), damping=c, even=even)
+    plain = survey.hill(
+        lambda u, p: p[0] + p[1] * cos(2 * u),
+        period=pi,
+        parameters=("a", "q"),
+        damping=c,
+        even=even,
+    )
     motion = survey.evaluate(plain, a=a, q=0.0).survey.trajectory()
     u, w = motion.u.values, np.sqrt(a - c * c)
     fall = np.exp(-c * u)
@@ -104,11 +128,16 @@ def test_the_motion_in_time_and_its_multipliers(even):
     moved = driven.survey.trajectory()
     pair = moved.multiplier_real.values + 1j * moved.multiplier_imag.values
     bars = moved.multiplier_error.values + 1e-15
-    assert abs(pair.sum() - float(driven.discriminant)) <= bars.sum() + float(driven.discriminant_error)
+    assert abs(pair.sum() - float(driven.discriminant)) <= bars.sum() + float(
+        driven.discriminant_error
+    )
     assert abs(np.prod(pair) - np.exp(-2 * c * pi)) <= 2 * bars.sum() and abs(pair).max() > 1
     last = moved.y1.values[moved.u.values <= pi + 1e-9][-1]
-    free = survey.hill(lambda u, p: p[0] + p[1] * cos(2 * u) - c * c, period=pi, parameters=("a", "q"), even=even)
+    free = survey.hill(
+        lambda u, p: p[0] + p[1] * cos(2 * u) - c * c, period=pi, parameters=("a", "q"), even=even
+    )
     x1, x2 = (
-        survey.evaluate(free, a=1.0, q=0.9).survey.trajectory()[n].sel(u=pi, method="nearest") for n in ("y1", "y2")
+        survey.evaluate(free, a=1.0, q=0.9).survey.trajectory()[n].sel(u=pi, method="nearest")
+        for n in ("y1", "y2")
     )
     assert abs(last - np.exp(-c * pi) * float(x1 + c * x2)) < 1e-10

@@ -1,4 +1,6 @@
-"""A user's own linear periodic system goes through every command like a built-in scene; errors are one line."""
+"""A user's own linear periodic system goes through every command like a built-in scene; errors are
+one line.
+"""
 
 import math
 
@@ -49,7 +51,13 @@ def C(t, p, out):
 
 
 def scene(**given):
-    usual = {"K": K, "C": C, "period": math.pi, "parameters": ("delta", "epsilon", "zeta"), "states": "x"}
+    usual = {
+        "K": K,
+        "C": C,
+        "period": math.pi,
+        "parameters": ("delta", "epsilon", "zeta"),
+        "states": "x",
+    }
     return survey.floquet(**(usual | given))
 
 
@@ -61,25 +69,38 @@ def test_every_command_takes_it(program, tmp_path, monkeypatch):
     run = program("run", "mine.toml", "-o", "mine.nc", "--workers", "1")
     assert run.returncode == 0, run.stderr
     assert (tmp_path / "mine.png").exists()
-    for words in (("plan", "mine.toml"), ("info", "mine.nc"), ("verify", "mine.nc"), ("plot", "mine.nc")):
+    for words in (
+        ("plan", "mine.toml"),
+        ("info", "mine.nc"),
+        ("verify", "mine.nc"),
+        ("plot", "mine.nc"),
+    ):
         done = program(*words)
         assert done.returncode == 0, done.stderr
     about = program("scenes", "mine.py").stdout
     assert "Two pendulums of my own" in about and "spectral_radius" in about
     ds = survey.open("mine.nc")
     assert ds.attrs["scene_text"] == SCENE and ds.attrs["states"] == "x, y, dx, dy"
-    assert ds.multiplier_re.dims == ("delta", "epsilon", "multiplier") and ds.sizes["multiplier"] == 4
+    assert (
+        ds.multiplier_re.dims == ("delta", "epsilon", "multiplier") and ds.sizes["multiplier"] == 4
+    )
     assert set(np.unique(ds.verdict)) == {0, 1} and (ds.status == 0).all()
     motion = ds.survey.trajectory(delta=ds.delta.values[3], epsilon=ds.epsilon.values[4], time=4.0)
     assert motion.dx.shape == motion.t.shape and motion.sizes["multiplier"] == 4
-    assert "certainly" in str(ds.survey.point(delta=ds.delta.values[3], epsilon=ds.epsilon.values[4]))
+    assert "certainly" in str(
+        ds.survey.point(delta=ds.delta.values[3], epsilon=ds.epsilon.values[4])
+    )
     finer = ds.survey.zoom(delta=(1.0, 1.5), epsilon=(0.5, 1.0), num=3)
     assert finer.verdict.shape == (3, 3)
 
 
 def test_the_monodromy_matrix_is_given_when_it_is_named():
     ds = survey.evaluate(scene(), delta=1.0, epsilon=0.2, zeta=0.1, variables=["monodromy"])
-    assert ds.monodromy.dims == ("row", "column") and set(ds.data_vars) == {"monodromy", "monodromy_error", "status"}
+    assert ds.monodromy.dims == ("row", "column") and set(ds.data_vars) == {
+        "monodromy",
+        "monodromy_error",
+        "status",
+    }
     assert "monodromy" not in survey.evaluate(scene(), delta=1.0, epsilon=0.2, zeta=0.1)
     # Liouville: det M = exp of the integral of tr A = exp(-2 zeta T)
     assert np.linalg.det(ds.monodromy.values) == pytest.approx(math.exp(-0.2 * math.pi), rel=1e-12)
@@ -104,7 +125,9 @@ def test_compiled_functions_closures_and_numpy_are_followed():
 
     ones, others = (
         survey.evaluate(
-            survey.floquet(K=k, period=math.pi, parameters=("a", "b"), states=("x", "y")), a=[1.0, 2.0], b=[0.3, 0.9]
+            survey.floquet(K=k, period=math.pi, parameters=("a", "b"), states=("x", "y")),
+            a=[1.0, 2.0],
+            b=[0.3, 0.9],
         )
         for k in (stiffness, by_hand)
     )
@@ -123,7 +146,14 @@ def test_a_mass_matrix_and_momenta_give_the_same_multipliers():
         out[0, 0], out[1, 1] = 1.5 + p[1] * math.cos(t), 2.5
         out[0, 1] = out[1, 0] = 0.2 * math.sin(t)
 
-    given = {"M": M, "C": G, "K": K2, "period": 2 * math.pi, "parameters": ("m", "b"), "states": ("x", "y")}
+    given = {
+        "M": M,
+        "C": G,
+        "K": K2,
+        "period": 2 * math.pi,
+        "parameters": ("m", "b"),
+        "states": ("x", "y"),
+    }
     free, canonical = (
         survey.evaluate(survey.floquet(**given, structure=kind), m=[0.0, 1.0], b=[0.1, 0.8])
         for kind in ("none", "symplectic")
@@ -142,10 +172,14 @@ def test_branches_are_followed_where_points_take_them():
         out[0, 0] = p[0] + p[1] * math.cos(2 * t)
 
     ours = survey.evaluate(
-        scene(K=K2, parameters=("a", "b"), C=lambda t, p, out: None), a=[0.3, 1.0, 1.4], b=[-0.2, 0.4]
+        scene(K=K2, parameters=("a", "b"), C=lambda t, p, out: None),
+        a=[0.3, 1.0, 1.4],
+        b=[-0.2, 0.4],
     )
     same = survey.evaluate(
-        scene(K=plain, parameters=("a", "b"), C=lambda t, p, out: None), a=[1.7, 1.0, 1.4], b=[0.2, 0.4]
+        scene(K=plain, parameters=("a", "b"), C=lambda t, p, out: None),
+        a=[1.7, 1.0, 1.4],
+        b=[0.2, 0.4],
     )
     assert (abs(ours.spectral_radius.values - same.spectral_radius.values) < 1e-7).all()
     assert (ours.multiplier_re.values == same.multiplier_re.values).all()

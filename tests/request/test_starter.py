@@ -56,10 +56,24 @@ def test_the_schema_accepts_the_kept_workflows_and_no_others():
     for path in sorted((ROOT / "workflows").glob("*.toml")):
         assert list(validator.iter_errors(tomllib.loads(path.read_text()))) == [], path
     base = {"scene": "mathieu", "axes": {"a": 1.0}}
-    for wrong in ({"axis": {}}, {"solver": {"tol": 1}}, {"axes": {"a": {"start": 1}}}, {"output": {"style": "x"}}):
+    for wrong in (
+        {"axis": {}},
+        {"solver": {"tol": 1}},
+        {"axes": {"a": {"start": 1}}},
+        {"output": {"style": "x"}},
+    ):
         assert list(validator.iter_errors(base | wrong)), wrong
     printed = schema["properties"]
-    assert set(printed) == {"title", "scene", "options", "axes", "solver", "output", "boundaries", "refine"}
+    assert set(printed) == {
+        "title",
+        "scene",
+        "options",
+        "axes",
+        "solver",
+        "output",
+        "boundaries",
+        "refine",
+    }
 
 
 def test_completion_offers_scenes_and_workflows(program):

@@ -1,4 +1,6 @@
-"""A scene's file that a stranger's survey names runs when this user has run it here before, or says so; else never."""
+"""A scene's file that a stranger's survey names runs when this user has run it here before, or says
+so; else never.
+"""
 
 import os
 import pty
@@ -23,7 +25,9 @@ AT = {"a": 1.0, "q": 0.5}
 
 @pytest.fixture
 def strange(tmp_path, monkeypatch):
-    """A stranger's survey with its scene beside it, for a user who has run nothing yet; `ran`: did its scene?"""
+    """A stranger's survey with its scene beside it, for a user who has run nothing yet; `ran`: did
+    its scene?
+    """
     (tmp_path / "files").mkdir()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setattr(trust, "_allowed", set())
@@ -32,7 +36,11 @@ def strange(tmp_path, monkeypatch):
     sentinel = hostile.base(tmp_path / "files")
 
     class Strange:
-        path, file, state = tmp_path / "files/base.nc", tmp_path / "files/evil.py", tmp_path / "state/survey/scenes"
+        path, file, state = (
+            tmp_path / "files/base.nc",
+            tmp_path / "files/evil.py",
+            tmp_path / "state/survey/scenes",
+        )
 
         @property
         def ran(self):
@@ -49,7 +57,14 @@ def verify(strange, *words, **given):
 def test_nothing_of_a_strange_survey_runs(strange):
     ds = survey.open(strange.path)
     assert "a Python file that you have not run here before" in repr(ds.survey.point(**AT))
-    ds.survey.areas(), ds.survey.boundary(), ds.survey.map(), ds.survey.compare(ds), repr(ds.survey), ds._repr_html_()
+    (
+        ds.survey.areas(),
+        ds.survey.boundary(),
+        ds.survey.map(),
+        ds.survey.compare(ds),
+        repr(ds.survey),
+        ds._repr_html_(),
+    )
     for ask in (lambda: ds.survey.trajectory(**AT), lambda: ds.survey.zoom(a=(0.0, 1.0), num=2)):
         with pytest.raises(
             Untrusted, match=r"--trust-scene, or in Python survey\.open\(path, trust_scene=True\)"
@@ -81,10 +96,14 @@ def test_a_strange_survey_whose_points_are_taken_over_runs_nothing(strange, monk
 
 def test_verify_checks_what_needs_no_scene_and_says_how_to_go_on(strange):
     done = verify(strange)
-    assert done.returncode == 2 and done.stdout.endswith("base.nc: sound; no points were solved again\n"), done.stderr
+    assert done.returncode == 2 and done.stdout.endswith(
+        "base.nc: sound; no points were solved again\n"
+    ), done.stderr
     assert "--trust-scene" in done.stderr and done.stderr.count("\n") == 1 and not strange.ran
     allowed = verify(strange, "--trust-scene")
-    assert allowed.returncode == 0 and "1 point" in allowed.stdout and "solved again" in allowed.stdout, allowed.stderr
+    assert (
+        allowed.returncode == 0 and "1 point" in allowed.stdout and "solved again" in allowed.stdout
+    ), allowed.stderr
     assert strange.ran
     assert verify(strange).returncode == 2, "it was allowed once, not for good"
 
@@ -101,10 +120,15 @@ def test_a_survey_that_is_opened_in_trust_is_solved(strange):
 def test_who_has_run_the_text_before_is_not_asked(strange):
     survey.evaluate(strange.file, **AT)
     (kept,) = strange.state.iterdir()
-    assert stat.S_IMODE(strange.state.stat().st_mode) == 0o700 and stat.S_IMODE(kept.stat().st_mode) == 0o600
+    assert (
+        stat.S_IMODE(strange.state.stat().st_mode) == 0o700
+        and stat.S_IMODE(kept.stat().st_mode) == 0o600
+    )
     code = "import sys, survey; from survey.request.user_scene import of_dataset; "
     code += "print(of_dataset(survey.open(sys.argv[1])).NAME)"
-    done = subprocess.run([sys.executable, "-c", code, strange.path], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code, strange.path], capture_output=True, text=True
+    )
     assert done.stdout == f"{strange.file}\n", done.stderr  # another process
     text = strange.file.read_text()
     strange.file.write_text(text + "\n")
@@ -131,20 +155,26 @@ def test_a_state_folder_that_others_can_write_is_not_believed(strange):
 
 
 @pytest.mark.parametrize("home", ["relative", "/proc/none", "/dev/null/x"])
-def test_without_a_home_to_write_a_run_goes_on_and_a_stranger_is_not_trusted(strange, home, monkeypatch, tmp_path):
+def test_without_a_home_to_write_a_run_goes_on_and_a_stranger_is_not_trusted(
+    strange, home, monkeypatch, tmp_path
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_STATE_HOME", home)
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))  # where platformdirs looks instead of a relative folder
+    # where platformdirs looks instead of a relative folder
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
     digest = survey.open(strange.path).attrs["scene_hash"]
     (tmp_path / "relative/survey/scenes").mkdir(parents=True)
-    (tmp_path / "relative/survey/scenes" / digest).touch()  # a stranger's folder, as it may be unpacked
+    # a stranger's folder, as it may be unpacked
+    (tmp_path / "relative/survey/scenes" / digest).touch()
     assert not trust.known(digest)
     trust.keep(digest)
     assert trust.known(digest)
 
 
 def test_many_processes_keep_hashes_at_once(strange):
-    code = "import sys; from survey.request import trust; [trust.keep(f'{i:064x}') for i in range(50)]"
+    code = (
+        "import sys; from survey.request import trust; [trust.keep(f'{i:064x}') for i in range(50)]"
+    )
     for process in [subprocess.Popen([sys.executable, "-c", code]) for _ in range(3)]:
         assert process.wait(60) == 0
     assert len(list(strange.state.iterdir())) == 50 and trust.known(f"{49:064x}")
@@ -183,7 +213,9 @@ def test_a_scene_that_is_no_small_file_is_not_read(strange, make):
         strange.file.symlink_to(strange.file.parent.parent / "elsewhere.py")
     ds = survey.open(strange.path)
     began = time.monotonic()
-    with pytest.raises(BadInput, match="not run here before" if make == "link" else "its file is missing"):
+    with pytest.raises(
+        BadInput, match="not run here before" if make == "link" else "its file is missing"
+    ):
         ds.survey.trajectory(**AT)
     assert time.monotonic() - began < 10 and not strange.ran
 
@@ -231,7 +263,12 @@ def test_the_viewer_shows_the_text_before_it_runs(strange):
     page.choose((1, 1))
     page.trust()  # nothing was shown yet
     page.solve()
-    assert "Read it first" in page.motion.text and page.read.visible and not page.run.visible and not strange.ran
+    assert (
+        "Read it first" in page.motion.text
+        and page.read.visible
+        and not page.run.visible
+        and not strange.ran
+    )
     page.show_source()
     shown = re.sub(r"<[^>]*>", "", page.source.text).replace("&#x27;", "'").replace("&quot;", '"')
     assert text.strip() in shown and page.run.visible and not strange.ran
@@ -246,7 +283,9 @@ def test_the_viewer_shows_the_text_before_it_runs(strange):
 
 
 def test_a_scene_made_of_a_function_needs_no_trust(strange):
-    scene = survey.hill(lambda u, p: p[0] - 2 * p[1] * np.cos(2 * u), period=np.pi, parameters=("a", "q"), even=True)
+    scene = survey.hill(
+        lambda u, p: p[0] - 2 * p[1] * np.cos(2 * u), period=np.pi, parameters=("a", "q"), even=True
+    )
     ds = survey.evaluate(scene, a=[0.5, 1.0], q=0.3)
     assert "T/2" in ds.survey.point(a=1.0).why and not strange.state.exists()
 

@@ -1,4 +1,6 @@
-"""A user's own Hill equation goes through every command like a built-in scene; what is wrong is said in one line."""
+"""A user's own Hill equation goes through every command like a built-in scene; what is wrong is
+said in one line.
+"""
 
 import dask.array as da
 import numpy as np
@@ -51,7 +53,12 @@ def test_every_command_takes_it(program, folder):
     run = program("run", "below/mine.toml", "-o", "mine.nc", "--workers", "1")
     assert run.returncode == 0, run.stderr
     assert (folder / "mine.png").exists()
-    for words in (("plan", "below/mine.toml"), ("info", "mine.nc"), ("verify", "mine.nc"), ("plot", "mine.nc")):
+    for words in (
+        ("plan", "below/mine.toml"),
+        ("info", "mine.nc"),
+        ("verify", "mine.nc"),
+        ("plot", "mine.nc"),
+    ):
         done = program(*words)
         assert done.returncode == 0, done.stderr
     assert "Mathieu's equation of my own" in program("scenes", "below/mine.py").stdout
@@ -64,7 +71,11 @@ def test_every_command_takes_it(program, folder):
     assert changed.returncode == 2 and "its file has changed since" in changed.stderr
     (folder / "below/mine.py").unlink()
     gone = program("verify", "mine.nc")
-    assert gone.returncode == 2 and "its file is missing" in gone.stderr and gone.stderr.count("\n") == 1
+    assert (
+        gone.returncode == 2
+        and "its file is missing" in gone.stderr
+        and gone.stderr.count("\n") == 1
+    )
     assert program("plot", "mine.nc").returncode == 0
 
 
@@ -103,7 +114,9 @@ def test_the_hash_tells_of_all_that_a_function_depends_on(monkeypatch):
     first = scene().HASH
     assert scene().HASH == first
     given = [{"period": 2 * np.pi}, {"even": False}, {"breaks": 1.0}, {"parameters": ("a", "b")}]
-    others = [scene(**more).HASH for more in given] + [scene(z).HASH for z in (_times(2.0), _times(3.0), calls)]
+    others = [scene(**more).HASH for more in given] + [
+        scene(z).HASH for z in (_times(2.0), _times(3.0), calls)
+    ]
     monkeypatch.setitem(globals(), "STRENGTH", 3.0)
     others += [scene().HASH, scene(calls).HASH]
     assert len({first, *others}) == 10
@@ -160,18 +173,34 @@ BAD = [
     ("def z(u, p):", "def w(u, p):", "z is missing; write def z"),
     ("PERIOD = pi", "", "PERIOD is missing; write"),
     ("PERIOD = pi", "PERIOD = -pi", "PERIOD = -3.14.*positive number"),
-    ("PERIOD = pi", "PERIOD = lambda p: -p[1]", "PERIOD is -0.5 at a = 1, q = 0.5; make it positive"),
+    (
+        "PERIOD = pi",
+        "PERIOD = lambda p: -p[1]",
+        "PERIOD is -0.5 at a = 1, q = 0.5; make it positive",
+    ),
     ("PERIOD = pi", "PERIOD = lambda p: p[2]", r"PERIOD\(p\) fails"),
-    ("PERIOD = pi", "PERIOD = 3.0", r"EVEN = True, but z\(T - u\) is not z\(u\) at a = 1, q = 0.5, T = 3"),
+    (
+        "PERIOD = pi",
+        "PERIOD = 3.0",
+        r"EVEN = True, but z\(T - u\) is not z\(u\) at a = 1, q = 0.5, T = 3",
+    ),
     ("PERIOD = pi\nEVEN = True", "PERIOD = 3.0", r"z\(T\) is not z\(0\)"),
-    ("cos(2 * u)", "cos(2 * u - 0.3)", r"EVEN = True, but z\(T - u\) is not z\(u\).*set EVEN = False"),
+    (
+        "cos(2 * u)",
+        "cos(2 * u - 0.3)",
+        r"EVEN = True, but z\(T - u\) is not z\(u\).*set EVEN = False",
+    ),
     ("EVEN = True", "EVEN = 'yes'", "EVEN = 'yes': it must be True or False"),
     ("cos(2 * u)", "abs(cos(2 * u))", "z is not smooth at a = 1, q = 0.5; name the positions"),
     ("p[0]", "(-p[0] - u) ** 0.5", "z has no finite value at a = 1, q = 0.5"),
     ("p[0]", "p[2]", r"PARAMETERS names 2: p\[0\] to p\[1\]"),
     ("p[0]", "unknown(u)", r"cannot compile z\(u, p\) \(name 'unknown' is not defined\)"),
     ("return p[0]", "return 'a'\n    p[0]", r"z\(u, p\) returns 'a'; it must return a real number"),
-    ("return", "if p[0] > 0: raise ValueError('no')\n    return", r"z\(u, p\) raises ValueError\('no'\)"),
+    (
+        "return",
+        "if p[0] > 0: raise ValueError('no')\n    return",
+        r"z\(u, p\) raises ValueError\('no'\)",
+    ),
     ("z(u, p)", "z(u, a, q)", "z must be a function of two arguments"),
     ("def z(u, p):", "def z(u, p)", "the scene file failed to run .SyntaxError"),
     ("from math", "from maths", "the scene file failed to run .ModuleNotFoundError"),
@@ -182,7 +211,9 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "words"), BAD, ids=[new.split("\n")[0] for _, new, _ in BAD])
+@pytest.mark.parametrize(
+    ("old", "new", "words"), BAD, ids=[new.split("\n")[0] for _, new, _ in BAD]
+)
 def test_what_is_wrong_with_a_scene_is_said_in_one_line(folder, old, new, words):
     assert old in SCENE
     (folder / "bad.py").write_text(SCENE.replace(old, new, 1))
@@ -193,13 +224,18 @@ def test_what_is_wrong_with_a_scene_is_said_in_one_line(folder, old, new, words)
 
 
 def test_what_is_no_scene_is_refused(folder):
-    with pytest.raises(BadInput, match=r"there is no file gone\.py or below/gone\.py; name the file"):
+    with pytest.raises(
+        BadInput, match=r"there is no file gone\.py or below/gone\.py; name the file"
+    ):
         workflow.check({"scene": "gone.py", "axes": {"a": 1.0}}, near="below")
     with pytest.raises(BadInput, match=r"is a function; give survey\.hill\(mathieu"):
         survey.evaluate(mathieu, a=1.0, q=1.0)
     with pytest.raises(BadInput, match="scene = 5: input should be a valid string"):
         workflow.check({"scene": 5, "axes": {"a": 1.0}})
-    with pytest.raises(BadInput, match=r"axes\.aa: unknown parameter of scene hill\(mathieu\) 'aa'; did you mean 'a'"):
+    with pytest.raises(
+        BadInput,
+        match=r"axes\.aa: unknown parameter of scene hill\(mathieu\) 'aa'; did you mean 'a'",
+    ):
         workflow.check({"scene": scene(), "axes": {"aa": {"num": 3}, "q": 1.0}})
     with pytest.raises(BadInput, match="a is missing"):
         survey.evaluate(scene(), q=1.0)

@@ -22,7 +22,9 @@ def a_survey(scene="mathieu", a=None, **more):
 
 @pytest.mark.parametrize("word", ["tol", "tolerance", "accuracy"])
 def test_a_tolerance_is_rtol(word):
-    assert "did you mean 'rtol'?" in message(survey.evaluate, "mathieu", a=1.0, q=0.1, **{word: 1e-8})
+    assert "did you mean 'rtol'?" in message(
+        survey.evaluate, "mathieu", a=1.0, q=0.1, **{word: 1e-8}
+    )
     assert "did you mean 'rtol'?" in message(workflow.check, a_survey(solver={word: 1e-8}))
     assert "put rtol under [solver]" in message(workflow.check, a_survey(**{word: 1e-8}))
 
@@ -40,23 +42,39 @@ def test_a_step_is_a_number_of_values():
 
 def test_an_end_outside_its_domain_names_what_may_take_its_place():
     given = {"scene": "satellite", "output": {"path": "x.nc"}}
-    k = message(workflow.check, given | {"axes": {"k": {"start": 0.0, "stop": 1.0, "num": 5}, "rho": 1.0}})
-    assert "end 1, outside its domain; allowed: 0 <= k" in k and k.endswith("you can give one_minus_k or amplitude")
+    k = message(
+        workflow.check, given | {"axes": {"k": {"start": 0.0, "stop": 1.0, "num": 5}, "rho": 1.0}}
+    )
+    assert "end 1, outside its domain; allowed: 0 <= k" in k and k.endswith(
+        "you can give one_minus_k or amplitude"
+    )
     body = {"k": 0.5, "inertia_ratio": {"start": -1.0, "stop": 1.5, "num": 5}}
-    assert message(workflow.check, given | {"axes": body}).endswith("instead of inertia_ratio you can give rho")
+    assert message(workflow.check, given | {"axes": body}).endswith(
+        "instead of inertia_ratio you can give rho"
+    )
     e = {"mu": 0.01, "e": {"start": 0.0, "stop": 1.0, "num": 3}}
-    assert message(workflow.check, given | {"scene": "libration_elliptic", "axes": e}).endswith("0 <= e < 1")
+    assert message(workflow.check, given | {"scene": "libration_elliptic", "axes": e}).endswith(
+        "0 <= e < 1"
+    )
     degrees = {"amplitude": {"start": 0.0, "stop": 90.0, "num": 5}, "rho": 1.0}
     turned = message(workflow.check, given | {"axes": degrees})
-    assert "allowed: 0 <= amplitude < 1.5708 (rad); if it is in degrees, give amplitude_deg = 90" in turned
+    assert (
+        "allowed: 0 <= amplitude < 1.5708 (rad); if it is in degrees, give amplitude_deg = 90"
+        in turned
+    )
     assert turned.endswith("instead of amplitude you can give k or one_minus_k")
 
 
 def test_values_of_a_workflow_that_are_words():
     """A number in quotes, a body among the axes; and how many mistakes there are besides the first."""
-    assert message(workflow.check, a_survey(a="1")) == "axes.a = '1': it must be a number, without quotes"
+    assert (
+        message(workflow.check, a_survey(a="1"))
+        == "axes.a = '1': it must be a number, without quotes"
+    )
     libration = {"scene": "libration", "axes": {"body": "Earth-Moon"}}
-    assert message(workflow.check, libration).startswith("axes.body: bodies are named under [options], as in body = '")
+    assert message(workflow.check, libration).startswith(
+        "axes.body: bodies are named under [options], as in body = '"
+    )
     listed = {"scene": "libration", "axes": {"body": {"values": ["Earth-Moon", "Sun-Jupiter"]}}}
     assert message(workflow.check, listed).endswith("several, in Python")
     assert message(workflow.check, {}).endswith("(and 1 more mistake)")
@@ -64,19 +82,27 @@ def test_values_of_a_workflow_that_are_words():
 
 def test_what_is_opened_is_one_file(tmp_path):
     assert message(survey.open, ["a.nc", "b.nc"]).endswith("survey.concat joins several")
-    with pytest.raises(TypeError, match="give the path of a file that survey model has made, not 3"):
+    with pytest.raises(
+        TypeError, match="give the path of a file that survey model has made, not 3"
+    ):
         survey.Model(3)
 
 
 def test_functions_are_told_of_keywords_and_files_of_their_names(tmp_path):
     made = {"period": 6.0, "parameters": "a"}
-    assert "even = 'yes': it must be True or False" in message(survey.hill, lambda u, p: p[0], even="yes", **made)
+    assert "even = 'yes': it must be True or False" in message(
+        survey.hill, lambda u, p: p[0], even="yes", **made
+    )
     odd = survey.hill(lambda u, p: p[0] + np.sin(u), even=True, **made)
     said = message(survey.evaluate, odd, a=1.0)
     assert "; set even = False, or correct z or period" in said and "EVEN" not in said
-    assert "structure = 'x'" in message(survey.floquet, lambda t, p, out: None, states="x", structure="x", **made)
+    assert "structure = 'x'" in message(
+        survey.floquet, lambda t, p, out: None, states="x", structure="x", **made
+    )
     path = tmp_path / "own.py"
-    path.write_text("EVEN = 'yes'\nPERIOD = 6.0\nPARAMETERS = 'a'\n\n\ndef z(u, p):\n    return p[0]\n")
+    path.write_text(
+        "EVEN = 'yes'\nPERIOD = 6.0\nPARAMETERS = 'a'\n\n\ndef z(u, p):\n    return p[0]\n"
+    )
     assert "EVEN = 'yes': it must be True or False" in message(survey.evaluate, str(path), a=1.0)
 
 
@@ -94,9 +120,13 @@ def test_a_scene_describes_its_methods_by_what_they_do_for_it():
         for name, line in api.scene(scene)["methods"].items():
             if name != "auto":
                 method, family = measures.method(name), load(scene).FAMILY
-                assert len(method.SERVES) == 1 or line.startswith(method.ABOUT[family].removesuffix(".")), (scene, name)
+                assert len(method.SERVES) == 1 or line.startswith(
+                    method.ABOUT[family].removesuffix(".")
+                ), (scene, name)
     for name in modules.names(methods):
         method = measures.method(name)
         assert len(method.SERVES) == 1 or set(method.ABOUT) >= set(method.SERVES), name
-    danby, hill = (api.scene(scene)["methods"]["taylor16"] for scene in ("libration_elliptic", "satellite"))
+    danby, hill = (
+        api.scene(scene)["methods"]["taylor16"] for scene in ("libration_elliptic", "satellite")
+    )
     assert "y'' + z y = 0" in hill and "y''" not in danby and "L4" in danby

@@ -37,7 +37,11 @@ def test_axes_are_the_dimensions_in_order():
 def test_defaults_are_filled_in():
     checked = check(GOOD)
     assert checked.request.options == {"body": "prolate"}
-    assert (checked.request.method, checked.request.rtol, checked.title) == ("auto", 1e-10, checked.scene.TITLE)
+    assert (checked.request.method, checked.request.rtol, checked.title) == (
+        "auto",
+        1e-10,
+        checked.scene.TITLE,
+    )
 
 
 @pytest.mark.parametrize(
@@ -47,15 +51,27 @@ def test_defaults_are_filled_in():
         (["axes.k.number=3"], ["unknown key axes.k.number", "'num'"]),
         (["solver.metod=auto"], ["unknown key solver.metod", "'method'"]),
         (["axes.kk.values=[1.0]"], ["parameter of scene satellite 'kk'", "did you mean 'k'"]),
-        (["axes.kk.num=40"], ["axes.kk: unknown parameter of scene satellite 'kk'; did you mean 'k'? (allowed: k, "]),
-        (["axes.K.num=40"], ["axes.K: unknown parameter of scene satellite 'K'; did you mean 'k'?"]),
-        (["axes.kk.num=40", "scene=satelite"], ["unknown scene 'satelite'; did you mean 'satellite'?"]),
+        (
+            ["axes.kk.num=40"],
+            ["axes.kk: unknown parameter of scene satellite 'kk'; did you mean 'k'? (allowed: k, "],
+        ),
+        (
+            ["axes.K.num=40"],
+            ["axes.K: unknown parameter of scene satellite 'K'; did you mean 'k'?"],
+        ),
+        (
+            ["axes.kk.num=40", "scene=satelite"],
+            ["unknown scene 'satelite'; did you mean 'satellite'?"],
+        ),
         (["axes.kk.num=40", "solvr.rtol=1"], ["unknown key solvr; did you mean 'solver'?"]),
         (["axes.rho.vales=[1.0]"], ["unknown key axes.rho.vales; did you mean 'values'?"]),
         (["refine.widht=0.1"], ["unknown key refine.widht; did you mean 'width'?"]),
         (["boundaries.axs=rho"], ["unknown key boundaries.axs; did you mean 'axis'?"]),
         (["output.variabls=['y1']"], ["unknown key output.variabls; did you mean 'variables'?"]),
-        (["output.figures=[verdict]"], ["output.figures = '[verdict]': it must be a list", "with quotes"]),
+        (
+            ["output.figures=[verdict]"],
+            ["output.figures = '[verdict]': it must be a list", "with quotes"],
+        ),
         (["axes.k=1.0"], ["axes.k is 1", "k != 1"]),
         (["axes.k=-0.5"], ["axes.k is -0.5", "0 <= k"]),
         (["axes.k.start=-0.5"], ["axes.k has an end -0.5", "0 <= k"]),
@@ -109,7 +125,10 @@ def test_defaults_are_filled_in():
         (["output.path=" + "n" * 240 + ".nc"], ["output.path", "too long for the files beside it"]),
         (["output.path=a\u0000.nc"], ["output.path = 'a\\x00.nc'", "cannot be printed"]),
         (["title=\u001b[31mred"], ["title = '\\x1b[31mred'", "cannot be printed"]),
-        (["scene=" + "n" * 5000 + ".py"], ["scene = 'nnn", "nnn ... nnn", "no file can have this name"]),
+        (
+            ["scene=" + "n" * 5000 + ".py"],
+            ["scene = 'nnn", "nnn ... nnn", "no file can have this name"],
+        ),
     ],
 )
 def test_bad_input_is_refused_in_one_line(overrides, words):
@@ -155,11 +174,17 @@ def test_an_interior_point_outside_the_domain_is_allowed():
 def test_overrides_take_toml_or_strings_and_are_recorded(tmp_path):
     path = tmp_path / "map.toml"
     path.write_text(GOOD)
-    read = workflow.read(path, ["axes.k.num=7", "title=A new name", "solver.rtol=1e-6"], tmp_path / "o.nc")
+    read = workflow.read(
+        path, ["axes.k.num=7", "title=A new name", "solver.rtol=1e-6"], tmp_path / "o.nc"
+    )
     assert (read.grid.sizes["k"], read.title, read.request.rtol) == (7, "A new name", 1e-6)
     assert read.text.startswith("# map.toml --set axes.k.num=7 --set title=A new name")
     again = workflow.check(tomllib.loads(read.text))
-    assert (again.grid.sizes, again.title, again.request) == (read.grid.sizes, read.title, read.request)
+    assert (again.grid.sizes, again.title, again.request) == (
+        read.grid.sizes,
+        read.title,
+        read.request,
+    )
     assert read.path == tmp_path / "o.nc"
 
 
@@ -168,7 +193,9 @@ junk = st.recursive(
     st.none() | st.booleans() | st.integers() | numbers | st.text(max_size=5),
     lambda inner: (
         st.lists(inner, max_size=3)
-        | st.dictionaries(st.sampled_from(["start", "stop", "num", "values", "k", "x"]), inner, max_size=4)
+        | st.dictionaries(
+            st.sampled_from(["start", "stop", "num", "values", "k", "x"]), inner, max_size=4
+        )
     ),
     max_leaves=8,
 )
@@ -176,7 +203,11 @@ junk = st.recursive(
 
 @settings(suppress_health_check=[HealthCheck.too_slow], deadline=None)
 @given(
-    st.dictionaries(st.sampled_from(["title", "scene", "axes", "options", "solver", "output", "x"]), junk, max_size=6)
+    st.dictionaries(
+        st.sampled_from(["title", "scene", "axes", "options", "solver", "output", "x"]),
+        junk,
+        max_size=6,
+    )
 )
 def test_junk_is_refused_in_one_line_and_never_with_a_traceback(data):
     with pytest.raises(BadInput) as refusal:
@@ -193,16 +224,29 @@ def test_listed_values_and_numbers_arrive_exactly(k, rho):
 
 
 def test_a_parameter_in_the_way_is_named():
-    with pytest.raises(BadInput, match=r"^axes.theta0 cannot be combined with axes.l, which is also given"):
+    with pytest.raises(
+        BadInput, match=r"^axes.theta0 cannot be combined with axes.l, which is also given"
+    ):
         workflow.check({"scene": "brun", "axes": {"l": 1.0, "theta0": 1.0}})
 
 
-def test_boundaries_of_a_question_without_a_verdict_are_refused_before_any_point(tmp_path, monkeypatch):
+def test_boundaries_of_a_question_without_a_verdict_are_refused_before_any_point(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     axes = {"A": 1.0, "B": {"values": [0.8, 0.9]}, "C": {"values": [0.6, 0.7]}}
-    asked = {"scene": "brun_triaxial", "options": {"question": "trajectory"}, "boundaries": {}, "axes": axes | {"t": 1}}
+    asked = {
+        "scene": "brun_triaxial",
+        "options": {"question": "trajectory"},
+        "boundaries": {},
+        "axes": axes | {"t": 1},
+    }
     with pytest.raises(BadInput, match="of brun_triaxial question = trajectory has no verdict"):
         survey.run(asked)
     assert not list(tmp_path.iterdir())
-    with pytest.raises(BadInput, match="no boundaries are known along B: question = trajectory has no verdict"):
-        survey.edge("brun_triaxial", question="trajectory", along="B", A=1.0, C=0.7, t=1.0, B=(0.5, 0.9))
+    with pytest.raises(
+        BadInput, match="no boundaries are known along B: question = trajectory has no verdict"
+    ):
+        survey.edge(
+            "brun_triaxial", question="trajectory", along="B", A=1.0, C=0.7, t=1.0, B=(0.5, 0.9)
+        )

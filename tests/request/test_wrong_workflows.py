@@ -1,4 +1,6 @@
-"""Workflow files that are wrong in every way: each ends soon, in a plan or in one short line without control codes."""
+"""Workflow files that are wrong in every way: each ends soon, in a plan or in one short line
+without control codes.
+"""
 
 import copy
 import datetime
@@ -26,9 +28,42 @@ SECONDS = 60  # for one file: on a busy machine, and with kernels of an own equa
 DEEP = []
 for _ in range(200):
     DEEP = [DEEP]
-NUMBERS = [0, -1, 1, 2, 3, 1000, 10**12, 10**30, 10**400, -(10**400), 2**63, 1e308, -1e308, 5e-324, -0.0, 1e-300, 0.5]
+NUMBERS = [
+    0,
+    -1,
+    1,
+    2,
+    3,
+    1000,
+    10**12,
+    10**30,
+    10**400,
+    -(10**400),
+    2**63,
+    1e308,
+    -1e308,
+    5e-324,
+    -0.0,
+    1e-300,
+    0.5,
+]
 NUMBERS += [math.nan, math.inf, -math.inf, True, False]
-TEXTS = ["", " ", "x", "auto", "log", "linear", "verdict", "results", ".", "..", "/", "~", "a/b/c.nc", "/proc/map.nc"]
+TEXTS = [
+    "",
+    " ",
+    "x",
+    "auto",
+    "log",
+    "linear",
+    "verdict",
+    "results",
+    ".",
+    "..",
+    "/",
+    "~",
+    "a/b/c.nc",
+    "/proc/map.nc",
+]
 TEXTS += [
     "n" * 300 + ".nc",
     "n" * 240 + ".nc",
@@ -172,12 +207,18 @@ def mutate_table(draw, table):
         if what < 3:
             holder[key] = copy.deepcopy(draw.choice(JUNK))
         elif what == 3 and isinstance(holder, dict):
-            holder[draw.choice(KEYS)] = holder.pop(key) if draw.random() < 0.5 else copy.deepcopy(draw.choice(JUNK))
+            holder[draw.choice(KEYS)] = (
+                holder.pop(key) if draw.random() < 0.5 else copy.deepcopy(draw.choice(JUNK))
+            )
         elif what == 4:
             del holder[key]
         elif what == 5 and isinstance(holder[key], (int, float)):
             factor = draw.choice([-1, 0, 2, 1e-3, 1e300, 1e6])
-            holder[key] = type(holder[key])(min(holder[key] * factor, 1e15)) if holder[key] == holder[key] else 1
+            holder[key] = (
+                type(holder[key])(min(holder[key] * factor, 1e15))
+                if holder[key] == holder[key]
+                else 1
+            )
         else:
             holder[key] = draw.choice([[holder[key]], {"values": holder[key]}, str(holder[key])])
     return table
@@ -205,9 +246,25 @@ def mutate_text(draw, text):
 def override(draw, table):
     """KEY=VALUE as `--set` takes it."""
     key = ".".join(str(part) for part in draw.choice(list(places(table))))
-    key = draw.choice([key, key, key, draw.choice(KEYS), f"{key}.{draw.choice(KEYS)}", f"axes.{draw.choice(KEYS)}"])
+    key = draw.choice(
+        [
+            key,
+            key,
+            key,
+            draw.choice(KEYS),
+            f"{key}.{draw.choice(KEYS)}",
+            f"axes.{draw.choice(KEYS)}",
+        ]
+    )
     value = draw.choice(
-        [str(draw.choice(NUMBERS[:8])), draw.choice(TEXTS), repr(draw.choice(TEXTS)), "[" * 2000, "[1,", "1" * 5000]
+        [
+            str(draw.choice(NUMBERS[:8])),
+            draw.choice(TEXTS),
+            repr(draw.choice(TEXTS)),
+            "[" * 2000,
+            "[1,",
+            "1" * 5000,
+        ]
     )
     return draw.choice([f"{key}={value}", f"{key}={value}", f"{key}={value}", key, f"={value}", ""])
 
@@ -220,7 +277,8 @@ def mutated(draw, path):
     if what < 0.6:
         try:
             return tomli_w.dumps(mutate_table(draw, table)).encode(), []
-        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):  # what cannot be written
+        # what cannot be written
+        except (ValueError, TypeError, AttributeError, OverflowError, RecursionError):
             return mutate_text(draw, text), []
     if what < 0.85:
         return mutate_text(draw, text), []
@@ -266,9 +324,13 @@ def attack(folder, number, seed):
         file.write_bytes(content)
         signal.setitimer(signal.ITIMER_REAL, SECONDS)
         try:
-            refusals += refused(lambda sets=overrides: plan.plan(workflow.read(file, sets))) is not None
+            refusals += (
+                refused(lambda sets=overrides: plan.plan(workflow.read(file, sets))) is not None
+            )
         except BaseException as error:
-            raise AssertionError(f"mutation {count} of seed {seed}: {content[:2000]!r} {overrides!r}"[:3000]) from error
+            raise AssertionError(
+                f"mutation {count} of seed {seed}: {content[:2000]!r} {overrides!r}"[:3000]
+            ) from error
     return refusals
 
 
@@ -313,7 +375,16 @@ OBJECTS += [
     [Hostile()],
     LOOP,
 ]
-OBJECTS += [np.float32(0.5), np.int8(1), (0.1, 0.2), range(3), "\ud800", np.empty(0), np.ma.masked, float]
+OBJECTS += [
+    np.float32(0.5),
+    np.int8(1),
+    (0.1, 0.2),
+    range(3),
+    "\ud800",
+    np.empty(0),
+    np.ma.masked,
+    float,
+]
 
 
 def test_objects_of_any_kind_are_refused_by_check_in_one_line(folder):

@@ -13,8 +13,18 @@ from survey.errors import BadInput
 from survey.status import INVALID_PARAMETERS
 
 REFERENCE = json.loads((files("survey.reference") / "brun.json").read_text())
-cases = pytest.mark.parametrize("case", REFERENCE["cases"], ids=[case["id"] for case in REFERENCE["cases"]])
-FREE = {"epsilon": 0.0, "A": 2.0, "C": 1.0, "theta0": 1.1, "p_theta0": 0.5, "p_psi": 1.3, "p_phi": 0.9}
+cases = pytest.mark.parametrize(
+    "case", REFERENCE["cases"], ids=[case["id"] for case in REFERENCE["cases"]]
+)
+FREE = {
+    "epsilon": 0.0,
+    "A": 2.0,
+    "C": 1.0,
+    "theta0": 1.1,
+    "p_theta0": 0.5,
+    "p_psi": 1.3,
+    "p_phi": 0.9,
+}
 VALUES = {"u_min": "u_min", "u_max": "u_max", "period": "nutation_period_T", "precession": "delta_psi_per_T",
           "spin": "delta_phi_per_T"}  # fmt: skip
 
@@ -22,7 +32,10 @@ VALUES = {"u_min": "u_min", "u_max": "u_max", "period": "nutation_period_T", "pr
 def scaled(sign=1, variables=None, **parameters):
     """At scaled integrals that share one dimension."""
     wide = np.broadcast_arrays(*(np.atleast_1d(value) for value in parameters.values()))
-    arrays = {key: xr.DataArray(value.copy(), dims="point") for key, value in zip(parameters, wide, strict=True)}
+    arrays = {
+        key: xr.DataArray(value.copy(), dims="point")
+        for key, value in zip(parameters, wide, strict=True)
+    }
     return survey.evaluate("brun", sign=str(sign), variables=variables, **arrays)
 
 
@@ -60,15 +73,24 @@ def test_reference_states(case):
             now = ds.isel(t=i)
             for name, key in (("u", "u"), ("psi", "psi_unwrapped"), ("phi", "phi_unwrapped")):
                 assert within(now[name], state[key], now[f"{name}_error"]), (name, i)
-    assert float(ds.u_error.max()) < 100 * max(float(case["conditioning_double"]["u_at_first_t_abs"]), 1e-15)
+    assert float(ds.u_error.max()) < 100 * max(
+        float(case["conditioning_double"]["u_at_first_t_abs"]), 1e-15
+    )
 
 
 @pytest.mark.parametrize("row", REFERENCE["bifurcation_points"], ids=lambda row: row["label"])
 def test_regular_precessions(row):
     """(S8), (S9): T -> 2 pi / omega_n at a stable one, the separatrix at an unstable one."""
-    k, L, a, b, square = (float(row[key]) for key in ("k", "L", "p_phi", "p_psi", "A2_omega_n_squared"))
+    k, L, a, b, square = (
+        float(row[key]) for key in ("k", "L", "p_phi", "p_psi", "A2_omega_n_squared")
+    )
     size = abs(k)
-    ds = scaled(int(np.sign(k)), l=L / size + (1e-13 if square > 0 else 0.0), alpha=a / size**0.5, beta=b / size**0.5)
+    ds = scaled(
+        int(np.sign(k)),
+        l=L / size + (1e-13 if square > 0 else 0.0),
+        alpha=a / size**0.5,
+        beta=b / size**0.5,
+    )
     if square < 0:
         assert abs(float(ds.separatrix_distance[0])) < 1e-15
     else:
@@ -93,7 +115,11 @@ def test_duality(sign):
     other = scaled(sign, ratio=1.0, **given | {"alpha": given["beta"], "beta": given["alpha"]})
     for name, dual in (("period", "period"), ("precession", "spin")):
         off = abs(one[name] - other[dual])
-        assert (off <= one[f"{name}_error"] + other[f"{dual}_error"]).where(one[name].notnull(), True).all()
+        assert (
+            (off <= one[f"{name}_error"] + other[f"{dual}_error"])
+            .where(one[name].notnull(), True)
+            .all()
+        )
     assert int(one.period.notnull().sum()) > 100
 
 
@@ -110,7 +136,11 @@ def test_two_wells():
     assert two.sizes["point"] > 100 and (two.separatrix_distance < 0).all()
     assert (two.u_max[:, 0] < two.u_min[:, 1]).all()
     near, far = np.sign(two.beta - two.alpha), np.sign(two.beta + two.alpha)
-    for name, exact in (("period", 0.0), ("precession", np.pi * (near - far)), ("spin", -np.pi * (near + far))):
+    for name, exact in (
+        ("period", 0.0),
+        ("precession", np.pi * (near - far)),
+        ("spin", -np.pi * (near + far)),
+    ):
         off = abs(two[name][:, 1] - two[name][:, 0] - exact)
         assert (off <= two[f"{name}_error"].sum("well") + 1e-15).all(), name
 
@@ -122,7 +152,9 @@ def test_scaling():
     x = (1.3 - 0.9 * np.cos(1.1)) / np.sin(1.1)
     L = 0.25 + x * x - k * np.cos(1.1) ** 2 + 0.81
     one = survey.evaluate("brun", **point)
-    other = survey.evaluate("brun", l=L / k, alpha=0.9 / k**0.5, beta=1.3 / k**0.5, ratio=0.5).isel(well=0)
+    other = survey.evaluate("brun", l=L / k, alpha=0.9 / k**0.5, beta=1.3 / k**0.5, ratio=0.5).isel(
+        well=0
+    )
     for name, unit in (
         ("period", 2.0 / k**0.5),
         ("precession", 1.0),
@@ -148,7 +180,9 @@ def test_action_derivatives(sign, l, alpha, beta):  # noqa: E741
         assert abs((8 * (j[2] - j[1]) - (j[3] - j[0])) / (12 * h) - float(exact)) < 1e-8, name
 
 
-@pytest.mark.parametrize("change", [{}, {"epsilon": 0.7, "C": 2.0}, {"p_phi": 2.9}, {"p_phi": -0.3}, {"p_psi": -3.0}])
+@pytest.mark.parametrize(
+    "change", [{}, {"epsilon": 0.7, "C": 2.0}, {"p_phi": 2.9}, {"p_phi": -0.3}, {"p_psi": -3.0}]
+)
 def test_without_field(change):
     """Delta_psi = pi [sgn(b-a) + sgn(b+a)], T = 2 pi A / sqrt L."""
     point = FREE | change
@@ -171,19 +205,27 @@ def test_small_field():
 
 
 def test_logarithmic_slopes():
-    """T grows as ln(1/d)/Lambda within a well and twice that outside; Lambda = 1 at the saddle u = 0 of a = b = 0."""
+    """T grows as ln(1/d)/Lambda within a well and twice that outside; Lambda = 1 at the saddle u =
+    0 of a = b = 0.
+    """
     for side, last, slope in ((-1, 250, 1), (1, 24, 2)):
         depth = 10.0 ** -np.arange(6, last, 3)
         ds = scaled(1, l=side * depth, alpha=0.0, beta=0.0)
-        assert (ds.wells == (2 if side < 0 else 1)).all() and (ds.separatrix_distance == side * depth).all()
+        assert (ds.wells == (2 if side < 0 else 1)).all() and (
+            ds.separatrix_distance == side * depth
+        ).all()
         assert abs(np.diff(ds.period[:, 0]) / (3 * np.log(10)) - slope).max() < 1e-5
 
 
 def test_jump_at_a_pole():
-    """The advances jump by 2 pi where b - a changes its sign on motions that pass u = 1, and take the mean there."""
+    """The advances jump by 2 pi where b - a changes its sign on motions that pass u = 1, and take
+    the mean there.
+    """
     beta = 0.5 * (1 + np.array([-1e-12, 0.0, 1e-12]))
     for sign in (1, -1):
-        ds = scaled(sign, l=np.full(3, 1.7), alpha=np.full(3, 0.5), beta=beta, ratio=1.0).isel(well=0)
+        ds = scaled(sign, l=np.full(3, 1.7), alpha=np.full(3, 0.5), beta=beta, ratio=1.0).isel(
+            well=0
+        )
         assert ds.verdict.values.tolist() == [1, 3, 1] and float(ds.u_max[1]) == 1.0
         for name, jump in (("precession", 2 * np.pi), ("spin", -2 * np.pi)):
             low, middle, high = ds[name].values
@@ -195,19 +237,29 @@ def test_monodromy():
     turn = np.linspace(0, 2 * np.pi, 4001) + 0.1
     p = 0.45
     alpha, beta = np.full(turn.size, p), p + 0.05 * np.cos(turn)
-    ds = scaled(-1, l=alpha * beta + 1 + 0.05 * np.sin(turn), alpha=alpha, beta=beta, ratio=1.0).isel(well=0)
+    ds = scaled(
+        -1, l=alpha * beta + 1 + 0.05 * np.sin(turn), alpha=alpha, beta=beta, ratio=1.0
+    ).isel(well=0)
     for name in ("precession", "spin"):
         steps = np.diff(ds[name].values)
         jumps = abs(steps) > np.pi
-        assert jumps.sum() == 1 and abs(steps.sum()) < 1e-9 and abs(abs(steps[jumps][0]) - 2 * np.pi) < 0.01, name
+        assert (
+            jumps.sum() == 1
+            and abs(steps.sum()) < 1e-9
+            and abs(abs(steps[jumps][0]) - 2 * np.pi) < 0.01
+        ), name
 
 
 def test_cusps():
-    """On the curve of triple roots the saddle is born: inside there is a separatrix, outside there is none."""
+    """On the curve of triple roots the saddle is born: inside there is a separatrix, outside there
+    is none.
+    """
     u = np.linspace(-0.33, 0.33, 41)
     minus, plus = np.sqrt((1 - u) ** 3 * (1 + 3 * u)), np.sqrt((1 + u) ** 3 * (1 - 3 * u))
     a, b = (plus - minus) / 2, (plus + minus) / 2
-    inside, outside = (scaled(1, l=1 - 6 * u * u, alpha=f * a, beta=f * b) for f in (1 - 1e-6, 1 + 1e-6))
+    inside, outside = (
+        scaled(1, l=1 - 6 * u * u, alpha=f * a, beta=f * b) for f in (1 - 1e-6, 1 + 1e-6)
+    )
     assert inside.separatrix_distance.notnull().all() and outside.separatrix_distance.isnull().all()
 
 
@@ -228,7 +280,11 @@ def test_exact_cases(sign, l, alpha, beta, verdict, status, u):  # noqa: E741
     ds = scaled(sign, l=l, alpha=alpha, beta=beta).isel(point=0)
     assert (int(ds.verdict), int(ds.status)) == (verdict, status)
     if u is not None:
-        assert float(ds.u_min[0]) == float(ds.u_max[0]) == u and float(ds.action[0]) == 0.0 and ds.period[0] > 0
+        assert (
+            float(ds.u_min[0]) == float(ds.u_max[0]) == u
+            and float(ds.action[0]) == 0.0
+            and ds.period[0] > 0
+        )
     if verdict <= 0:
         assert ds.period.isnull().all()
 

@@ -1,7 +1,8 @@
-"""Brun's problem by the Euler-Poisson equations in Cartesian components; wells in lanes and one by one.
+"""Brun's problem by the Euler-Poisson equations in Cartesian components; wells in lanes and one by
+one.
 
-M' = M x w + epsilon gamma x I gamma, e' = e x w for the fixed axes e = gamma (vertical), xi, eta in the body,
-w = I^-1 M: no angle, no polynomial and no elliptic function.
+M' = M x w + epsilon gamma x I gamma, e' = e x w for the fixed axes e = gamma (vertical), xi, eta in
+the body, w = I^-1 M: no angle, no polynomial and no elliptic function.
 """
 
 import numpy as np
@@ -25,7 +26,9 @@ def slope(state, inertia, epsilon):
     """Of M and of the axes, state (4, 3, n), at `inertia` (3, n)."""
     momentum, axes = state[0], state[1:]
     rate = momentum / inertia
-    torque = np.cross(momentum, rate, axis=0) + epsilon * np.cross(axes[0], inertia * axes[0], axis=0)
+    torque = np.cross(momentum, rate, axis=0) + epsilon * np.cross(
+        axes[0], inertia * axes[0], axis=0
+    )
     return np.concatenate([torque[None], np.cross(axes, rate[None], axis=1)])
 
 
@@ -38,7 +41,9 @@ def integrated(point, times, steps):
     for _ in range(steps):
         slopes = []
         for i in range(STAGES):
-            slopes.append(slope(state + h * sum(A[i, j] * slopes[j] for j in range(i)), inertia, epsilon))
+            slopes.append(
+                slope(state + h * sum(A[i, j] * slopes[j] for j in range(i)), inertia, epsilon)
+            )
         state = state + h * sum(B[i] * slopes[i] for i in range(STAGES))
     gamma, xi, eta = state[1:]
     return gamma[2], np.arctan2(xi[2], -eta[2]), np.arctan2(gamma[0], gamma[1])
@@ -54,7 +59,10 @@ def states(number, seed):
 
 
 def evaluated(point, method="auto", **more):
-    arrays = {name: xr.DataArray(values.copy(), dims="point") for name, values in zip(NAMES, point, strict=True)}
+    arrays = {
+        name: xr.DataArray(values.copy(), dims="point")
+        for name, values in zip(NAMES, point, strict=True)
+    }
     return survey.evaluate("brun", method=method, **arrays, **more)
 
 
@@ -64,18 +72,23 @@ def turned(difference):
 
 
 def test_euler_poisson():
-    """One period later u is back and the angles have advanced; at t = 2, u, psi and phi are the integrated ones."""
+    """One period later u is back and the angles have advanced; at t = 2, u, psi and phi are the
+    integrated ones.
+    """
     point = states(60, 5)
     ds = evaluated(point)
     assert ds.wells.values.min() == 1 and (ds.verdict == 1).all()
     after, half = (integrated(point, ds.period.values, n) for n in (STEPS, STEPS // 2))
-    good = np.all([abs(turned(x - y)) < 1e-9 for x, y in zip(after, half, strict=True)], axis=0)  # short enough steps
+    # short enough steps
+    good = np.all([abs(turned(x - y)) < 1e-9 for x, y in zip(after, half, strict=True)], axis=0)
     assert good.sum() > 40
     exact = (np.cos(point[3]), ds.precession.values, ds.spin.values)
     for found, value in zip(after, exact, strict=True):
         assert abs(turned(found - value))[good].max() < 1e-10
     at = evaluated(point, t=2.0)
-    for name, found in zip(("u", "psi", "phi"), integrated(point, np.full(60, 2.0), STEPS), strict=True):
+    for name, found in zip(
+        ("u", "psi", "phi"), integrated(point, np.full(60, 2.0), STEPS), strict=True
+    ):
         assert np.quantile(abs(turned(found - at[name].values)), 0.7) < 1e-11, name
 
 
@@ -85,7 +98,11 @@ def agree(one, other, names):
         assert (one[name] == other[name]).all(), name
     for name in names:
         off = abs(one[name] - other[name])
-        assert (off <= one[f"{name}_error"] + other[f"{name}_error"]).where(one[name].notnull(), True).all(), name
+        assert (
+            (off <= one[f"{name}_error"] + other[f"{name}_error"])
+            .where(one[name].notnull(), True)
+            .all()
+        ), name
         assert (one[name].notnull() == other[name].notnull()).all(), name
         wider = (one[f"{name}_error"] / other[f"{name}_error"]).where(other[f"{name}_error"] > 0)
         assert not float(wider.median()) > 1.5, name
@@ -95,7 +112,9 @@ VALUES = ("u_min", "u_max", "period", "precession", "spin", "action", "separatri
 
 
 def test_lanes():
-    """What is solved in lanes is what agm gives one well at a time; a point's bits do not depend on others."""
+    """What is solved in lanes is what agm gives one well at a time; a point's bits do not depend on
+    others.
+    """
     random = np.random.default_rng(11)
     hard = np.array([draw(random)[1] for _ in range(1000)]).T
     both = np.concatenate([states(1000, 6), hard], axis=1)
@@ -112,8 +131,15 @@ def test_lanes():
 def test_lanes_of_scaled_integrals(sign):
     random = np.random.default_rng(12)
     hard = [point for _, s, point in (draw_scaled(random) for _ in range(1500)) if s == sign]
-    l, alpha, beta = np.concatenate([np.array(hard), random.normal(size=(1500, 3)) * [1.0, 0.4, 0.4]]).T  # noqa: E741
-    arrays = {name: xr.DataArray(v.copy(), dims="point") for name, v in (("l", l), ("alpha", alpha), ("beta", beta))}
-    one, other = (survey.evaluate("brun", sign=str(sign), method=m, **arrays) for m in ("auto", "agm"))
+    l, alpha, beta = np.concatenate(  # noqa: E741
+        [np.array(hard), random.normal(size=(1500, 3)) * [1.0, 0.4, 0.4]]
+    ).T
+    arrays = {
+        name: xr.DataArray(v.copy(), dims="point")
+        for name, v in (("l", l), ("alpha", alpha), ("beta", beta))
+    }
+    one, other = (
+        survey.evaluate("brun", sign=str(sign), method=m, **arrays) for m in ("auto", "agm")
+    )
     assert sign == -1 or int((one.wells == 2).sum()) > 50
     agree(one, other, VALUES)

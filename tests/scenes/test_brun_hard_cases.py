@@ -1,4 +1,6 @@
-"""Hard cases of every kind against 60 digits: errors within the bars, and near what half-ulp changes of inputs do."""
+"""Hard cases of every kind against 60 digits: errors within the bars, and near what half-ulp
+changes of inputs do.
+"""
 
 import numpy as np
 import pytest
@@ -6,18 +8,32 @@ import xarray as xr
 from mpmath import mp, mpf
 
 import survey
-from survey.truth.brun_digits import HALF_ULP, NAMES, OUTPUTS, draw, draw_scaled, scaled, truth, wells
+from survey.truth.brun_digits import (
+    HALF_ULP,
+    NAMES,
+    OUTPUTS,
+    draw,
+    draw_scaled,
+    scaled,
+    truth,
+    wells,
+)
 
 WIDEST = 1e4  # bars over floors: 5e3 at 1e-24 from separatrices
 
 
 def evaluate(points, method="auto", **more):
-    arrays = {name: xr.DataArray(np.array(column), dims="point") for name, column in zip(NAMES, points.T, strict=True)}
+    arrays = {
+        name: xr.DataArray(np.array(column), dims="point")
+        for name, column in zip(NAMES, points.T, strict=True)
+    }
     return survey.evaluate("brun", method=method, **arrays, **more)
 
 
 def misses(seed, number):
-    """Complaints: an error outside its bar, or above 100 times the floor, of a rounded output at least; a wide bar."""
+    """Complaints: an error outside its bar, or above 100 times the floor, of a rounded output at
+    least; a wide bar.
+    """
     random = np.random.default_rng(seed)
     kinds, points = zip(*(draw(random) for _ in range(number)), strict=True)
     ds, faults = evaluate(np.array(points)), []
@@ -48,7 +64,9 @@ def scaled_misses(seed, number):
     cases = [draw_scaled(random) for _ in range(number)]
     for sign in (1, -1):
         mine = [(kind, point) for kind, s, point in cases if s == sign]
-        columns = zip(("l", "alpha", "beta"), zip(*(point for _, point in mine), strict=True), strict=True)
+        columns = zip(
+            ("l", "alpha", "beta"), zip(*(point for _, point in mine), strict=True), strict=True
+        )
         arrays = {name: xr.DataArray(np.array(column), dims="point") for name, column in columns}
         ds = survey.evaluate("brun", sign=str(sign), ratio=1.0, **arrays)
         for i, (kind, point) in enumerate(mine):
@@ -60,7 +78,10 @@ def scaled_misses(seed, number):
                 continue
             for j, ends in enumerate(found):
                 exact = truth(point, scaled(sign), ends)
-                faults += [(kind, sign, *complaint, point) for complaint in compared(one.isel(well=j), *exact)]
+                faults += [
+                    (kind, sign, *complaint, point)
+                    for complaint in compared(one.isel(well=j), *exact)
+                ]
     return faults
 
 
@@ -108,7 +129,8 @@ def test_many_hard_cases_of_scaled_integrals(seed):
 
 
 ATTACKED = [
-    # p_psi = +-p_phi but for an ulp, far from both poles: the integral of the third kind has a parameter of 1e-34
+    # p_psi = +-p_phi but for an ulp, far from both poles: the integral of the third kind has a
+    # parameter of 1e-34
     (0.7094687596845162, 1.291239726698599, 8.945842071118667, 2.1179917764009564, -0.6067452734098381,
      0.062437788306259165, 0.06243778830625917),
     (2.854856305072559, 3.358440474556878, 2.4878300007402845, 1.0976082748215041, 1.0052608801625322,

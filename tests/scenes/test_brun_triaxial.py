@@ -1,4 +1,6 @@
-"""Clebsch's case against the linearised equations in 50 digits, the full motion, and the scene of a body with A = B."""
+"""Clebsch's case against the linearised equations in 50 digits, the full motion, and the scene of a
+body with A = B.
+"""
 
 import body_truth as truth
 import mpmath as mp
@@ -19,16 +21,23 @@ def bodies(number, seed):
 
 
 def ask(question, moments, **point):
-    ds = survey.evaluate("brun_triaxial", question=question, **dict(zip(MOMENTS, moments, strict=True)), **point)
+    ds = survey.evaluate(
+        "brun_triaxial", question=question, **dict(zip(MOMENTS, moments, strict=True)), **point
+    )
     return ds.load()
 
 
 def linearised(moments, epsilon, rate, axis):
-    """Exponents of the linearised equations (1) in w and nu beside the rotation, by the eigenvalues of 6 x 6."""
+    """Exponents of the linearised equations (1) in w and nu beside the rotation, by the eigenvalues
+    of 6 x 6.
+    """
     inertias, e = [mp.mpf(float(A)) for A in moments], mp.mpf(float(epsilon))
     nu = [mp.mpf(i == axis) for i in range(3)]
     w = [mp.mpf(float(rate)) * x for x in nu]
-    M, f = [A * p for A, p in zip(inertias, w, strict=True)], [A * x for A, x in zip(inertias, nu, strict=True)]
+    M, f = (
+        [A * p for A, p in zip(inertias, w, strict=True)],
+        [A * x for A, x in zip(inertias, nu, strict=True)],
+    )
 
     def cross(v):
         return mp.matrix([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
@@ -36,7 +45,10 @@ def linearised(moments, epsilon, rate, axis):
     inertia = mp.diag(inertias)
     torque_w = cross(M) - cross(w) * inertia
     torque_nu = e * (cross(nu) * inertia - cross(f))
-    top = mp.diag([1 / A for A in inertias]) * torque_w, mp.diag([1 / A for A in inertias]) * torque_nu
+    top = (
+        mp.diag([1 / A for A in inertias]) * torque_w,
+        mp.diag([1 / A for A in inertias]) * torque_nu,
+    )
     full = mp.matrix(6, 6)
     for i in range(3):
         for j in range(3):
@@ -58,9 +70,16 @@ def test_rotations_are_those_of_the_linearised_equations():
             turns = sorted(abs(mp.im(x)) for x in sorted(roots, key=abs)[2:])
             assert abs(float(ds.growth) - growth) <= float(ds.growth_error) + 1e-18
             for name, value in (("frequency_slow", turns[0]), ("frequency_fast", turns[-1])):
-                assert abs(float(ds[name]) - value) <= float(ds[f"{name}_error"]) + 1e-18, (name, body, epsilon, rate)
+                assert abs(float(ds[name]) - value) <= float(ds[f"{name}_error"]) + 1e-18, (
+                    name,
+                    body,
+                    epsilon,
+                    rate,
+                )
         assert int(ds.verdict) == (0 if growth > 1e-12 else 1)
-        assert float(ds.growth_error) < 1e-8 and (not growth > 1e-12 or float(ds.growth) > float(ds.growth_error))
+        assert float(ds.growth_error) < 1e-8 and (
+            not growth > 1e-12 or float(ds.growth) > float(ds.growth_error)
+        )
         seen.add((int(ds.verdict), int(ds.place)))
     assert seen >= {(0, -1), (0, 0), (0, 1), (1, -1), (1, 1)}
 
@@ -77,7 +96,10 @@ def test_at_the_critical_rate_stability_changes():
             assert abs(float(one.critical_rate) - other) < 1e-12
         rate = float(one.critical_rate)
         with mp.workdps(50):
-            grows = [max(mp.re(x) for x in linearised(body, epsilon, rate * (1 + s * 1e-9), axis)) for s in (-1, 1)]
+            grows = [
+                max(mp.re(x) for x in linearised(body, epsilon, rate * (1 + s * 1e-9), axis))
+                for s in (-1, 1)
+            ]
         assert grows[0] > 1e-7 > 1e-15 > grows[1]
         beside = [rate * (1 - 1e-9), rate, rate * (1 + 1e-9)]
         assert ask("rotation", body, epsilon=epsilon, Omega=beside, axis=MOMENTS[axis]).verdict.values.tolist() == [
@@ -92,7 +114,9 @@ def test_bodies_that_turn_stably_stay_and_others_leave():
         growth = float(ds.growth)
         if int(ds.verdict) == 0 and growth < 0.1:
             continue
-        start = {f"gamma{i + 1}": 1.0 if i == axis else 1e-5 for i in range(3)} | {f"omega{axis + 1}": rate}
+        start = {f"gamma{i + 1}": 1.0 if i == axis else 1e-5 for i in range(3)} | {
+            f"omega{axis + 1}": rate
+        }
         t = np.linspace(0.0, 12.0 / max(growth, 0.1) + 20.0, 200)
         path = ask("trajectory", body, epsilon=epsilon, t=t, **start)
         away = 1.0 - float(path[f"nu{axis + 1}"].min())
@@ -103,7 +127,10 @@ def test_bodies_that_turn_stably_stay_and_others_leave():
 def test_equal_moments_and_rest_without_field_are_left_open():
     assert int(ask("rotation", (1.0, 1.0, 1.5), epsilon=1.0, Omega=1.0, axis="A").verdict) == -1
     assert int(ask("rotation", (1.0, 1.2, 1.5), epsilon=0.0, Omega=0.0, axis="A").verdict) == -1
-    free = [int(ask("rotation", (1.0, 1.2, 1.5), epsilon=0.0, Omega=0.3, axis=axis).verdict) for axis in MOMENTS]
+    free = [
+        int(ask("rotation", (1.0, 1.2, 1.5), epsilon=0.0, Omega=0.3, axis=axis).verdict)
+        for axis in MOMENTS
+    ]
     assert free == [1, 0, 1]
     # Omega^2 = epsilon: rotations about all axes are permanent
     assert int(ask("rotation", (1.0, 1.2, 1.5), epsilon=1.0, Omega=1.0, axis="B").verdict) == -1
@@ -114,7 +141,9 @@ def test_equal_moments_are_unstable_where_deviations_grow_exponentially():
     ds = ask("rotation", (1.5, 1.5, 1.0), epsilon=[1.0, -1.0], Omega=0.0, axis="A")
     assert ds.verdict.values.tolist() == [0, -1]
     assert abs(float(ds.growth[0]) - np.sqrt(0.5 / 1.5)) <= float(ds.growth_error[0])
-    assert str(ds.isel(epsilon=0).survey.point()).splitlines()[2].startswith("why: growth = 0.57735")
+    assert (
+        str(ds.isel(epsilon=0).survey.point()).splitlines()[2].startswith("why: growth = 0.57735")
+    )
 
 
 def test_no_body_has_such_moments():
@@ -127,7 +156,11 @@ def draws(number, seed):
     moments, epsilons, draw = bodies(40 * number, seed)
     found = []
     for body, epsilon in zip(moments, epsilons, strict=True):
-        sigma, sense, nu = float(draw.normal() * 2.0), int(draw.choice([-1, 1])), draw.normal(size=3)
+        sigma, sense, nu = (
+            float(draw.normal() * 2.0),
+            int(draw.choice([-1, 1])),
+            draw.normal(size=3),
+        )
         square = epsilon * np.prod(1.0 + sigma * body)
         if square > 1e-2 and len(found) < number:
             nu /= np.linalg.norm(nu)
@@ -162,7 +195,9 @@ def multiplier(body, epsilon, w, nu, period):
             np.cross(body * V[:3].T, w) + np.cross(body * w, V[:3].T)
             + epsilon * (np.cross(V[3:].T, body * nu) + np.cross(nu, body * V[3:].T))]) / body  # fmt: skip
         beside = np.cross(V[3:].T, w) + np.cross(nu, V[:3].T)
-        return np.concatenate([torque / body, np.cross(nu, w), np.vstack([turn.T, beside.T]).ravel()])
+        return np.concatenate(
+            [torque / body, np.cross(nu, w), np.vstack([turn.T, beside.T]).ravel()]
+        )
 
     start = np.concatenate([w, nu, np.eye(6).ravel()])
     end = solve_ivp(slope, (0.0, period), start, method="DOP853", rtol=1e-11, atol=1e-12).y[6:, -1]
@@ -177,7 +212,13 @@ def test_the_second_variation_tells_stable_from_unstable():
             continue
         total = multiplier(body, epsilon, w, nu, float(ds.period))
         if abs(abs(total) - 2.0) > 1e-5 * (1.0 + abs(total)):
-            assert int(ds.verdict) == (1 if abs(total) < 2.0 else 0), (body, epsilon, sigma, area, total)
+            assert int(ds.verdict) == (1 if abs(total) < 2.0 else 0), (
+                body,
+                epsilon,
+                sigma,
+                area,
+                total,
+            )
             seen.add(int(ds.verdict))
     assert seen == {0, 1}
 
@@ -186,7 +227,12 @@ def test_bars_of_critical_motions_against_fifty_digits():
     for body, epsilon, sigma, sense, area, *_ in draws(40, 7):
         ds = ask("critical", body, epsilon=epsilon, sigma=sigma, p_psi=area, sense=str(sense))
         with mp.workdps(50):
-            Is, e, s, p = [mp.mpf(float(A)) for A in body], mp.mpf(epsilon), mp.mpf(sigma), mp.mpf(area)
+            Is, e, s, p = (
+                [mp.mpf(float(A)) for A in body],
+                mp.mpf(epsilon),
+                mp.mpf(sigma),
+                mp.mpf(area),
+            )
             alpha = sense * mp.sqrt(e * mp.fprod(1 + s * A for A in Is))
             D = sorted(A / (1 + s * A) for A in Is)
             y = p / alpha
@@ -194,15 +240,25 @@ def test_bars_of_critical_motions_against_fifty_digits():
             if y < D[1]:
                 one, two = (D[2] - D[0]) * (D[1] - y), (D[1] - D[0]) * (D[2] - y)
             m = 1 - one / two
-            exact = {"period": 4 * mp.ellipk(m) / (abs(alpha * s) * mp.sqrt(two)), "turn_rate": alpha}
+            exact = {
+                "period": 4 * mp.ellipk(m) / (abs(alpha * s) * mp.sqrt(two)),
+                "turn_rate": alpha,
+            }
             for name, value in exact.items():
-                assert abs(mp.mpf(float(ds[name])) - value) <= float(ds[f"{name}_error"]), (name, body, sigma)
+                assert abs(mp.mpf(float(ds[name])) - value) <= float(ds[f"{name}_error"]), (
+                    name,
+                    body,
+                    sigma,
+                )
                 assert float(ds[f"{name}_error"]) < 1e-9 * abs(value)
 
 
 def test_there_is_no_critical_motion_where_the_square_is_negative_or_the_area_too_large():
     points = ((-0.55, 1.2), (-0.3, 1.2), (-0.3, 90.0))
-    found = [int(ask("critical", (2.0, 1.5, 1.0), epsilon=1.0, sigma=s, p_psi=p).status) for s, p in points]
+    found = [
+        int(ask("critical", (2.0, 1.5, 1.0), epsilon=1.0, sigma=s, p_psi=p).status)
+        for s, p in points
+    ]
     assert found == [16, 0, 16]
 
 
@@ -211,7 +267,9 @@ def test_trajectories_lie_within_their_bars_and_keep_the_integrals():
     moments, epsilons, draw = bodies(4, 8)
     for body, epsilon in zip(moments, epsilons, strict=True):
         w, nu = draw.normal(size=3), draw.normal(size=3)
-        start = {f"omega{i + 1}": w[i] for i in range(3)} | {f"gamma{i + 1}": nu[i] for i in range(3)}
+        start = {f"omega{i + 1}": w[i] for i in range(3)} | {
+            f"gamma{i + 1}": nu[i] for i in range(3)
+        }
         t = [-3.0, 0.0, 20.0]
         ds = ask("trajectory", body, epsilon=epsilon, t=t, **start)
         parts = {"A11": body[0], "A22": body[1], "A33": body[2]}
@@ -222,20 +280,34 @@ def test_trajectories_lie_within_their_bars_and_keep_the_integrals():
             for at in range(3):
                 end = truth.motion(parts, state, t[at], 30)
                 for name, value in zip(("w1", "w2", "w3", "nu1", "nu2", "nu3"), end, strict=True):
-                    assert abs(mp.mpf(float(ds[name][at])) - value) <= float(ds[f"{name}_error"][at]), (name, at)
+                    assert abs(mp.mpf(float(ds[name][at])) - value) <= float(
+                        ds[f"{name}_error"][at]
+                    ), (name, at)
         for name in ("H_drift", "F2_drift", "F3_drift"):
-            assert (abs(ds[name]) <= ds[f"{name}_error"]).all() and float(ds[f"{name}_error"].max()) < 1e-6
+            assert (abs(ds[name]) <= ds[f"{name}_error"]).all() and float(
+                ds[f"{name}_error"].max()
+            ) < 1e-6
 
 
 def test_motions_from_far_ends_have_bars_or_a_status():
     draw = np.random.default_rng(9)
     ends = [0.0, 1e-300, -1e-17, 1.0, -30.0, 1e3]
     for _ in range(12):
-        moments = draw.choice([3e-12, 1.0, 1e11]) * np.array([1.0, 1.5, draw.choice([0.5, 0.5 + 1e-9, 2.5])])
+        moments = draw.choice([3e-12, 1.0, 1e11]) * np.array(
+            [1.0, 1.5, draw.choice([0.5, 0.5 + 1e-9, 2.5])]
+        )
         start = {f"{kind}{i}": draw.choice(ends) for kind in ("omega", "gamma") for i in (1, 2, 3)}
-        ds = ask("trajectory", moments, epsilon=draw.choice(ends), t=float(draw.choice([0.0, 1e-9, -0.1])), **start)
+        ds = ask(
+            "trajectory",
+            moments,
+            epsilon=draw.choice(ends),
+            t=float(draw.choice([0.0, 1e-9, -0.1])),
+            **start,
+        )
         known = int(ds.status) == 0
-        assert all(bool(np.isfinite(ds[name])) == known for name in ("w1", "nu3", "nu3_error", "F2_drift"))
+        assert all(
+            bool(np.isfinite(ds[name])) == known for name in ("w1", "nu3", "nu3_error", "F2_drift")
+        )
         assert known == any(start[f"gamma{i}"] for i in (1, 2, 3))
 
 

@@ -1,4 +1,6 @@
-"""The scene: shapes, statuses, what applies where, the same bits in any block, and plain Python as the slow twin."""
+"""The scene: shapes, statuses, what applies where, the same bits in any block, and plain Python as
+the slow twin.
+"""
 
 import json
 import os
@@ -15,22 +17,32 @@ from survey.scenes import gyrostat
 from survey.status import INVALID_PARAMETERS, OK
 from survey.sweep import cost
 
-SIX = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), strict=True))
+SIX = dict(
+    zip(("b12", "b31", "d", "c23", "s2", "s3"), (0.7, -0.4, 1.1, 0.3, 0.5, -0.2), strict=True)
+)
 
 
 def solve(question, method="auto", rtol=1e-10, **values):
-    point = {name: np.asarray(value, float) for name, value in (SIX | {"phi0": 0.0, "w0": 0.0} | values).items()}
+    point = {
+        name: np.asarray(value, float)
+        for name, value in (SIX | {"phi0": 0.0, "w0": 0.0} | values).items()
+    }
     if question == "portrait":
         del point["phi0"], point["w0"]
     size = max(array.ndim for array in point.values())
-    point = {name: array.reshape((1,) * (size - array.ndim) + array.shape) for name, array in point.items()}
+    point = {
+        name: array.reshape((1,) * (size - array.ndim) + array.shape)
+        for name, array in point.items()
+    }
     return gyrostat.solve(point, Request({"question": question}, method, rtol))
 
 
 def grid(*lengths):
     """Axes phi0, w0 and perhaps a third, each along its own dimension."""
     axes = [np.linspace(-3.0, 3.0, n) for n in lengths]
-    return [axis.reshape([-1 if i == j else 1 for j in range(len(axes))]) for i, axis in enumerate(axes)]
+    return [
+        axis.reshape([-1 if i == j else 1 for j in range(len(axes))]) for i, axis in enumerate(axes)
+    ]
 
 
 def test_trajectory_fills_the_block():
@@ -38,20 +50,33 @@ def test_trajectory_fills_the_block():
     out = solve("trajectory", phi0=phi0, w0=w0, t=t)
     assert {values.shape for values in out.values()} == {(3, 4, 5)}
     assert (out["status"] == OK).all() and (out["turnings"] >= 0).all()
-    assert np.isfinite(out["phi"]).all() and (out["phi_error"] < 1e-10 * (1 + np.abs(out["phi"]))).all()
+    assert (
+        np.isfinite(out["phi"]).all()
+        and (out["phi_error"] < 1e-10 * (1 + np.abs(out["phi"]))).all()
+    )
 
 
 def test_turning_points_beyond_what_an_int32_holds_are_not_told():
     ds = survey.evaluate(
-        "gyrostat", question="trajectory", s3=1.0, phi0=1.0, w0=0.0, t=[1e3, 1e8, 1e10], method="closed"
+        "gyrostat",
+        question="trajectory",
+        s3=1.0,
+        phi0=1.0,
+        w0=0.0,
+        t=[1e3, 1e8, 1e10],
+        method="closed",
     )
     assert ds.status.values.tolist() == [OK] * 3 and np.isnan(ds.turnings[2])
     assert (ds.turnings[:2] > 0).all()
 
 
-@pytest.mark.parametrize("start", [{"w0": 0.0, "s3": 1e-300}, {"w0": 1e-300, "s3": 1e-300}, {"w0": 1e-300, "s3": -0.4}])
+@pytest.mark.parametrize(
+    "start", [{"w0": 0.0, "s3": 1e-300}, {"w0": 1e-300, "s3": 1e-300}, {"w0": 1e-300, "s3": -0.4}]
+)
 def test_next_to_no_motion_there_is_a_bar_or_no_answer(start):
-    ds = survey.evaluate("gyrostat", question="abel", phi0=1.0, phi=[-4.0, 1e-300, 1.0, 4.0], **start)
+    ds = survey.evaluate(
+        "gyrostat", question="abel", phi0=1.0, phi=[-4.0, 1e-300, 1.0, 4.0], **start
+    )
     for name in ("w", "t", "phi_turning", "t_turning"):
         assert (ds[name].notnull() == np.isfinite(ds[f"{name}_error"])).all(), name
 
@@ -86,12 +111,18 @@ def test_the_same_bits_in_any_block(question):
         part = solve(question, phi0=phi0[i], w0=w0[:, j], **extra)
         for name, values in part.items():
             wanted = whole[name][i, j]
-            assert np.array_equal(values.reshape(wanted.shape), wanted, equal_nan=values.dtype.kind == "f"), name
+            assert np.array_equal(
+                values.reshape(wanted.shape), wanted, equal_nan=values.dtype.kind == "f"
+            ), name
 
 
 @pytest.mark.parametrize("name", ["b12", "s3", "phi0", "w0"])
 def test_a_point_outside_the_domain_costs_itself_alone(name):
-    for question, extra in (("fate", {}), ("trajectory", {"t": [1.0, 2.0]}), ("abel", {"phi": [0.1, 0.2]})):
+    for question, extra in (
+        ("fate", {}),
+        ("trajectory", {"t": [1.0, 2.0]}),
+        ("abel", {"phi": [0.1, 0.2]}),
+    ):
         start = {"phi0": 0.0, "w0": 2.0} | {name: [[0.5], [np.nan]]}
         out = solve(question, **start, **extra)
         assert (out["status"][1] == INVALID_PARAMETERS).all() and (out["status"][0] == OK).all()
@@ -101,11 +132,15 @@ def test_a_point_outside_the_domain_costs_itself_alone(name):
 
 
 def test_portraits_over_parameters():
-    """The same bits in any block, places beyond the cycles are empty, a point outside its domain affects no other."""
+    """The same bits in any block, places beyond the cycles are empty, a point outside its domain
+    affects no other.
+    """
     s2, d = np.array([[-1.0], [0.5], [np.nan], [1.2]]), np.array([[-2.0, 0.4, 1.1]])
     whole = solve("portrait", s2=s2, d=d)
     assert whole["cycle_w"].shape == (4, 3, 8) and whole["equilibrium_phi"].shape == (4, 3, 4)
-    assert (whole["status"][2] == INVALID_PARAMETERS).all() and (np.delete(whole["status"], 2, 0) == OK).all()
+    assert (whole["status"][2] == INVALID_PARAMETERS).all() and (
+        np.delete(whole["status"], 2, 0) == OK
+    ).all()
     part = solve("portrait", s2=s2[1:2], d=d[:, 1:])
     for name, values in part.items():
         np.testing.assert_array_equal(values, whole[name][1:2, 1:], err_msg=name)
@@ -113,7 +148,10 @@ def test_portraits_over_parameters():
     for name in ("cycle_w", "cycle_multiplier", "cycle_period"):
         for values in (whole[name], whole[f"{name}_error"]):
             assert np.array_equal(np.isfinite(values).sum(axis=-1), np.maximum(cycles, 0)), name
-    assert np.array_equal((whole["cycle_kind"] > 0).sum(axis=-1), np.maximum(cycles, 0)) and cycles.max() > 0
+    assert (
+        np.array_equal((whole["cycle_kind"] > 0).sum(axis=-1), np.maximum(cycles, 0))
+        and cycles.max() > 0
+    )
 
 
 def test_fates_over_a_parameter():
@@ -152,7 +190,10 @@ def test_plain_python_gives_the_same_bits():
     texts = []
     for off in ("0", "1"):
         run = subprocess.run(
-            [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": off}
+            [sys.executable, "-c", PLAIN],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"NUMBA_DISABLE_JIT": off},
         )
         assert run.returncode == 0, run.stderr
         texts.append(run.stdout)
@@ -164,15 +205,28 @@ def test_plain_python_gives_the_same_bits():
 def test_times_are_solved_together_whatever_the_blocks(axes, monkeypatch):
     """A row that misses the accuracy at one time is refined at all: so t is never cut."""
     values = {"t": np.linspace(0.0, 40.0, 6), "w0": np.linspace(-1.0, 2.0, 5)}
-    system = {"b12": 0.3, "b31": -0.2, "d": 1.0, "s3": 0.5, "phi0": 0.4, "question": "trajectory", "rtol": 1e-13}
+    system = {
+        "b12": 0.3,
+        "b31": -0.2,
+        "d": 1.0,
+        "s3": 0.5,
+        "phi0": 0.4,
+        "question": "trajectory",
+        "rtol": 1e-13,
+    }
 
     def solved(**given):
-        return survey.evaluate("gyrostat", method="taylor", **(system | {name: values[name] for name in axes} | given))
+        return survey.evaluate(
+            "gyrostat", method="taylor", **(system | {name: values[name] for name in axes} | given)
+        )
 
     whole = solved()
     monkeypatch.setattr(cost, "BLOCK_POINTS", 1)
     xr.testing.assert_identical(whole.drop_attrs(), solved().drop_attrs())
     alone = solved(t=values["t"][1:2])
     for name in ("phi", "w"):
-        some, bars = whole.isel(t=slice(1, 2)), whole[f"{name}_error"].isel(t=slice(1, 2)) + alone[f"{name}_error"]
+        some, bars = (
+            whole.isel(t=slice(1, 2)),
+            whole[f"{name}_error"].isel(t=slice(1, 2)) + alone[f"{name}_error"],
+        )
         assert (abs(some[name] - alone[name]) <= bars).all()

@@ -1,4 +1,6 @@
-"""The whole gyrostat against mpmath: its place by the paper's conditions, what is beside its limits, rests, motions."""
+"""The whole gyrostat against mpmath: its place by the paper's conditions, what is beside its
+limits, rests, motions.
+"""
 
 import json
 from importlib.resources import files
@@ -17,7 +19,8 @@ FREE = ("A22", "A23", "A33", "B22", "B23", "B33", "C11", "lambda1")
 LARGEST, MIDDLE, SMALLEST = ({"A22": a, "A33": b} for a, b in ((0.5, 0.6), (0.6, 1.4), (1.7, 1.4)))
 REST = {"A23": 0.07, "B22": 0.3, "B23": 0.07, "B33": -0.2, "C11": 0.1}
 FLOW = {"B12": 0.7, "B31": -0.4, "C22": 1.1, "C23": 0.3, "s2": 0.5, "s3": -0.2}
-CYCLES = {"B12": 0.4, "B31": 0.9, "C22": 1.0, "C23": 3.7, "s2": 0.3, "s3": -0.5}  # a rotation, m = 0.9475
+# a rotation, m = 0.9475
+CYCLES = {"B12": 0.4, "B31": 0.9, "C22": 1.0, "C23": 3.7, "s2": 0.3, "s3": -0.5}
 ROTATION = (1, 2, 3, 4)
 
 
@@ -36,7 +39,9 @@ def state(phi, w, theta=None):
 def turned(body, q=ROTATION):
     """The same body in other axes, rounded to float64."""
     with mp.workdps(40):
-        return {name: float(value) for name, value in truth.turned(body, truth.rotation(*q)).items()}
+        return {
+            name: float(value) for name, value in truth.turned(body, truth.rotation(*q)).items()
+        }
 
 
 def ask(body, question="fate", **more):
@@ -46,7 +51,9 @@ def ask(body, question="fate", **more):
 def slopes(body):
     """A-11 times (w2', w3') at the initial state, in mpmath."""
     with mp.workdps(30):
-        start = [mp.mpf(body.get(f"{name}{i}", 0)) for name in ("omega", "gamma") for i in (1, 2, 3)]
+        start = [
+            mp.mpf(body.get(f"{name}{i}", 0)) for name in ("omega", "gamma") for i in (1, 2, 3)
+        ]
         parts = truth.tensors(body)
         rows = truth._series(parts, parts[0] ** -1, start, 1)
         return max(abs(float(rows[1][1])), abs(float(rows[2][1])))
@@ -85,11 +92,19 @@ def test_what_the_conditions_leave_free_does_not_matter(turn):
         body[name] = body.get(name, 0.0) + 0.1
     ds = ask(turned(body) if turn else body)
     assert ds.case == 3 and slopes(body) < 1e-16
-    exact = [REFERENCE["B"]["B12"], REFERENCE["B"]["B31"], "1.2", "0.25", REFERENCE["s2"], REFERENCE["s3"]]
+    exact = [
+        REFERENCE["B"]["B12"],
+        REFERENCE["B"]["B31"],
+        "1.2",
+        "0.25",
+        REFERENCE["s2"],
+        REFERENCE["s3"],
+    ]
     if not turn:
         for name, value in zip(SIX, exact, strict=True):
             off = abs(float(ds[f"reduced_{name}"]) - mp.mpf(value) / mp.mpf(body["A11"]))
-            assert off <= 4e-16 + float(ds[f"reduced_{name}_error"]), name  # the reference's decimals are rounded
+            # the reference's decimals are rounded
+            assert off <= 4e-16 + float(ds[f"reduced_{name}_error"]), name
         assert (ds.axis == [1, 0, 0]).all()
 
 
@@ -102,7 +117,9 @@ def test_the_frame_does_not_matter(question):
         assert name not in one or int(one[name]) == int(other[name]), name
     for name in ("growth", "miss", "theta", "limit_phi"):
         if name in one and not name.endswith("phi"):  # phi is counted from another axis 2
-            assert abs(one[name] - other[name]) <= one[f"{name}_error"] + other[f"{name}_error"], name
+            assert abs(one[name] - other[name]) <= one[f"{name}_error"] + other[f"{name}_error"], (
+                name
+            )
 
 
 def test_the_reduced_motion_is_that_of_the_body():
@@ -160,13 +177,18 @@ def cycles_of(body, kinds=(1, 2, 3)):
 @pytest.mark.parametrize(
     ("inertia", "moment"),
     [
-        *(pytest.param(*case, marks=pytest.mark.slow) for case in ((LARGEST, 0.0), (LARGEST, 2.0), (MIDDLE, 0.0))),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in ((LARGEST, 0.0), (LARGEST, 2.0), (MIDDLE, 0.0))
+        ),
         (SMALLEST, 2.0),
     ],
     ids=["largest", "largest-2", "middle", "smallest-2"],
 )
 def test_multipliers_beside_cycles_are_those_of_the_six_equations(inertia, moment):
-    """Of motions beside the cycle, in turned axes, in 30 digits: 1 for k, and two that the bars of ours hold."""
+    """Of motions beside the cycle, in turned axes, in 30 digits: 1 for k, and two that the bars of
+    ours hold.
+    """
     body = CYCLES | inertia | REST | {"lambda1": moment} | state(1.5, 0.8)
     seen = 0
     for ds, j, exact in cycles_of(body):
@@ -182,9 +204,13 @@ def test_multipliers_beside_cycles_are_those_of_the_six_equations(inertia, momen
     assert seen
 
 
-@pytest.mark.parametrize("inertia", [LARGEST, MIDDLE, SMALLEST], ids=["largest", "middle", "smallest"])
+@pytest.mark.parametrize(
+    "inertia", [LARGEST, MIDDLE, SMALLEST], ids=["largest", "middle", "smallest"]
+)
 def test_exponents_at_equilibria_are_those_of_the_six_equations(inertia):
-    """All six eigenvalues of the linearised equations, in 30 digits: two of the set, two beside it, and 0 twice."""
+    """All six eigenvalues of the linearised equations, in 30 digits: two of the set, two beside it,
+    and 0 twice.
+    """
     body = FLOW | inertia | REST | {"lambda1": 1.3} | state(1.5, 0.8)
     ds = ask(body, "portrait")
     assert int(ds.equilibria) >= 2
@@ -208,7 +234,9 @@ def test_exponents_at_equilibria_are_those_of_the_six_equations(inertia):
 def _force(body):
     """g of the reduced flow, for A11 = 1."""
     d, c23, s2, s3 = (mp.mpf(body[name]) for name in ("C22", "C23", "s2", "s3"))
-    return lambda x: -d * mp.cos(x) * mp.sin(x) - c23 * mp.cos(2 * x) + s2 * mp.cos(x) - s3 * mp.sin(x)
+    return lambda x: (
+        -d * mp.cos(x) * mp.sin(x) - c23 * mp.cos(2 * x) + s2 * mp.cos(x) - s3 * mp.sin(x)
+    )
 
 
 def _jacobian(A, B, C, moment, s, nu, w=(0, 0, 0)):
@@ -221,7 +249,9 @@ def _jacobian(A, B, C, moment, s, nu, w=(0, 0, 0)):
 
     out = mp.matrix(6, 6)
     for k in range(6):
-        ahead, behind = (rates([x + sign * h * (i == k) for i, x in enumerate(start)]) for sign in (1, -1))
+        ahead, behind = (
+            rates([x + sign * h * (i == k) for i, x in enumerate(start)]) for sign in (1, -1)
+        )
         for i in range(6):
             out[i, k] = (ahead[i] - behind[i]) / (2 * h)
     return out
@@ -233,13 +263,19 @@ def test_of_a_symmetric_body_no_attracting_limit_is_observable():
     for _ in range(20):
         flow = dict(zip(FLOW, random.normal(size=6) * [1, 1, 1.5, 1.5, 1, 1], strict=True))
         a = random.uniform(0.4, 2.0)
-        body = flow | {"A22": a, "A33": a, "lambda1": random.uniform(-9, 9), "C11": random.normal()} | state(1.5, 0.8)
+        body = (
+            flow
+            | {"A22": a, "A33": a, "lambda1": random.uniform(-9, 9), "C11": random.normal()}
+            | state(1.5, 0.8)
+        )
         ds = ask(body, "portrait")
         assert 2 not in ds.equilibrium_verdict.values and 2 not in ds.cycle_verdict.values
 
 
 def test_rotation_about_the_vertical_is_that_of_a_top():
-    """B = C = 0: steady rotation about the middle axis is unstable, and a fast gyroscopic moment makes it stable."""
+    """B = C = 0: steady rotation about the middle axis is unstable, and a fast gyroscopic moment
+    makes it stable.
+    """
     body = {"A11": 2.0, "A22": 1.0, "A33": 3.0, "omega1": 1.0, "gamma1": 1.0, "gamma3": 0.0}
     ds = ask(body)
     assert ds.case == 1 and ds.fate == 10 and ds.verdict == 1 and ds.observable == 0
@@ -253,8 +289,20 @@ def test_case_a_has_three_multipliers():
     """Its periodic rotation against the six equations; k varies along the set, so none of them is trivial."""
     theta = 1.1
     cos = np.cos(theta)
-    body = {"A22": 0.7, "A33": 1.2, "A23": 0.1, "B12": 0.3, "B31": -0.2, "B22": 0.2, "C11": 0.4, "C22": 0.9, "C33": 0.9}
-    body |= {"lambda1": 0.5, "lambda2": -0.3 * cos, "lambda3": 0.2 * cos, "s1": -0.5 * cos} | state(0.3, 1.7, theta)
+    body = {
+        "A22": 0.7,
+        "A33": 1.2,
+        "A23": 0.1,
+        "B12": 0.3,
+        "B31": -0.2,
+        "B22": 0.2,
+        "C11": 0.4,
+        "C22": 0.9,
+        "C33": 0.9,
+    }
+    body |= {"lambda1": 0.5, "lambda2": -0.3 * cos, "lambda3": 0.2 * cos, "s1": -0.5 * cos} | state(
+        0.3, 1.7, theta
+    )
     ds = ask(body)
     assert ds.case == 2 and ds.fate == 7 and ds.status == 0
     six = [float(ds[f"reduced_{name}"]) for name in SIX]
@@ -263,7 +311,8 @@ def test_case_a_has_three_multipliers():
         assert abs(t - float(ds.period)) <= float(ds.period_error) + 1e-14
     mine = ds.transversal_multiplier_re.values + 1j * ds.transversal_multiplier_im.values
     assert np.isfinite(mine[:3]).all() and np.isnan(mine[3])
-    # the set of float64 numbers is off case A by their rounding: the neighbouring motions in float64 then suffice
+    # the set of float64 numbers is off case A by their rounding: the neighbouring motions in
+    # float64 then suffice
     h, ends = 1e-6, []
     names = ("w2", "w3", "nu1")
     for k in range(-1, 6):
@@ -273,7 +322,9 @@ def test_case_a_has_three_multipliers():
         sin, s, c, eta = np.sin(theta), np.sin(0.3), np.cos(0.3), kick[2]
         nu = np.array([cos + sin * eta, sin * s - cos * s * eta, sin * c - cos * c * eta])
         given = (
-            body | {"omega2": kick[0], "omega3": kick[1]} | dict(zip(("gamma1", "gamma2", "gamma3"), nu, strict=True))
+            body
+            | {"omega2": kick[0], "omega3": kick[1]}
+            | dict(zip(("gamma1", "gamma2", "gamma3"), nu, strict=True))
         )
         end = ask(given, "trajectory", t=float(ds.period), rtol=1e-13)
         ends.append([float(end[name]) for name in names])
@@ -289,11 +340,17 @@ def test_rests_are_all_that_a_search_finds():
     for _ in range(12):
         C = random.normal(size=(3, 3))
         body = {f"C{key}": (C + C.T)[i, j] for key, (i, j) in system.ENTRIES.items()}
-        body |= {f"s{i}": value for i, value in enumerate(random.normal(size=3) * random.choice([0.2, 1.0, 3.0]), 1)}
+        body |= {
+            f"s{i}": value
+            for i, value in enumerate(random.normal(size=3) * random.choice([0.2, 1.0, 3.0]), 1)
+        }
         body |= {"omega1": 1.0}
         ds = ask(body, "portrait")
         given = system.read(
-            [{"A11": 1.0, "A22": 1.0, "A33": 1.0, "gamma3": 1.0, **body}.get(n, 0.0) for n in system.NAMES]
+            [
+                {"A11": 1.0, "A22": 1.0, "A33": 1.0, "gamma3": 1.0, **body}.get(n, 0.0)
+                for n in system.NAMES
+            ]
         )
         found = set()
         for nu in random.normal(size=(200, 3)):
@@ -306,7 +363,9 @@ def test_rests_are_all_that_a_search_finds():
         indices = 0
         for row in ds.rest_nu.values[: int(ds.rests)]:
             tangent = np.linalg.svd(row[None])[2][1:].T
-            hessian = tangent.T @ (given.C - (row @ (given.C @ row - given.s)) * np.eye(3)) @ tangent
+            hessian = (
+                tangent.T @ (given.C - (row @ (given.C @ row - given.s)) * np.eye(3)) @ tangent
+            )
             indices += 1 if np.linalg.det(hessian) > 0 else -1
         assert indices == 2
 

@@ -42,7 +42,12 @@ def test_a_run_keeps_the_labels(tmp_path):
     again = survey.evaluate("libration", mu=ds.mu.values)
     np.testing.assert_array_equal(ds.c.sel(monomial="012"), again.c.sel(monomial="012"))
     assert ds.c.dims == ("mu", "monomial") and (tmp_path / "small.png").exists()
-    checker = [Path(sys.executable).with_name("compliance-checker"), "--test=cf:1.11", "--criteria=strict", path]
+    checker = [
+        Path(sys.executable).with_name("compliance-checker"),
+        "--test=cf:1.11",
+        "--criteria=strict",
+        path,
+    ]
     assert subprocess.run(checker, capture_output=True).returncode == 0
 
 
@@ -56,7 +61,9 @@ def test_lazy_input():
 
 
 def test_no_binary_fraction_is_a_resonance_of_rank_2():
-    """omega1 omega2 = sqrt(27 m (2^k - m)) / 2^(k+1) at mu = m / 2^k is irrational below mu_R; at 1/4 it is not."""
+    """omega1 omega2 = sqrt(27 m (2^k - m)) / 2^(k+1) at mu = m / 2^k is irrational below mu_R; at
+    1/4 it is not.
+    """
     for k in range(2, 15):
         for m in range(1, int(0.0386 * 2**k) + 1):
             square = 27 * m * (2**k - m)
@@ -65,7 +72,10 @@ def test_no_binary_fraction_is_a_resonance_of_rank_2():
 
 
 def test_what_is_not_proved_is_said():
-    for text in (libration.__doc__, next(o for o in libration.OUTPUTS if o.name == "verdict").applies):
+    for text in (
+        libration.__doc__,
+        next(o for o in libration.OUTPUTS if o.name == "verdict").applies,
+    ):
         assert "rational" in text and "rank-2" in text and "Lyapunov" in text
 
 

@@ -1,4 +1,6 @@
-"""Danby's map against 30-digit references, the curves' known points, the full period, and the circular problem."""
+"""Danby's map against 30-digit references, the curves' known points, the full period, and the
+circular problem.
+"""
 
 import json
 import os
@@ -16,28 +18,39 @@ import survey
 from survey.measures.libration import danby
 from survey.sweep import cost
 
-REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
+REFERENCE = json.loads(
+    resources.files("survey.reference").joinpath("libration_elliptic.json").read_text()
+)
 POINTS, BOUNDARY = REFERENCE["points"], REFERENCE["boundary"]
 STABLE_BELOW = {"A": False, "B": True, "KC": True}
 
 
 def points(mu, e, **more):
     mu, e = np.broadcast_arrays(mu, e)
-    return survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="p"), e=xr.DataArray(e, dims="p"), **more)
+    return survey.evaluate(
+        "libration_elliptic", mu=xr.DataArray(mu, dims="p"), e=xr.DataArray(e, dims="p"), **more
+    )
 
 
-@pytest.mark.parametrize(("method", "rtol"), [("auto", 1e-6), ("auto", 1e-12), ("dop853", 1.3e-9), ("rk4", 1e-6)])
+@pytest.mark.parametrize(
+    ("method", "rtol"), [("auto", 1e-6), ("auto", 1e-12), ("dop853", 1.3e-9), ("rk4", 1e-6)]
+)
 def test_references_lie_within_the_bars(method, rtol):
     """At e < 0.7 the bars of dop853 come down to 1.2e-9, whatever is asked; hence its rtol here.
 
-    At e = 0.5, mu = 0.005 the finest tolerance takes 108 steps, each of which rounds by about 1e-15; these add up with
-    the worst signs and grow fifty times in the matrix and ten times in b. The errors are 1e-13.
+    At e = 0.5, mu = 0.005 the finest tolerance takes 108 steps, each of which rounds by about
+    1e-15; these add up with the worst signs and grow fifty times in the matrix and ten times in b.
+    The errors are 1e-13.
     """
-    ds = points([row["mu"] for row in POINTS], [row["e"] for row in POINTS], method=method, rtol=rtol)
+    ds = points(
+        [row["mu"] for row in POINTS], [row["e"] for row in POINTS], method=method, rtol=rtol
+    )
     with mp.workdps(30):
         for name in "ab":
             exact = [mpf(row[name]) for row in POINTS]
-            error = [abs(float(mpf(v) - x)) for v, x in zip(ds[name].values.tolist(), exact, strict=True)]
+            error = [
+                abs(float(mpf(v) - x)) for v, x in zip(ds[name].values.tolist(), exact, strict=True)
+            ]
             assert 1e-4 < max(error / ds[f"{name}_error"].values) <= 1
             size = np.array([1 + abs(float(x)) for x in exact])
             near = np.array([row["e"] < 0.7 for row in POINTS])
@@ -48,13 +61,17 @@ def test_references_lie_within_the_bars(method, rtol):
 
 
 def test_factors_within_their_bars():
-    values, bars = danby.factors(np.array([row["e"] for row in POINTS]), np.array([row["mu"] for row in POINTS]))
+    values, bars = danby.factors(
+        np.array([row["e"] for row in POINTS]), np.array([row["mu"] for row in POINTS])
+    )
     exact = np.array([[float(row[name]) for name in ("A", "B", "C", "D", "t")] for row in POINTS])
     assert (abs(values - exact) <= bars + np.spacing(abs(exact))).all()
     assert np.median(bars / (abs(values - exact) + np.spacing(abs(exact)))) < 1000
 
 
-@pytest.mark.parametrize("row", [r for r in BOUNDARY if r["e"] != "0"], ids=lambda r: f"{r['curve']}-{r['e']}")
+@pytest.mark.parametrize(
+    "row", [r for r in BOUNDARY if r["e"] != "0"], ids=lambda r: f"{r['curve']}-{r['e']}"
+)
 def test_the_verdict_changes_across_the_curves(row):
     edge = float(row["mu"])
     ds = points([edge - 1e-12, edge + 1e-12], float(row["e"]), rtol=1e-13)
@@ -87,13 +104,20 @@ def monodromy(mu, e):
         r = 1.5 / (1 + e * np.cos(f))
         return np.concatenate([dxi, deta, 2 * deta + (1 + s) * r * xi, (1 - s) * r * eta - 2 * dxi])
 
-    return solve_ivp(slope, (0, 2 * np.pi), np.eye(4).ravel(), "DOP853", rtol=1e-12, atol=1e-12).y[:, -1].reshape(4, 4)
+    return (
+        solve_ivp(slope, (0, 2 * np.pi), np.eye(4).ravel(), "DOP853", rtol=1e-12, atol=1e-12)
+        .y[:, -1]
+        .reshape(4, 4)
+    )
 
 
 def test_half_the_period_gives_the_monodromy_of_the_whole_and_the_collision_its_multipliers():
     random = np.random.default_rng(3)
     mu, e = random.uniform(0.001, 0.05, 24), random.uniform(0.0, 0.5, 24)
-    mu[:6], e[:6] = [0.031, 0.034, 0.0365, 0.038, 0.042, 0.0455], [0.02, 0.06, 0.05, 0.06, 0.21, 0.29]
+    mu[:6], e[:6] = (
+        [0.031, 0.034, 0.0365, 0.038, 0.042, 0.0455],
+        [0.02, 0.06, 0.05, 0.06, 0.21, 0.29],
+    )
     ds = points(mu, e)
     codes = set()
     for i in range(mu.size):
@@ -105,7 +129,8 @@ def test_half_the_period_gives_the_monodromy_of_the_whole_and_the_collision_its_
     assert codes == {(1, 0), (1, 1), (2, 0), (2, 1)}
 
 
-CANONICAL = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, -1, 1, 0], [1, 0, 0, 1]])  # xi, eta, xi' - eta, eta' + xi
+# xi, eta, xi' - eta, eta' + xi
+CANONICAL = np.array([[1, 0, 0, 0], [0, 1, 0, 0], [0, -1, 1, 0], [1, 0, 0, 1]])
 FORM = np.block([[np.zeros((2, 2)), np.eye(2)], [-np.eye(2), np.zeros((2, 2))]])
 
 
@@ -136,19 +161,28 @@ def test_the_circular_problem():
     ds = points(mu, 0.0)
     exact = np.array([circular(value) for value in mu]).T
     for name, values in zip("ab", exact, strict=True):
-        assert (abs(ds[name] - values) <= ds[f"{name}_error"].astype(float) + np.spacing(abs(values))).all()
+        assert (
+            abs(ds[name] - values) <= ds[f"{name}_error"].astype(float) + np.spacing(abs(values))
+        ).all()
         assert (ds[f"{name}_error"] < 1e-12 * (1 + abs(ds[name]))).all()
     assert ds.verdict.values.tolist() == [1, 1, 1, 1, 1, 0, 0, 0]
     assert ds.collision.values.tolist() == [1, 1, 1, 2, 2, 2, 2, 2]
     other = points(mu, 0.0, method="taylor16")
     for name in "ab":
-        assert (abs(ds[name] - other[name]) <= ds[f"{name}_error"].astype(float) + other[f"{name}_error"]).all()
+        assert (
+            abs(ds[name] - other[name])
+            <= ds[f"{name}_error"].astype(float) + other[f"{name}_error"]
+        ).all()
 
 
 def test_the_curves_leave_the_circular_problem_as_known():
     e, half, routh = 1e-4, 0.0285954792089683171, 0.0385208965045513971
     slope, bend = 0.056416933365573, 0.0802573
-    for curve, at in (("B", half - slope * e), ("A", half + slope * e), ("KC", routh + bend * e * e)):
+    for curve, at in (
+        ("B", half - slope * e),
+        ("A", half + slope * e),
+        ("KC", routh + bend * e * e),
+    ):
         width = 1e-12 if curve == "KC" else 2e-8  # what the next terms move
         ds = points([at - width, at + width], e)
         below = STABLE_BELOW[curve]
@@ -157,16 +191,27 @@ def test_the_curves_leave_the_circular_problem_as_known():
 
 def test_without_a_lesser_primary_it_is_keplers_problem():
     ds = points(0.0, [0.0, 0.3, 0.9])
-    assert (ds.a == 4).all() and (ds.b == 6).all() and (ds.verdict == 0).all() and (ds.collision == 0).all()
+    assert (
+        (ds.a == 4).all()
+        and (ds.b == 6).all()
+        and (ds.verdict == 0).all()
+        and (ds.collision == 0).all()
+    )
     near = points(1e-6, [0.0, 0.3, 0.9])
     assert (near.verdict == 1).all() and (abs(near.a - 4) < 0.05).all()
 
 
 def test_a_dense_row_is_that_of_its_points():
     mu, e = np.linspace(0.0, 0.5, 120), np.array([0.05, 0.4, 0.8, 0.97])
-    row, alone = (survey.evaluate("libration_elliptic", mu=mu, e=e, **more) for more in ({}, {"method": "taylor16"}))
+    row, alone = (
+        survey.evaluate("libration_elliptic", mu=mu, e=e, **more)
+        for more in ({}, {"method": "taylor16"})
+    )
     for name in "ab":
-        assert (abs(row[name] - alone[name]) <= row[f"{name}_error"].astype(float) + alone[f"{name}_error"]).all()
+        assert (
+            abs(row[name] - alone[name])
+            <= row[f"{name}_error"].astype(float) + alone[f"{name}_error"]
+        ).all()
         assert (row[name] != alone[name]).any()  # it is another way
     decided = (alone.verdict != -1) & (row.verdict != -1)
     assert (row.verdict == alone.verdict).where(decided, True).all() and decided.mean() > 0.95
@@ -176,7 +221,9 @@ def test_a_dense_map_has_the_same_bits_in_any_block(monkeypatch):
     given = {"mu": np.linspace(0.0, 0.05, 90), "e": np.array([0.0, 0.2, 0.314, 0.9])}
     whole = survey.evaluate("libration_elliptic", **given)
     monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
-    xr.testing.assert_identical(whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs())
+    xr.testing.assert_identical(
+        whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs()
+    )
 
 
 def test_eccentricities_near_one_keep_honest_bars():
@@ -204,7 +251,10 @@ print(*(v.hex() for v in danby.solve(np.array([0.3]), np.linspace(0, 0.5, 75)[No
 def test_plain_python_gives_the_same_bits():
     printed = [
         subprocess.run(
-            [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=os.environ | {"NUMBA_DISABLE_JIT": off}
+            [sys.executable, "-c", PLAIN],
+            capture_output=True,
+            text=True,
+            env=os.environ | {"NUMBA_DISABLE_JIT": off},
         ).stdout
         for off in ("0", "1")
     ]

@@ -1,7 +1,8 @@
-"""Coefficients against the full equations: periodic orbits about L4, their actions, periods and Floquet exponents.
+"""Coefficients against the full equations: periodic orbits about L4, their actions, periods and
+Floquet exponents.
 
-On the family of mode j with action r the frequencies are dH/dr_i at r_j = r: signed omega_i + c_ij r + c_ijj r^2 + ...,
-twice and thrice the coefficient for i = j. No expansion of H is used here.
+On the family of mode j with action r the frequencies are dH/dr_i at r_j = r: signed omega_i + c_ij
+r + c_ijj r^2 + ..., twice and thrice the coefficient for i = j. No expansion of H is used here.
 """
 
 import numpy as np
@@ -59,7 +60,9 @@ def modes():
 
 
 def orbit(mode, size):
-    """(action, signed frequencies) of the orbit of a family whose start lies `size` from L4 along the mode."""
+    """(action, signed frequencies) of the orbit of a family whose start lies `size` from L4 along
+    the mode.
+    """
     omega, columns = modes()
     along = columns[:, mode].real / np.linalg.norm(columns[:, mode].real)
     z, period = HOME + size * along, 2.0 * np.pi / omega[mode]
@@ -68,7 +71,9 @@ def orbit(mode, size):
         flow = slope(0.0, np.concatenate([z, np.eye(6).ravel(), [0.0]]))[:6]
         at_end = slope(0.0, np.concatenate([end, np.eye(6).ravel(), [0.0]]))[:6]
         # periodic, no shift in time, and as large as asked
-        rows = np.vstack([np.column_stack([matrix - np.eye(6), at_end]), [*flow, 0.0], [*along, 0.0]])
+        rows = np.vstack(
+            [np.column_stack([matrix - np.eye(6), at_end]), [*flow, 0.0], [*along, 0.0]]
+        )
         off = np.concatenate([end - z, [0.0], [(z - HOME) @ along - size]])
         step = np.linalg.lstsq(rows, -off, rcond=1e-12)[0]
         z, period = z + step[:6], period + step[6]
@@ -90,7 +95,10 @@ def test_frequencies_along_a_family_of_periodic_orbits(mode):
     ds = survey.evaluate("libration", mu=MU)
     sizes = {0: 0.02, 1: 0.02, 2: 0.06}[mode] * np.sqrt([1.0, 2.0, 3.0, 4.0])
     actions, frequencies = zip(*(orbit(mode, size) for size in sizes), strict=True)
-    actions, moved = np.array(actions), np.array(frequencies) - SIGNS * [float(ds.omega1), float(ds.omega2), 1.0]
+    actions, moved = (
+        np.array(actions),
+        np.array(frequencies) - SIGNS * [float(ds.omega1), float(ds.omega2), 1.0],
+    )
     assert (actions > 0).all()
     for i in range(3):
         fitted = np.linalg.solve(np.vander(actions, 4, increasing=True), moved[:, i] / actions)

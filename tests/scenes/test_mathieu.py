@@ -11,7 +11,8 @@ from survey.measures.hill import monodromy
 from survey.scenes import mathieu
 
 STANDARD = REFERENCE["standard"]
-# The factor that vanishes at a_n and b_n: even n are periodic, a_n belongs to even solutions (DLMF 28.2(v)).
+# The factor that vanishes at a_n and b_n: even n are periodic, a_n belongs to even solutions (DLMF
+# 28.2(v)).
 FACTOR = {("a", 0): "dy1", ("a", 1): "y1", ("b", 0): "y2", ("b", 1): "dy2"}
 
 
@@ -24,7 +25,9 @@ def test_discriminants_of_the_reference(method):
         assert error < 1e-10 * (1 + abs(float(row["Delta"])))
 
 
-@pytest.mark.parametrize("row", STANDARD["mathieu"]["values"], ids=lambda r: f"{r['kind']}{r['n']}-q{r['q']}")
+@pytest.mark.parametrize(
+    "row", STANDARD["mathieu"]["values"], ids=lambda r: f"{r['kind']}{r['n']}-q{r['q']}"
+)
 def test_the_factor_vanishes_at_a_characteristic_value_and_the_verdict_changes_there(row):
     n, edge = row["n"], float(row["value"])
     ds = survey.evaluate("mathieu", a=[edge - 1e-6, edge, edge + 1e-6], q=float(row["q"]))
@@ -34,12 +37,15 @@ def test_the_factor_vanishes_at_a_characteristic_value_and_the_verdict_changes_t
     # The edge itself is rounded to binary64.
     assert abs(float(factor[1])) <= bar[1] + slope * np.spacing(abs(edge))
     assert np.sign(float(factor[0])) == -np.sign(float(factor[2]))
-    np.testing.assert_allclose(ds.rotation_number[1], n / 2, atol=1e-4)  # a square root leaves the edge
+    # a square root leaves the edge
+    np.testing.assert_allclose(ds.rotation_number[1], n / 2, atol=1e-4)
     assert (ds.exponent >= 0).all()
 
 
 def test_between_the_edges_of_a_tongue_it_is_unstable_and_outside_stable():
-    b5, a5 = (float(r["value"]) for r in STANDARD["mathieu"]["values"] if r["n"] == 5 and r["q"] == 1)
+    b5, a5 = (
+        float(r["value"]) for r in STANDARD["mathieu"]["values"] if r["n"] == 5 and r["q"] == 1
+    )
     width = a5 - b5
     ds = survey.evaluate("mathieu", a=np.array([b5 - width, 0.5 * (a5 + b5), a5 + width]), q=1.0)
     assert ds.verdict.values.tolist() == [1, 0, 1] and 1e-5 < width < 2e-5
@@ -52,7 +58,10 @@ def test_without_excitation_it_is_a_free_oscillator():
     assert ds.verdict.values.tolist() == [0, 0, 2, 1, 2, 1, 2, 2, 1]
     with mp.workdps(30):
         exact = [2 * mp.cos(mp.pi * mp.sqrt(value)) for value in map(mpf, a)]
-        error = [abs(float(mp.re(e) - mpf(float(v)))) for e, v in zip(exact, ds.discriminant, strict=True)]
+        error = [
+            abs(float(mp.re(e) - mpf(float(v))))
+            for e, v in zip(exact, ds.discriminant, strict=True)
+        ]
     assert (error <= ds.discriminant_error).all()
     np.testing.assert_allclose(ds.rotation_number[3:], np.sqrt(a[3:]) / 2, rtol=1e-12)
 
@@ -81,7 +90,11 @@ def test_bars_do_not_underflow(method):
     for rtol in (1.156e-13, 6.96e-13, 1e-9):
         for a, q in points:
             out = monodromy.solve(mathieu._problem(np.array([q]), np.array([[a]])), method, rtol)
-            said, dy1, bar = int(out["verdict"][0, 0]), float(out["dy1"][0, 0]), float(out["dy1_error"][0, 0])
+            said, dy1, bar = (
+                int(out["verdict"][0, 0]),
+                float(out["dy1"][0, 0]),
+                float(out["dy1_error"][0, 0]),
+            )
             with mp.workdps(700):
                 beyond = mpf(a) + mpf(q) ** 2 / 2
                 assert abs(mpf(dy1) + beyond * mp.pi / 2) <= bar, (a, q, rtol)

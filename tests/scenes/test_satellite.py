@@ -32,16 +32,22 @@ def test_references_lie_within_the_bars(method, rtol):
         assert out["verdict"][0] == int(case["stable"])
 
 
-@pytest.mark.parametrize(("group", "accuracy"), [("libration", 1e-11), ("rotation", 1e-11), ("nasty", 1e-9)])
+@pytest.mark.parametrize(
+    ("group", "accuracy"), [("libration", 1e-11), ("rotation", 1e-11), ("nasty", 1e-9)]
+)
 def test_references_to_the_promised_accuracy(group, accuracy):
     for case in cases(group):
-        out = solve(BODY[case["fam"]], k=float.fromhex(case["k_hex"]), rho=float.fromhex(case["rho_hex"]))
+        out = solve(
+            BODY[case["fam"]], k=float.fromhex(case["k_hex"]), rho=float.fromhex(case["rho_hex"])
+        )
         value = mpf(case["Delta"])
         assert abs(out["discriminant"][0] - value) < accuracy * (1 + abs(value))
 
 
 def test_boundaries():
-    """On an edge the named factor vanishes within its bar; 1e-9 to either side the verdicts differ and are right."""
+    """On an edge the named factor vanishes within its bar; 1e-9 to either side the verdicts differ
+    and are right.
+    """
     names = {"y1_half": "y1", "y2_half": "y2", "dy1_half": "dy1", "dy2_half": "dy2"}
     for case in cases("boundaries"):
         k, rho = float(case["k"]), float(case["rho_star"])
@@ -53,7 +59,9 @@ def test_boundaries():
 
 def test_rotation_boundary():
     case = cases("rotation_boundaries")[0]
-    out = solve("prolate", k=float(case["k_star"]) + np.array([0.0, -1e-9, 1e-9]), rho=np.full(3, 3**-0.5))
+    out = solve(
+        "prolate", k=float(case["k_star"]) + np.array([0.0, -1e-9, 1e-9]), rho=np.full(3, 3**-0.5)
+    )
     assert abs(out["dy1"][0]) < 1e-13
     assert sorted(out["verdict"][1:]) == [0, 1]
 
@@ -80,12 +88,20 @@ def test_random_points_against_mpmath(rtol):
             out = solve(BODY[family], rtol=rtol, k=k, rho=rho)
             assert_within(out, known)
             assert out["verdict"][0] == (abs(discriminant) < 2)
-            sharp += [abs(out[n][0] - known[n]) / out[f"{n}_error"][0] for n in ("y1", "y2", "dy1", "dy2")]
+            sharp += [
+                abs(out[n][0] - known[n]) / out[f"{n}_error"][0] for n in ("y1", "y2", "dy1", "dy2")
+            ]
     assert np.median(np.array(sharp, dtype=float)) > 0.005
 
 
 @pytest.mark.parametrize(
-    "short", [1e-6, 1e-12, -1e-10, *(pytest.param(short, marks=pytest.mark.slow) for short in (1e-3, 1e-9, -1e-6))]
+    "short",
+    [
+        1e-6,
+        1e-12,
+        -1e-10,
+        *(pytest.param(short, marks=pytest.mark.slow) for short in (1e-3, 1e-9, -1e-6)),
+    ],
 )
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
 def test_near_the_separatrix_from_one_minus_k(short, body):
@@ -108,7 +124,9 @@ def test_no_amplitude_closed_form(body):
     with mp.workdps(30):
         turned = [mp.sqrt(1 + mpf(r) ** 2) if body == "prolate" else mpf(r) for r in rho.tolist()]
         for i, turn in enumerate(turned):
-            assert_within(out, {"discriminant": 2 * mp.cos(2 * mp.pi * turn), "rotation_number": turn}, i)
+            assert_within(
+                out, {"discriminant": 2 * mp.cos(2 * mp.pi * turn), "rotation_number": turn}, i
+            )
     assert np.all((out["verdict"] == 1) | (2 * turns == np.rint(2 * turns)))
     assert np.all(out["exponent"] == 0)
 
@@ -119,9 +137,13 @@ def test_marginal_by_exact_rules_only():
     assert list(solve("prolate", k=0.0, rho=rho)["verdict"]) == [1, 1, 1, 1, 1, 2]
 
 
-@pytest.mark.parametrize(("alpha", "direction"), [(4 / 3, "1"), (4 / 3, "-1"), (31 / 27, "1"), (31 / 27, "-1")])
+@pytest.mark.parametrize(
+    ("alpha", "direction"), [(4 / 3, "1"), (4 / 3, "-1"), (31 / 27, "1"), (31 / 27, "-1")]
+)
 def test_no_inertia_ratio_is_marginal_without_amplitude(alpha, direction):
-    """rho^2 = 1 / (3 (alpha - 1)) = n^2 / 4 has no solution in binary fractions; rho itself rounds to 1 and 3/2."""
+    """rho^2 = 1 / (3 (alpha - 1)) = n^2 / 4 has no solution in binary fractions; rho itself rounds
+    to 1 and 3/2.
+    """
     ds = survey.evaluate("satellite", k=0.0, inertia_ratio=alpha, direction=direction)
     square = 1 / (3 * (Fraction(alpha) - 1))
     assert int(ds.verdict) == 1 and (4 * square).denominator > 1
@@ -134,7 +156,8 @@ def test_no_inertia_ratio_is_marginal_without_amplitude(alpha, direction):
 
 
 @pytest.mark.parametrize(
-    ("body", "k", "turns"), [("prolate", 0.6, 1), ("oblate", 0.6, 0), ("prolate", 1.7, 0.5), ("oblate", 1.7, 0.5)]
+    ("body", "k", "turns"),
+    [("prolate", 0.6, 1), ("oblate", 0.6, 0), ("prolate", 1.7, 0.5), ("oblate", 1.7, 0.5)],
 )
 def test_lame_at_rho_0(body, k, turns):
     out = solve(body, k=k, rho=0.0)
@@ -147,23 +170,40 @@ def test_lame_at_rho_0(body, k, turns):
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
 @pytest.mark.parametrize("short", [0.3, 1e-9, -1e-9, -0.3])
 def test_on_an_edge_the_discriminant_is_exact(body, short):
-    """At rho = 0 w or its derivative solves the equation (Lame's): |D| = 2, whatever a factor's bar near k = 1."""
+    """At rho = 0 w or its derivative solves the equation (Lame's): |D| = 2, whatever a factor's bar
+    near k = 1.
+    """
     out = solve(body, one_minus_k=short, rho=0.0)
-    assert abs(out["discriminant"][0]) == 2 and out["discriminant_error"][0] == 0 and out["verdict"][0] == 2
+    assert (
+        abs(out["discriminant"][0]) == 2
+        and out["discriminant_error"][0] == 0
+        and out["verdict"][0] == 2
+    )
 
 
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
 def test_parity_of_librations(body):
     rho = np.linspace(0.1, 5, 40)
     plus, minus = (solve(body, k=0.83, rho=sign * rho) for sign in (1, -1))
-    for name, other in {"y2": "y2", "dy1": "dy1", "y1": "dy2", "discriminant": "discriminant"}.items():
-        assert np.all(abs(plus[name] - minus[other]) <= plus[f"{name}_error"] + minus[f"{other}_error"])
-    np.testing.assert_allclose(plus["discriminant"] + 2, 4 * plus["y1"] * minus["y1"], rtol=1e-10, atol=1e-11)
+    for name, other in {
+        "y2": "y2",
+        "dy1": "dy1",
+        "y1": "dy2",
+        "discriminant": "discriminant",
+    }.items():
+        assert np.all(
+            abs(plus[name] - minus[other]) <= plus[f"{name}_error"] + minus[f"{other}_error"]
+        )
+    np.testing.assert_allclose(
+        plus["discriminant"] + 2, 4 * plus["y1"] * minus["y1"], rtol=1e-10, atol=1e-11
+    )
     assert np.all(plus["verdict"] == minus["verdict"])
 
 
 def test_rotations_tell_prograde_from_retrograde():
-    assert solve(k=1.2, rho=0.69)["discriminant"][0] * solve(k=1.2, rho=-0.69)["discriminant"][0] < 0
+    assert (
+        solve(k=1.2, rho=0.69)["discriminant"][0] * solve(k=1.2, rho=-0.69)["discriminant"][0] < 0
+    )
 
 
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
@@ -174,7 +214,8 @@ def test_lyapunov_never_certifies_an_unstable_point(body):
     certified = out["lyapunov"] == 1
     assert certified.sum() > 30
     assert np.all(np.isin(out["verdict"][certified], [1, 2]))
-    # No libration that is a body (rho >= 1/sqrt 3) is certified, whatever the paper says: satellite.md: What is known.
+    # No libration that is a body (rho >= 1/sqrt 3) is certified, whatever the paper says:
+    # satellite.md: What is known.
     assert not np.any(certified & (k < 1) & (abs(rho) >= 3**-0.5))
 
 
@@ -212,7 +253,9 @@ def test_tongue_widths(body, centre, n, factor):
 
 
 def test_critical_amplitudes_of_rod_and_disc():
-    """Thin rod and disc, rho = 1/sqrt 3: the amplitudes of satellite.md: What is known, in degrees; rotations in k."""
+    """Thin rod and disc, rho = 1/sqrt 3: the amplitudes of satellite.md: What is known, in degrees;
+    rotations in k.
+    """
     rod = solve("prolate", k=np.sin(np.radians([58.05, 58.07, 75.49, 75.51])), rho=3**-0.5)
     assert list(rod["verdict"]) == [1, 0, 0, 1]
     disc = solve("oblate", k=np.sin(np.radians([8.92, 8.94])), rho=3**-0.5)
@@ -225,11 +268,15 @@ def test_critical_amplitudes_of_rod_and_disc():
 
 def test_growth_per_orbit_of_the_rod():
     k = np.sin(np.radians(67.6))
-    assert solve("prolate", k=k, rho=3**-0.5)["exponent_per_orbit"][0] == pytest.approx(0.987, abs=2e-3)
+    assert solve("prolate", k=k, rho=3**-0.5)["exponent_per_orbit"][0] == pytest.approx(
+        0.987, abs=2e-3
+    )
 
 
 def test_a_narrow_tongue_defeats_the_trace_but_not_the_factors():
-    """n = 7 at k = 0.15: inside, |D| - 2 is 3e-18, so the rule |trace| > 2 is a coin; the factors' signs are right."""
+    """n = 7 at k = 0.15: inside, |D| - 2 is 3e-18, so the rule |trace| > 2 is a coin; the factors'
+    signs are right.
+    """
     low, high = edges(0.15, 7, (45**0.5 / 2 - 0.02, 45**0.5 / 2), "prolate")
     inside = np.linspace(low, high, 42)[1:-1]
     out = solve(k=0.15, rho=inside, rtol=1e-13)
@@ -250,7 +297,9 @@ def test_invalid_points_cost_themselves_alone():
 def test_large_rho():
     out = solve(k=0.5, rho=np.array([1000.0, -1000.0, 1e7]))
     assert np.all(out["discriminant_error"][:2] < 1e-11 * 1000)
-    assert abs(out["discriminant"][0] - out["discriminant"][1]) < np.sum(out["discriminant_error"][:2])
+    assert abs(out["discriminant"][0] - out["discriminant"][1]) < np.sum(
+        out["discriminant_error"][:2]
+    )
     assert list(out["status"]) == [status.OK, status.OK, status.STEP_LIMIT]
 
 
@@ -277,7 +326,9 @@ def test_scalars_and_three_dimensions():
 
 def test_a_block_without_a_valid_point():
     out = solve(k=np.full(3, np.nan), rho=np.arange(3.0))
-    assert np.all(out["status"] == status.INVALID_PARAMETERS) and np.isnan(out["discriminant"]).all()
+    assert (
+        np.all(out["status"] == status.INVALID_PARAMETERS) and np.isnan(out["discriminant"]).all()
+    )
 
 
 TINY = """
@@ -297,11 +348,19 @@ sys.stdout.write(f" {float(out['discriminant'][0]):.13g} {out['verdict'][0]}")
 
 
 def test_plain_python_gives_the_same_bits():
-    """The readable twin of every kernel is its own source with the JIT off (dop853: math's sin and cos may differ)."""
+    """The readable twin of every kernel is its own source with the JIT off (dop853: math's sin and
+    cos may differ).
+    """
     said = []
     for off in ("0", "1"):
         environment = {**os.environ, "NUMBA_DISABLE_JIT": off}
-        run = subprocess.run([sys.executable, "-c", TINY], env=environment, capture_output=True, text=True, check=True)
+        run = subprocess.run(
+            [sys.executable, "-c", TINY],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         said.append(run.stdout)
     assert said[0] == said[1]
 
@@ -336,7 +395,11 @@ def test_bars_hold_the_rounding_of_the_inertia_ratio():
             rho, k = 1 / mp.sqrt(3 * abs(1 - mpf(alpha))), mp.sin(mpf(amplitude))
         exact = mp_factors("PL" if alpha < 1 else "OL", k, rho)
         for name, value in zip(("y1", "dy1", "y2", "dy2"), exact[:4], strict=True):
-            assert abs(value - mpf(float(ds[name]))) <= float(ds[f"{name}_error"]), (alpha, amplitude, name)
+            assert abs(value - mpf(float(ds[name]))) <= float(ds[f"{name}_error"]), (
+                alpha,
+                amplitude,
+                name,
+            )
 
 
 @pytest.mark.parametrize(

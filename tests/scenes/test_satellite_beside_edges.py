@@ -1,7 +1,9 @@
-"""Points a few doubles to 1e-12 beside edges of tongues: verdicts, exponents and rotation numbers within their bars.
+"""Points a few doubles to 1e-12 beside edges of tongues: verdicts, exponents and rotation numbers
+within their bars.
 
-The truth beside an edge is the polynomial through the half-period factors, with 40 digits, at places 1e-7 around it.
-With 30 digits it would not do: beside an edge an exponent hangs on the 28th digit of a factor.
+The truth beside an edge is the polynomial through the half-period factors, with 40 digits, at
+places 1e-7 around it. With 30 digits it would not do: beside an edge an exponent hangs on the 28th
+digit of a factor.
 """
 
 import numpy as np
@@ -32,7 +34,10 @@ def polynomial(family, k, rho, nodes=6):
         def at(x):
             total = table[-1]
             for i in range(nodes - 2, -1, -1):
-                total = [value * (x - places[i]) + own for value, own in zip(total, table[i], strict=True)]
+                total = [
+                    value * (x - places[i]) + own
+                    for value, own in zip(total, table[i], strict=True)
+                ]
             return total
 
         return at
@@ -41,7 +46,9 @@ def polynomial(family, k, rho, nodes=6):
 def edge_near(family, k, rho, which):
     """The zero of a factor nearest to rho, by the secant method."""
     with mp.workdps(20):
-        return float(mp.findroot(lambda x: mp_factors(family, k, x, 20)[which], (rho, rho + 0.02), tol=1e-30))
+        return float(
+            mp.findroot(lambda x: mp_factors(family, k, x, 20)[which], (rho, rho + 0.02), tol=1e-30)
+        )
 
 
 @pytest.mark.slow
@@ -50,7 +57,9 @@ def test_what_is_said_beside_an_edge_is_true(family, k, rho, which):
     edge = edge_near(family, k, rho, which)
     random = np.random.default_rng(1)
     ulps = edge + np.arange(-60, 61) * np.spacing(edge)
-    places = np.concatenate([ulps, edge + random.choice([-1, 1], 80) * 10 ** random.uniform(-16, -12, 80)])
+    places = np.concatenate(
+        [ulps, edge + random.choice([-1, 1], 80) * 10 ** random.uniform(-16, -12, 80)]
+    )
     ds = survey.evaluate("satellite", k=k, rho=xr.DataArray(places, dims="x"), body=BODY[family])
     exact, index = polynomial(family, k, edge), np.rint(2 * float(ds.rotation_number[0]))
     assert (ds.verdict == -1).sum() == 0
@@ -61,10 +70,18 @@ def test_what_is_said_beside_an_edge_is_true(family, k, rho, which):
             stable = sine > 0 and cosine > 0
             assert int(ds.verdict[i]) == stable
             exponent = 0 if stable else 2 * mp.asinh(mp.sqrt(-min(sine, cosine)))
-            # n pi + theta, or n pi + pi - theta, whichever has the parity of the signs and lies at the edge's index
+            # n pi + theta, or n pi + pi - theta, whichever has the parity of the signs and lies at
+            # the edge's index
             turn = mp.atan2(mp.sqrt(abs(sine)), mp.sqrt(abs(cosine))) / mp.pi
             odd = (y1 < 0) != (y2 < 0)
             part = 1 - 2 * turn if odd else 2 * turn
-            turns = (2 * mp.nint((index - part - odd) / 2) + odd + part) / 2 if stable else mpf(int(index)) / 2
+            turns = (
+                (2 * mp.nint((index - part - odd) / 2) + odd + part) / 2
+                if stable
+                else mpf(int(index)) / 2
+            )
             for name, value in (("exponent", exponent), ("rotation_number", turns)):
-                assert abs(mpf(float(ds[name][i])) - value) <= float(ds[f"{name}_error"][i]), (name, place)
+                assert abs(mpf(float(ds[name][i])) - value) <= float(ds[f"{name}_error"][i]), (
+                    name,
+                    place,
+                )

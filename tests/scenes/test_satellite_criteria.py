@@ -17,7 +17,9 @@ def z_of(body, k, rho, u):
 
 
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
-@pytest.mark.parametrize(("k", "rho"), [(0.3, 0.7), (0.95, 2.0), (0.999, -1.1), (1.2, -1.4), (3.0, 0.6)])
+@pytest.mark.parametrize(
+    ("k", "rho"), [(0.3, 0.7), (0.95, 2.0), (0.999, -1.1), (1.2, -1.4), (3.0, 0.6)]
+)
 def test_the_integral_and_the_least_z(body, k, rho):
     out = solve(body, k=k, rho=rho)
     with mp.workdps(25):
@@ -27,18 +29,22 @@ def test_the_integral_and_the_least_z(body, k, rho):
         assert abs(out["lyapunov_integral"][0] - total) <= out["lyapunov_integral_error"][0]
         values = [z_of(body, K, R, period * i / 400) for i in range(401)]
         assert out["least_z"][0] <= min(values) + out["least_z_error"][0]
-        assert out["least_z"][0] >= min(values) - 1e-3 * (1 + abs(min(values)))  # of the samples, not of z
+        # of the samples, not of z
+        assert out["least_z"][0] >= min(values) - 1e-3 * (1 + abs(min(values)))
         edge = [(i * mp.pi / period) ** 2 for i in range(60)]
         n = [i for i in range(59) if edge[i] <= min(values) and max(values) <= edge[i + 1]]
         assert bool(out["zhukovskii"][0]) == bool(n)
 
 
 @pytest.mark.parametrize(
-    ("body", "low", "high"), [("prolate", 0.01, 0.95), ("oblate", 0.01, 0.95), ("prolate", 1.02, 3.0)]
+    ("body", "low", "high"),
+    [("prolate", 0.01, 0.95), ("oblate", 0.01, 0.95), ("prolate", 1.02, 3.0)],
 )
 def test_no_point_that_a_criterion_certifies_is_unstable(body, low, high):
     rho = np.linspace(-4.0, 4.0, 301)
-    ds = survey.evaluate("satellite", body=body, k=np.linspace(low, high, 90), rho=rho, variables=COMPARED)
+    ds = survey.evaluate(
+        "satellite", body=body, k=np.linspace(low, high, 90), rho=rho, variables=COMPARED
+    )
     certain = (ds.zhukovskii == 1) | (ds.lyapunov == 1)
     assert (ds.verdict == 1).where(certain, True).all()
     assert (ds.zhukovskii == 1).sum() > 100
@@ -54,7 +60,9 @@ def test_zhukovskii_certifies_some_librations():
     assert abs(share - 4665 / 28280) < 0.03
 
 
-@pytest.mark.parametrize("given", [{"k": 0.4}, {"one_minus_k": 1e-9}, {"k": 0.0}, {"k": 1.3}, {"one_minus_k": -1e-7}])
+@pytest.mark.parametrize(
+    "given", [{"k": 0.4}, {"one_minus_k": 1e-9}, {"k": 0.0}, {"k": 1.3}, {"one_minus_k": -1e-7}]
+)
 def test_the_planar_motion(given):
     ds = survey.evaluate("satellite", rho=0.9, **given).survey.trajectory(time=30.0)
     with mp.workdps(40):

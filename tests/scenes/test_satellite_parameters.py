@@ -1,4 +1,6 @@
-"""Every way to give a satellite's point is solved again in double-double where float64 cannot tell, against mpmath."""
+"""Every way to give a satellite's point is solved again in double-double where float64 cannot tell,
+against mpmath.
+"""
 
 from fractions import Fraction
 
@@ -32,7 +34,10 @@ def given(point):
     body, rho = point.get("body"), point.get("rho")
     if rho is None:
         alpha = mpf(point["inertia_ratio"])
-        rho, body = point.get("direction", 1) / mp.sqrt(3 * abs(1 - alpha)), "oblate" if alpha > 1 else "prolate"
+        rho, body = (
+            point.get("direction", 1) / mp.sqrt(3 * abs(1 - alpha)),
+            "oblate" if alpha > 1 else "prolate",
+        )
     return k, rho, body[0].upper() + ("L" if k < 1 else "R")
 
 
@@ -58,21 +63,33 @@ def test_doubles_one_after_another_about_an_edge(first, second, between, options
     """No verdict is left open, there is one switch, and mpmath finds it between the same two doubles."""
 
     def verdict(**values):
-        return survey.evaluate("satellite", **values, **options, variables=["verdict"]).verdict.values
+        return survey.evaluate(
+            "satellite", **values, **options, variables=["verdict"]
+        ).verdict.values
 
     line = np.linspace(*between, 200)
     verdicts = verdict(**first, **{second: line})
     at = np.flatnonzero(verdicts[1:] != verdicts[:-1])[0]
     low, high = line[at], line[at + 1]
     while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if verdict(**first, **{second: [middle]})[0] == verdicts[at] else (low, middle)
+        low, high = (
+            (middle, high)
+            if verdict(**first, **{second: [middle]})[0] == verdicts[at]
+            else (low, middle)
+        )
     ((name, value),) = first.items()
-    for along, places, fixed in ((second, doubles(low, 100), first), (name, doubles(value, 100), {second: low})):
+    for along, places, fixed in (
+        (second, doubles(low, 100), first),
+        (name, doubles(value, 100), {second: low}),
+    ):
         got = verdict(**fixed, **{along: places})
         assert set(got) == {STABLE, UNSTABLE}
         (switch,) = np.flatnonzero(got[1:] != got[:-1])
         for place in (switch, switch + 1):
-            assert truth(options | fixed | {along: places[place]}) == got[place], (along, places[place])
+            assert truth(options | fixed | {along: places[place]}) == got[place], (
+                along,
+                places[place],
+            )
 
 
 @pytest.mark.parametrize("amplitude", [1e-5, 0.7, 1.5707])
@@ -80,10 +97,14 @@ def test_doubles_one_after_another_about_an_edge(first, second, between, options
 def test_factors_by_amplitude_and_inertia_ratio(amplitude, inertia_ratio):
     """The double-double kernel: all four within half an ulp."""
     rho, low = satellite.rates(np.array(inertia_ratio), "1")
-    out = factors("oblate" if inertia_ratio > 1 else "prolate", float(rho), float(low), amplitude=amplitude)
+    out = factors(
+        "oblate" if inertia_ratio > 1 else "prolate", float(rho), float(low), amplitude=amplitude
+    )
     with mp.workdps(40):
         k, rho, family = given({"amplitude": amplitude, "inertia_ratio": inertia_ratio})
-        for got, bar, exact in zip(out[:4], out[4:8], mp_factors(family, k, rho, 40)[:4], strict=True):
+        for got, bar, exact in zip(
+            out[:4], out[4:8], mp_factors(family, k, rho, 40)[:4], strict=True
+        ):
             assert abs(mpf(got) - exact) <= bar
             assert bar < 1.3e-16 * abs(got) + 1e-24
 
@@ -94,7 +115,10 @@ def test_the_last_amplitude_below_a_right_angle():
     with mp.workdps(60):
         one_minus_k = float(1 - mp.sin(mpf(amplitude)))
     for body in ("prolate", "oblate"):
-        one, other = (factors(body, 1.7, **point) for point in ({"amplitude": amplitude}, {"one_minus_k": one_minus_k}))
+        one, other = (
+            factors(body, 1.7, **point)
+            for point in ({"amplitude": amplitude}, {"one_minus_k": one_minus_k})
+        )
         np.testing.assert_allclose(one[:4], other[:4], rtol=1e-14)
 
 
@@ -106,7 +130,9 @@ def test_at_the_separatrix_there_is_no_period(recwarn):
 
 
 def test_rho_of_an_inertia_ratio_to_thirty_digits():
-    alpha = np.concatenate([[0.0, 1e-300, 1e-17, np.nextafter(1, 0), np.nextafter(1, 2), 2.0], np.linspace(0, 2, 40)])
+    alpha = np.concatenate(
+        [[0.0, 1e-300, 1e-17, np.nextafter(1, 0), np.nextafter(1, 2), 2.0], np.linspace(0, 2, 40)]
+    )
     for direction in ("1", "-1"):
         rho, low = satellite.rates(alpha, direction)
         for i in range(alpha.size):
@@ -117,20 +143,29 @@ def test_rho_of_an_inertia_ratio_to_thirty_digits():
 
 
 def test_steps_fill_the_half_period_on_any_machine():
-    """Mathieu's is pi / 2, known to 32 digits: steps an ulp longer or shorter add up to it to half an ulp of one."""
+    """Mathieu's is pi / 2, known to 32 digits: steps an ulp longer or shorter add up to it to half
+    an ulp of one.
+    """
     problem = mathieu._problem(np.array([1.0, 5.0]), np.zeros((2, 1)))
     for steps in (6, 10, 28, 448, 28672):
         lengths = problem.lengths(np.array([1]), steps)[0]
         total = sum(map(Fraction, lengths.tolist()))
-        assert abs(total - (Fraction(HALF_PI[0]) + Fraction(HALF_PI[1]))) <= Fraction(np.spacing(lengths.min())) / 2
+        assert (
+            abs(total - (Fraction(HALF_PI[0]) + Fraction(HALF_PI[1])))
+            <= Fraction(np.spacing(lengths.min())) / 2
+        )
         assert np.ptp(lengths) <= np.spacing(lengths.max())
 
 
-@pytest.mark.skipif(np.finfo(np.longdouble).eps > 1e-18, reason="this machine has no longer floats than float64")
+@pytest.mark.skipif(
+    np.finfo(np.longdouble).eps > 1e-18, reason="this machine has no longer floats than float64"
+)
 def test_steps_fill_the_half_period_to_19_digits():
     """Half an ulp of each step alone would be 1e-11 of D at rho = 1000 beside the separatrix."""
     for one_minus_k in (1e-12, 0.4, -1e-9, -3.0):
-        motion = satellite.Motion(*(np.array([v]) for v in satellite.moduli({"one_minus_k": one_minus_k})), False)
+        motion = satellite.Motion(
+            *(np.array([v]) for v in satellite.moduli({"one_minus_k": one_minus_k})), False
+        )
         problem = satellite._problem(motion, np.array([[1.0]]))
         total = sum(map(Fraction, problem.lengths(np.array([0]), 28672)[0].tolist()))
         with mp.workdps(40):

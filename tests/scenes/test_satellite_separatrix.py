@@ -1,4 +1,6 @@
-"""Satellites close to the separatrix and at large rho (satellite.md: Numerics), against double-double and mpmath."""
+"""Satellites close to the separatrix and at large rho (satellite.md: Numerics), against
+double-double and mpmath.
+"""
 
 import numpy as np
 import pytest
@@ -32,7 +34,12 @@ def miss(body, rho, scale=1.0, **modulus):
     assert out["status"][0] == status.OK and out["verdict"][0] == verdict, (body, rho, modulus)
     assert off <= out["discriminant_error"][0] + 4e-16 * (2 + abs(d)), (body, rho, modulus)
     for i, name in enumerate(NAMES):
-        assert abs(out[name][0] - exact[i]) <= out[f"{name}_error"][0] + exact[4 + i], (body, rho, modulus, name)
+        assert abs(out[name][0] - exact[i]) <= out[f"{name}_error"][0] + exact[4 + i], (
+            body,
+            rho,
+            modulus,
+            name,
+        )
     return off / max(scale, abs(d))
 
 
@@ -62,7 +69,9 @@ def test_a_discriminant_that_an_ulp_of_rho_moves_by_more(short, rho):
         d, verdict = decided(*mp_factors("OL", 1 - mpf(short), mpf(rho), 40)[:4])
         for rtol, most in ((1e-10, 5e-11), (1e-12, 1e-12), (1e-13, 1e-12)):
             out = solve("oblate", rtol=rtol, rho=rho, one_minus_k=short)
-            assert abs(out["discriminant"][0] - d) < min(most * max(1, abs(d)), mpf(out["discriminant_error"][0]))
+            assert abs(out["discriminant"][0] - d) < min(
+                most * max(1, abs(d)), mpf(out["discriminant_error"][0])
+            )
             assert out["verdict"][0] == verdict
 
 
@@ -93,7 +102,9 @@ def test_rho_of_1000_at_the_separatrix(body, side):
 def test_dense_rows_by_the_separatrix(body, short):
     """By way of the proxy of whole rows: every verdict right, D within its bar."""
     rho = np.linspace(0.1, 4, 3000)
-    ds = survey.evaluate("satellite", one_minus_k=short, rho=rho, body=body, variables=["discriminant", "verdict"])
+    ds = survey.evaluate(
+        "satellite", one_minus_k=short, rho=rho, body=body, variables=["discriminant", "verdict"]
+    )
     for i in range(0, rho.size, 30):
         d, verdict = decided(*factors(body, rho[i], one_minus_k=short)[:4])
         assert int(ds.verdict[i]) == verdict, rho[i]
@@ -103,7 +114,9 @@ def test_dense_rows_by_the_separatrix(body, short):
 
 @pytest.mark.parametrize("short", [1e-2, 1e-4, 1e-8, 1e-12])
 def test_exponentially_thin_stable_bands_of_an_oblate_body(short):
-    """For rho < 1 a stable band is as narrow as exp(-4 K sqrt(1 - rho^2)); both its edges, from the next double on."""
+    """For rho < 1 a stable band is as narrow as exp(-4 K sqrt(1 - rho^2)); both its edges, from the
+    next double on.
+    """
     rho = np.linspace(0.05, 0.999, 300)
     out = solve("oblate", one_minus_k=short, rho=rho)
     assert (out["status"] == status.OK).all() and (out["verdict"] >= 0).all()
@@ -111,7 +124,9 @@ def test_exponentially_thin_stable_bands_of_an_oblate_body(short):
     for place, name in enumerate(NAMES):
         for i in np.flatnonzero(np.diff(np.sign(out[name]))):
             edge, count = (
-                closed_in(lambda x, at=place: factors("oblate", x, one_minus_k=short)[at], *rho[i : i + 2]),
+                closed_in(
+                    lambda x, at=place: factors("oblate", x, one_minus_k=short)[at], *rho[i : i + 2]
+                ),
                 count + 1,
             )
             for away in (0.0, 2e-16, 1e-15, 1e-13, 1e-10, 1e-7):
@@ -129,7 +144,9 @@ def closed_in(function, low, high):
 
 
 def test_no_overflow_and_no_false_alarm():
-    """|D| of an oblate body is up to 1e31 at the last double below k = 1; far beyond, its bar leaves float32."""
+    """|D| of an oblate body is up to 1e31 at the last double below k = 1; far beyond, its bar
+    leaves float32.
+    """
     rho = np.linspace(0.02, 3, 150)
     for body in BODIES:
         near = solve(body, one_minus_k=np.array([[1e-14], [1e-16], [-1e-14], [-2e-16]]), rho=rho)
@@ -143,10 +160,15 @@ def test_no_overflow_and_no_false_alarm():
 def test_half_period_to_an_ulp():
     random = np.random.default_rng(13)
     bound = 2.3e-16 if np.finfo(np.longdouble).eps < 1e-18 else 6e-16
-    for k in np.concatenate([1 - 10 ** random.uniform(-12, 0, 20), 1 + 10 ** random.uniform(-12, 3, 20)]):
+    for k in np.concatenate(
+        [1 - 10 ** random.uniform(-12, 0, 20), 1 + 10 ** random.uniform(-12, 3, 20)]
+    ):
         with mp.workdps(30):
             small = min(mpf(k), 1 / mpf(k))
-            true, kc = mp.ellipk(small**2) * (2 if k < 1 else 1 / mpf(k)), float(mp.sqrt(1 - small**2))
+            true, kc = (
+                mp.ellipk(small**2) * (2 if k < 1 else 1 / mpf(k)),
+                float(mp.sqrt(1 - small**2)),
+            )
             assert abs(half_periods(np.array([k]), np.array([kc]))[0][0] - true) < bound * true, k
 
 
@@ -162,13 +184,17 @@ def test_the_same_by_mpmath(seed):
         exact = mp_factors(family, 1 - mpf(short), mpf(rho), 45)[:4]
         d, verdict = decided(*exact)
         out = solve(body, rtol=1e-13, rho=rho, one_minus_k=short)
-        assert abs(out["discriminant"][0] - d) < min(1e-12 * max(1, abs(d)), mpf(out["discriminant_error"][0]))
+        assert abs(out["discriminant"][0] - d) < min(
+            1e-12 * max(1, abs(d)), mpf(out["discriminant_error"][0])
+        )
     assert out["verdict"][0] == verdict
     miss(body, rho, one_minus_k=short)
 
 
 def test_a_bar_for_every_value_where_solutions_differ_by_30_orders():
-    """An oblate body at next to no rho: the ellipse of the errors is so thin that rounding could turn it inside out."""
+    """An oblate body at next to no rho: the ellipse of the errors is so thin that rounding could
+    turn it inside out.
+    """
     out = survey.evaluate(
         "satellite",
         one_minus_k=np.geomspace(1e-16, 1e-9, 8),
@@ -184,7 +210,10 @@ def test_a_bar_for_every_value_where_solutions_differ_by_30_orders():
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
 def test_a_rotation_number_whose_zeros_cannot_be_counted_says_so(method, body):
     """Where y1 is known to nothing at T/2, a zero next to it may be miscounted. At rho = 0 it is 1/2 or 0."""
-    ds = survey.evaluate("satellite", k=float(np.nextafter(1, 0)), rho=0.0, body=body, method=method, rtol=1e-12)
-    exact = survey.evaluate("satellite", k=0.5, rho=0.0, body=body)  # the same on the whole line rho = 0
+    ds = survey.evaluate(
+        "satellite", k=float(np.nextafter(1, 0)), rho=0.0, body=body, method=method, rtol=1e-12
+    )
+    # the same on the whole line rho = 0
+    exact = survey.evaluate("satellite", k=0.5, rho=0.0, body=body)
     off = abs(abs(float(ds.rotation_number)) - abs(float(exact.rotation_number)))
     assert off <= float(ds.rotation_number_error) + 1e-15

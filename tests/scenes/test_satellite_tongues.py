@@ -1,7 +1,9 @@
-"""Narrow tongues of librations (satellite.md: Numerics): no verdict is wrong, every point inside a tongue is found.
+"""Narrow tongues of librations (satellite.md: Numerics): no verdict is wrong, every point inside a
+tongue is found.
 
-The truth is the edges by Hill's method in mpmath: z = 2 w^2 + 2 rho w + rho^2 + c is a cosine series in v = pi u / 2K,
-and a factor vanishes where the matrix that the equation makes of its solution's Fourier series is singular.
+The truth is the edges by Hill's method in mpmath: z = 2 w^2 + 2 rho w + rho^2 + c is a cosine
+series in v = pi u / 2K, and a factor vanishes where the matrix that the equation makes of its
+solution's Fourier series is singular.
 """
 
 import numpy as np
@@ -19,7 +21,9 @@ CELLS = [(family, n, k) for family, n in TONGUES for k in (0.15, 0.3, 0.5)]
 
 
 def fourier(family, k, factor, size):
-    """Matrices S, W: S + 2 rho W + rho^2 is singular where `factor` vanishes at T/2 (DLMF 22.11.2, 22.11.13)."""
+    """Matrices S, W: S + 2 rho W + rho^2 is singular where `factor` vanishes at T/2 (DLMF 22.11.2,
+    22.11.13).
+    """
     m = k * k
     first = mp.ellipk(m)
     q = mp.exp(-mp.pi * mp.ellipk(1 - m) / first)
@@ -57,10 +61,13 @@ def edge(family, k, factor, near, size=16):
 def tongue(family, n, k):
     """Both edges of tongue n, ascending (satellite.md: What is known: where it opens, and how it bends)."""
     opens = (n * n / 4 - 1) ** 0.5 if family == "PL" else n / 2
-    bends = {("PL", 3): -13 / 32, ("PL", 4): -4 / 5, ("PL", 5): -43 / 32}.get((family, n), 0) / opens
+    bends = {("PL", 3): -13 / 32, ("PL", 4): -4 / 5, ("PL", 5): -43 / 32}.get(
+        (family, n), 0
+    ) / opens
     with mp.workdps(DIGITS):
         return sorted(
-            edge(family, mpf(k), f, opens + bends * k * k) for f in (("y1", "dy2") if n % 2 else ("y2", "dy1"))
+            edge(family, mpf(k), f, opens + bends * k * k)
+            for f in (("y1", "dy2") if n % 2 else ("y2", "dy1"))
         )
 
 
@@ -81,7 +88,9 @@ def within(rho, low, high):
 def test_hills_method_gives_the_reference(case):
     with mp.workdps(DIGITS):
         known = mpf(case["rho_star"])
-        found = edge(case["fam"], mpf(float(case["k"])), case["factor_zero"][:-5], float(known), size=30)
+        found = edge(
+            case["fam"], mpf(float(case["k"])), case["factor_zero"][:-5], float(known), size=30
+        )
         assert abs(found - known) < mpf("1e-22")
 
 
@@ -104,7 +113,11 @@ def test_no_verdict_is_wrong_and_none_is_open(family, n, k):
 def test_a_dense_row_finds_a_tongue_as_narrow(family, n, widest):
     """By way of the proxy of whole rows, which cannot see it: |D| - 2 is 3e-18."""
     low, high = tongue(family, n, 0.15)
-    rho = np.unique(np.append(np.linspace(float(low) - 2e-9, float(high) + 2e-9, 400), beside(low, high)))
-    ds = survey.evaluate("satellite", k=0.15, rho=rho, body=BODY[family], variables=["discriminant", "verdict"])
+    rho = np.unique(
+        np.append(np.linspace(float(low) - 2e-9, float(high) + 2e-9, 400), beside(low, high))
+    )
+    ds = survey.evaluate(
+        "satellite", k=0.15, rho=rho, body=BODY[family], variables=["discriminant", "verdict"]
+    )
     assert 0 < high - low < widest
     np.testing.assert_array_equal(ds.verdict, np.where(within(rho, low, high), UNSTABLE, STABLE))

@@ -12,9 +12,16 @@ BODY = {"A": 0.7, "B": 1.5, "C": 1.9}
 
 
 def evaluate(**given):
-    options = {name: given.pop(name) for name in ("direction", "rtol", "variables", "method") if name in given}
+    options = {
+        name: given.pop(name)
+        for name in ("direction", "rtol", "variables", "method")
+        if name in given
+    }
     columns = np.broadcast_arrays(*np.atleast_1d(*given.values()))
-    point = {name: xr.DataArray(values, dims="point") for name, values in zip(given, columns, strict=True)}
+    point = {
+        name: xr.DataArray(values, dims="point")
+        for name, values in zip(given, columns, strict=True)
+    }
     return survey.evaluate("satellite_triaxial", **point, **options).load()
 
 
@@ -27,10 +34,16 @@ def random_bodies(count, seed):
 
 def compare(count, seed):
     body, random = random_bodies(count, seed)
-    k = np.where(random.random(count) < 0.6, random.uniform(0.0, 0.98, count), random.uniform(1.02, 3.0, count))
+    k = np.where(
+        random.random(count) < 0.6,
+        random.uniform(0.0, 0.98, count),
+        random.uniform(1.02, 3.0, count),
+    )
     for direction in (1, -1):
         known = monodromies(*body.values(), k, direction, rtol=1e-13)
-        ds = evaluate(**body, k=k, direction=direction, variables=["monodromy", "verdict", "spectral_radius"])
+        ds = evaluate(
+            **body, k=k, direction=direction, variables=["monodromy", "verdict", "spectral_radius"]
+        )
         assert (ds.status == status.OK).all()
         size = abs(known).max(axis=(1, 2))
         off = abs(ds.monodromy.values - known).max(axis=(1, 2))
@@ -71,10 +84,14 @@ def test_a_complex_quadruple():
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("body", ["prolate", "oblate"])
 def test_a_body_with_an_axis_of_symmetry_is_the_other_scene(body, direction):
-    """B = C: the axis is in the plane, alpha = A / C; A = C: alpha = B / C. Two multipliers are 1, two are Hill's."""
+    """B = C: the axis is in the plane, alpha = A / C; A = C: alpha = B / C. Two multipliers are 1,
+    two are Hill's.
+    """
     k = np.array([0.0, 0.3, 0.6, 0.8, 0.95, 1.05, 1.2, 2.0])
     alpha, moments = (
-        (0.3, {"A": 0.6, "B": 2.0, "C": 2.0}) if body == "prolate" else (1.7, {"A": 2.0, "B": 3.4, "C": 2.0})
+        (0.3, {"A": 0.6, "B": 2.0, "C": 2.0})
+        if body == "prolate"
+        else (1.7, {"A": 2.0, "B": 3.4, "C": 2.0})
     )
     ds = evaluate(**moments, k=k, direction=direction)
     known = survey.evaluate("satellite", inertia_ratio=alpha, k=k, direction=direction).load()
@@ -98,7 +115,9 @@ def test_the_relative_equilibrium():
     square = (-b[:, None] + np.array([1, -1]) * np.sqrt(b * b - 4 * c + 0j)[:, None]) / 2
     rate = np.sqrt(3 * (roll - yaw) / (1 - roll * yaw))  # of pitch
     exponents = abs(np.sqrt(square).real).max(axis=1) * 2 * np.pi / rate
-    assert (abs(ds.exponent.values - exponents) <= ds.exponent_error.values + 1e-9 * (1 + exponents)).all()
+    assert (
+        abs(ds.exponent.values - exponents) <= ds.exponent_error.values + 1e-9 * (1 + exponents)
+    ).all()
     stable = (c > 0) & (b > 0) & (b * b > 4 * c)
     assert (ds.verdict.values == stable).all() and 20 < stable.sum() < 180
 
@@ -115,12 +134,16 @@ def test_all_names_of_a_motion_mean_the_same():
     for way in ways:
         ds = evaluate(**way)
         off = abs(ds.multiplier_re - first.multiplier_re).values
-        assert (off <= (ds.multiplier_re_error + first.multiplier_re_error).values + 1e-13).all(), way
+        assert (off <= (ds.multiplier_re_error + first.multiplier_re_error).values + 1e-13).all(), (
+            way
+        )
 
 
 @pytest.mark.parametrize("short", [1e-4, 1e-8, -1e-4, -1e-8])
 def test_next_to_the_separatrix_methods_agree(short):
-    one, other = (evaluate(**BODY, one_minus_k=short, method=method) for method in ("taylor16", "dop853"))
+    one, other = (
+        evaluate(**BODY, one_minus_k=short, method=method) for method in ("taylor16", "dop853")
+    )
     assert one.status == other.status == status.OK
     bars = (one.multiplier_re_error + other.multiplier_re_error).values
     assert (abs(one.multiplier_re - other.multiplier_re).values <= bars).all() and bars.max() < 1e-4
@@ -141,7 +164,9 @@ def test_a_map_by_series_has_the_points_answers():
     random = np.random.default_rng(2)
     i, j = random.integers(0, 60, 80), random.integers(0, 50, 80)
     points = evaluate(A=0.7, B=b[j], C=1.9, k=k[i], rtol=1e-12)
-    own = ds.isel(k=xr.DataArray(i, dims="point"), B=xr.DataArray(j, dims="point")).transpose("point", ...)
+    own = ds.isel(k=xr.DataArray(i, dims="point"), B=xr.DataArray(j, dims="point")).transpose(
+        "point", ...
+    )
     assert ((own.verdict == points.verdict) | (own.verdict == -1) | (points.verdict == -1)).all()
     off = abs(own.spectral_radius - points.spectral_radius)
     assert (off <= own.spectral_radius_error + points.spectral_radius_error).all()

@@ -36,7 +36,9 @@ figures = ["verdict", "discriminant"]
 
 
 def program(folder, *words):
-    return subprocess.run([sys.executable, "-m", "survey", *words], cwd=folder, capture_output=True, text=True)
+    return subprocess.run(
+        [sys.executable, "-m", "survey", *words], cwd=folder, capture_output=True, text=True
+    )
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +51,9 @@ def folder(tmp_path_factory):
         (path / f"{name}.toml").write_text(WORKFLOW.format(scene=scene))
         done = program(path, "run", f"{name}.toml", "-o", f"{name}.nc", "--quiet")
         assert done.returncode == 0, done.stderr
-    done = program(path, "bundle", "map.nc", "--author", "A. Author", "--license", "https://example.org/l")
+    done = program(
+        path, "bundle", "map.nc", "--author", "A. Author", "--license", "https://example.org/l"
+    )
     assert done.returncode == 0, done.stderr
     done = program(path, "bundle", "own.nc", "-o", "kept")
     assert done.returncode == 0, done.stderr
@@ -69,7 +73,10 @@ def test_a_bundle_holds_everything_and_describes_it(folder):
     assert graph["ro-crate-metadata.json"]["about"] == {"@id": "./"}
     assert {part["@id"] for part in root["hasPart"]} == names - {"ro-crate-metadata.json"}
     assert all(graph[part["@id"]]["@type"] == "File" for part in root["hasPart"])
-    assert root["license"] == {"@id": "https://example.org/l"} and graph["#author"]["name"] == "A. Author"
+    assert (
+        root["license"] == {"@id": "https://example.org/l"}
+        and graph["#author"]["name"] == "A. Author"
+    )
     assert root["datePublished"] == survey.open(folder / "map.nc").attrs["date_created"][:10]
     assert {"@id": "map.nc"} in action["result"] and {"@id": "workflow.toml"} in action["object"]
 
@@ -78,7 +85,10 @@ def test_a_bundle_holds_everything_and_describes_it(folder):
 def test_verify_checks_the_whole(folder, name):
     done = program(folder, "verify", name, "--points", "5", "--trust-scene")
     assert done.returncode == 0, done.stderr
-    assert "all files are those that the bundle lists" in done.stdout and "within the error bars" in done.stdout
+    assert (
+        "all files are those that the bundle lists" in done.stdout
+        and "within the error bars" in done.stdout
+    )
 
 
 @pytest.mark.parametrize(
@@ -88,10 +98,19 @@ def test_verify_checks_the_whole(folder, name):
             lambda at: (at / "map_verdict.png").unlink(),
             "map_verdict.png: the bundle lists this file, but it is missing",
         ),
-        (lambda at: (at / "more.txt").write_text("x"), "more.txt: the bundle does not list this file"),
+        (
+            lambda at: (at / "more.txt").write_text("x"),
+            "more.txt: the bundle does not list this file",
+        ),
         (lambda at: (at / "README.md").write_text("other"), "README.md: its bits differ"),
-        (lambda at: (at / "ro-crate-metadata.json").write_text("{}"), "does not describe the bundle"),
-        (lambda at: (at / "workflow.toml").write_text("scene = 'brun'"), "not the workflow that the data"),
+        (
+            lambda at: (at / "ro-crate-metadata.json").write_text("{}"),
+            "does not describe the bundle",
+        ),
+        (
+            lambda at: (at / "workflow.toml").write_text("scene = 'brun'"),
+            "not the workflow that the data",
+        ),
     ],
 )
 def test_verify_finds_what_was_changed(folder, tmp_path, change, line):
@@ -110,7 +129,9 @@ def test_run_makes_the_same_bits_again_from_a_bundle(folder, tmp_path, name):
         at = tmp_path / "map"
     else:
         at = Path(shutil.copytree(folder / "kept", tmp_path / "kept"))
-        assert (at / "own.py").read_text() == SCENE and 'scene = "own.py"' in (at / "workflow.toml").read_text()
+        assert (at / "own.py").read_text() == SCENE and 'scene = "own.py"' in (
+            at / "workflow.toml"
+        ).read_text()
     done = program(at, "run", "workflow.toml", "-o", "again.nc", "--quiet")
     assert done.returncode == 0, done.stderr
     with xr.open_dataset(folder / f"{name}.nc") as one, xr.open_dataset(at / "again.nc") as other:
@@ -122,7 +143,11 @@ def test_zips_that_are_no_bundles_are_refused(folder, tmp_path):
         with zipfile.ZipFile(tmp_path / "bad.zip", "w") as archive:
             archive.writestr(member, "x")
         done = program(tmp_path, "verify", "bad.zip")
-        assert done.returncode == 3 and done.stderr.count("\n") == 1 and "which no bundle does" in done.stderr, member
+        assert (
+            done.returncode == 3
+            and done.stderr.count("\n") == 1
+            and "which no bundle does" in done.stderr
+        ), member
     with zipfile.ZipFile(tmp_path / "empty.zip", "w"):
         pass
     done = program(tmp_path, "verify", "empty.zip")
@@ -139,7 +164,10 @@ def test_only_the_certificate_of_the_proof_is_bundled(folder, tmp_path):
     """A file from a stranger may name any file beside it: what is not the certificate is not packed."""
     text = b"a certificate"
     ds = xr.load_dataset(folder / "map.nc", decode_timedelta=False)
-    ds.attrs |= {"proof_certificate": "../map.cert", "proof_sha256": hashlib.sha256(text).hexdigest()}
+    ds.attrs |= {
+        "proof_certificate": "../map.cert",
+        "proof_sha256": hashlib.sha256(text).hexdigest(),
+    }
     ds.to_netcdf(tmp_path / "map.nc")
     digest_of(tmp_path / "map.nc").write_text(
         f"{hashlib.sha256((tmp_path / 'map.nc').read_bytes()).hexdigest()}  map.nc\n"

@@ -1,4 +1,6 @@
-"""Abel solutions drawn as curves: w w' = -phi has the circles w^2 + phi^2 = w0^2, which turn at phi = +-w0."""
+"""Abel solutions drawn as curves: w w' = -phi has the circles w^2 + phi^2 = w0^2, which turn at phi
+= +-w0.
+"""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -28,12 +30,19 @@ def circles():
         "t_turning": np.where(turns, np.sign(phi) * np.pi / 2, np.nan),
     }
     data = {name: (dims, value) for name, value in values.items()}
-    data |= {f"{name}_error": (dims, np.where(np.isnan(value), nothing, 1e-12)) for name, value in values.items()}
+    data |= {
+        f"{name}_error": (dims, np.where(np.isnan(value), nothing, 1e-12))
+        for name, value in values.items()
+    }
     flags = {"flag_values": np.array([0, 1, 4, TURNING, SEPARATRIX], np.int8),
              "flag_meanings": "ok invalid_parameters step_limit turning separatrix"}  # fmt: skip
     data["status"] = (dims, np.where(turns, TURNING, status.OK).astype(np.int8), flags)
     angle = {"symbol": r"\varphi", "long_name": "angle", "units": "rad"}
-    coords = {"w0": ("w0", w0, {"long_name": "initial velocity"}), "phi": ("phi", phi, angle), "phi0": 0.0}
+    coords = {
+        "w0": ("w0", w0, {"long_name": "initial velocity"}),
+        "phi": ("phi", phi, angle),
+        "phi0": 0.0,
+    }
     return xr.Dataset(data, coords, {"title": "Circles", "options": "question=abel"})
 
 
@@ -56,7 +65,9 @@ def test_curves_end_in_their_turning_points_and_follow_the_solution_to_there(cir
         ends = (-radius, radius) if radius < 2.2 else (-2.2, 2.2)
         assert tuple(curve[[0, -1], 0]) == pytest.approx(ends)
     (dots,) = (line for line in figure.axes[0].lines if len(line.get_xdata()) == 18)
-    assert sorted(dots.get_xdata()) == pytest.approx(sorted([*circles.w0.values[:9], *-circles.w0.values[:9]]))
+    assert sorted(dots.get_xdata()) == pytest.approx(
+        sorted([*circles.w0.values[:9], *-circles.w0.values[:9]])
+    )
     assert not dots.get_ydata().any() and figure.axes[1].get_ylabel() == "initial velocity"
     assert tuple(drawn.get_array()) == tuple(circles.w0.values)
 
@@ -78,12 +89,18 @@ def test_the_direction_of_the_axes_and_the_order_of_the_dimensions_change_nothin
 def test_colours_belong_to_their_curves_on_an_axis_that_is_not_sorted(circles):
     drawn, curves = lines(figures.draw(circles.isel(w0=[3, 9, 0])))
     assert list(drawn.get_array()) == list(circles.w0.values[[0, 3, 9]])
-    assert [np.hypot(*curve[0]) for curve in curves] == pytest.approx(list(drawn.get_array()), rel=0.05)
+    assert [np.hypot(*curve[0]) for curve in curves] == pytest.approx(
+        list(drawn.get_array()), rel=0.05
+    )
 
 
 def test_one_curve_and_none(circles):
     assert len(lines(figures.draw(circles.isel(w0=[2])))[1]) == 1
-    circles.status[...], circles.w[...], circles.phi_turning[...] = status.STEP_LIMIT, np.nan, np.nan
+    circles.status[...], circles.w[...], circles.phi_turning[...] = (
+        status.STEP_LIMIT,
+        np.nan,
+        np.nan,
+    )
     assert legend(figures.draw(circles)) == ["solutions", "initial angle", "failed (10)"]
 
 
@@ -110,7 +127,11 @@ def test_ends_that_are_left_open_are_ringed_and_counted(circles, style):
     counted = ["separatrix (1)", "failed (1)", "outside the domain (1)"]
     counted = counted if style == "screen" else [label.partition(" (")[0] for label in counted]
     assert legend(figure)[-3:] == counted
-    rings = [line.get_xydata() for line in figure.axes[0].lines if line.get_markeredgecolor() == "#D40000"]
+    rings = [
+        line.get_xydata()
+        for line in figure.axes[0].lines
+        if line.get_markeredgecolor() == "#D40000"
+    ]
     ((place,),) = (ring for ring in rings if len(ring))
     assert place[0] == pytest.approx(circles.phi.values[circles.w[8].notnull().values].max())
 
@@ -121,7 +142,9 @@ def test_error_bars_are_drawn_where_they_are_seen(circles):
     assert "error bars" in legend(figure) and len(figure.axes[0].collections) == 2
 
 
-def test_a_second_parameter_leaves_its_first_value_and_maps_the_turning_points_of_the_last_angle(circles):
+def test_a_second_parameter_leaves_its_first_value_and_maps_the_turning_points_of_the_last_angle(
+    circles,
+):
     two = xr.concat([circles, circles.assign(w=circles.w + 1)], "d").assign_coords(d=[1.0, 2.0])
     two = two.transpose("w0", "d", "phi")
     figure = figures.draw(two)
@@ -151,7 +174,16 @@ def test_at_one_angle_w_is_a_map_whose_grey_points_turn_before_it(circles):
 
 def test_ticks_are_multiples_of_pi():
     halves = [family._multiple_of_pi(n) for n in (-3, -2, -1, 0, 1, 2, 3, 4)]
-    assert halves == [r"$-3\pi/2$", r"$-\pi$", r"$-\pi/2$", "$0$", r"$\pi/2$", r"$\pi$", r"$3\pi/2$", r"$2\pi$"]
+    assert halves == [
+        r"$-3\pi/2$",
+        r"$-\pi$",
+        r"$-\pi/2$",
+        "$0$",
+        r"$\pi/2$",
+        r"$\pi$",
+        r"$3\pi/2$",
+        r"$2\pi$",
+    ]
 
 
 def test_the_accessor_chooses_an_angle_and_draws_a_map(circles):

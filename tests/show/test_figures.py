@@ -23,7 +23,10 @@ def toy():
     state = np.zeros((40, 50), np.int8)
     state[30:, 40:] = status.STEP_LIMIT
     state[0, 0] = status.INVALID_PARAMETERS
-    flags = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "undecided unstable stable marginal"}
+    flags = {
+        "flag_values": np.array([-1, 0, 1, 2], np.int8),
+        "flag_meanings": "undecided unstable stable marginal",
+    }
     return xr.Dataset(
         {"verdict": (("k", "rho"), verdict, flags | {"long_name": "verdict"}), "status": (("k", "rho"), state)},
         {"k": ("k", np.linspace(0, 1, 40), {"symbol": "k", "long_name": "modulus", "units": "1"}),
@@ -36,7 +39,13 @@ def test_the_legend_counts_every_kind_of_point(toy):
     figure = figures.draw(toy)
     axes = figure.axes[0]
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["unstable (499)", "stable (1,399)", "undecided (1)", "failed (100)", "outside the domain (1)"]
+    assert labels == [
+        "unstable (499)",
+        "stable (1,399)",
+        "undecided (1)",
+        "failed (100)",
+        "outside the domain (1)",
+    ]
     assert axes.get_xlabel() == "modulus, $k$" and axes.get_ylabel() == r"ratio, $\rho$ (rad)"
     assert axes.get_title().startswith("A toy map") and axes.get_yscale() == "log"
     assert [line.get_xydata().shape[0] for line in axes.lines] == [1, 1]  # rare points are ringed
@@ -75,7 +84,9 @@ def test_undefined_points_are_grey_and_listed_by_their_status(bare, style):
     labels = [text.get_text() for text in legend.get_texts()]
     expected = ["unstable (499)", "stable (1,349)", "no motion (50)", "undecided (1)", "failed (100)",
                 "outside the domain (1)"]  # fmt: skip
-    assert labels == (expected if style == "screen" else [label.partition(" (")[0] for label in expected])
+    assert labels == (
+        expected if style == "screen" else [label.partition(" (")[0] for label in expected]
+    )
     patch, mesh = legend.legend_handles[2], figure.axes[0].collections[0]
     assert to_hex(patch.get_facecolor()).upper() == palette.GREYS[0] and not patch.get_hatch()
     drawn = mesh.cmap(mesh.norm(mesh.get_array().reshape(50, 40)))[5, [10, 12]]
@@ -91,7 +102,10 @@ def test_undefined_points_are_grey_in_a_large_map_too(bare, monkeypatch):
     assert "no motion (50)" in labels and "undecided (1)" in labels
     mesh = figure.axes[0].collections[0]
     drawn = mesh.cmap(mesh.norm(mesh.get_array()))[2]
-    assert to_hex(drawn[5]).upper() == palette.GREYS[0] and to_hex(drawn[12]).upper() == palette.COLOURS[1]
+    assert (
+        to_hex(drawn[5]).upper() == palette.GREYS[0]
+        and to_hex(drawn[12]).upper() == palette.COLOURS[1]
+    )
     plt.close(figure)
 
 
@@ -100,7 +114,8 @@ def test_a_row_shows_undefined_points_apart(bare):
     axes = figure.axes[0]
     names = [label.get_text() for label in axes.get_yticklabels()]
     assert names == ["undecided", "unstable", "stable", "marginal", "no motion"]
-    assert [line.get_xdata().size for line in axes.lines[:5]] == [0, 9, 29, 0, 1]  # one is outside the domain
+    # one is outside the domain
+    assert [line.get_xdata().size for line in axes.lines[:5]] == [0, 9, 29, 0, 1]
     plt.close(figure)
 
 
@@ -109,7 +124,13 @@ def test_a_large_map_is_reduced_for_the_picture_and_counted_in_full(toy, monkeyp
     monkeypatch.setattr(maps, "MAX_CELLS", 20)
     figure = figures.draw(toy)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["unstable (499)", "stable (1,399)", "undecided (1)", "failed (100)", "outside the domain (1)"]
+    assert labels == [
+        "unstable (499)",
+        "stable (1,399)",
+        "undecided (1)",
+        "failed (100)",
+        "outside the domain (1)",
+    ]
     assert figure.axes[0].collections[0].get_array().shape == (17, 20)
     plt.close(figure)
 
@@ -122,7 +143,8 @@ def test_the_colours_differ_for_the_colour_blind_and_in_grey():
         return min(abs(a - b) for i, a in enumerate(values) for b in values[:i])
 
     assert apart(grey(*palette.COLOURS[:2], palette.UNDECIDED)) > 0.25
-    assert apart(grey(palette.COLOURS[1], palette.UNDECIDED, palette.GREYS[0], "white")) > 0.15  # not hatched in print
+    # not hatched in print
+    assert apart(grey(palette.COLOURS[1], palette.UNDECIDED, palette.GREYS[0], "white")) > 0.15
     assert apart(grey(*palette.GREYS)) > 0.1 and not set(palette.GREYS) & set(palette.COLOURS)
 
 
@@ -131,7 +153,9 @@ def test_any_variable_can_be_drawn(surveyed, tmp_path, name):
     ds = survey.open(surveyed)
     figures.save(ds, tmp_path / "map.png", name)
     figures.save(ds.isel(t=-1), tmp_path / "curve.png", name)
-    assert all((tmp_path / file).read_bytes()[:4] == b"\x89PNG" for file in ("map.png", "curve.png"))
+    assert all(
+        (tmp_path / file).read_bytes()[:4] == b"\x89PNG" for file in ("map.png", "curve.png")
+    )
 
 
 def test_a_third_axis_is_named_with_its_place(surveyed):
@@ -157,9 +181,15 @@ def test_a_row_of_verdicts_is_drawn_by_its_names(toy):
 
 def test_for_papers_verdicts_are_hatched_in_columns_and_fonts_embedded(toy, tmp_path):
     figure = figures.draw(toy, style="paper", width="double")
-    assert figure.get_size_inches()[0] == pytest.approx(175 / 25.4, abs=0.01) and not figure.axes[0].get_title()
+    assert (
+        figure.get_size_inches()[0] == pytest.approx(175 / 25.4, abs=0.01)
+        and not figure.axes[0].get_title()
+    )
     legend = figure.legends[0]
-    hatches = {t.get_text(): p.get_hatch() for t, p in zip(legend.get_texts(), legend.get_patches(), strict=False)}
+    hatches = {
+        t.get_text(): p.get_hatch()
+        for t, p in zip(legend.get_texts(), legend.get_patches(), strict=False)
+    }
     assert hatches["unstable"] == "//////" and not hatches["stable"]
     assert figure.axes[0].get_ylabel() == r"ratio, $\rho$ (rad)"
     figures.save(toy, tmp_path / "map.pdf", style="paper")
@@ -184,10 +214,14 @@ def test_hatching_follows_the_edges_of_cells(toy):
     (path,) = axes.collections[0].get_paths()
     middles = [0.5 * (v[1:] + v[:-1]) for v in (one.k.values, one.rho.values)]
     for corner in np.unique(path.vertices.round(12), axis=0):
-        assert all(np.isclose(value, edges).any() for value, edges in zip(corner, middles, strict=True))
+        assert all(
+            np.isclose(value, edges).any() for value, edges in zip(corner, middles, strict=True)
+        )
 
 
-LONG = "Is this motion, whose name is long, in this system, whose name is longer still, a stable one?"
+LONG = (
+    "Is this motion, whose name is long, in this system, whose name is longer still, a stable one?"
+)
 
 
 @pytest.mark.parametrize(
@@ -203,7 +237,12 @@ def test_nothing_is_clipped_in_narrow_axes(bare, columns, size, style):
     whole = figure.bbox.padded(2)
     for axes in panels[0]:
         legends = [axes.get_legend(), *figure.legends]
-        for text in (axes.title, axes.xaxis.label, axes.yaxis.label, *(t for g in legends if g for t in g.get_texts())):
+        for text in (
+            axes.title,
+            axes.xaxis.label,
+            axes.yaxis.label,
+            *(t for g in legends if g for t in g.get_texts()),
+        ):
             box = text.get_window_extent()
             assert not text.get_text() or (whole.x0 <= box.x0 and box.x1 <= whole.x1), text
             assert not text.get_text() or (whole.y0 <= box.y0 and box.y1 <= whole.y1), text

@@ -1,4 +1,6 @@
-"""What pictures say: labels without repetition, one meaning for one colour, lines at |D| = 2, ensembles, error bars."""
+"""What pictures say: labels without repetition, one meaning for one colour, lines at |D| = 2,
+ensembles, error bars.
+"""
 
 import matplotlib
 import numpy as np
@@ -18,36 +20,53 @@ def ds():
 
 
 def test_a_symbol_stands_once_and_the_unit_on_its_line():
-    named = xr.DataArray(0.0, name="delta", attrs={"long_name": "delta", "symbol": r"\delta", "units": "1"})
+    named = xr.DataArray(
+        0.0, name="delta", attrs={"long_name": "delta", "symbol": r"\delta", "units": "1"}
+    )
     assert label_of(named) == r"$\delta$"
-    long = xr.DataArray(0.0, name="x", attrs={"long_name": "a long name of a quantity", "symbol": "x", "units": "rad"})
+    long = xr.DataArray(
+        0.0,
+        name="x",
+        attrs={"long_name": "a long name of a quantity", "symbol": "x", "units": "rad"},
+    )
     for width in range(10, 40):
         assert "quantity, $x$ (rad)" in label_of(long, width)
 
 
-@pytest.mark.parametrize(("units", "shown"), [("rad s-1", "(rad s⁻¹)"), ("m2 s-2", "(m² s⁻²)"), ("kg", "(kg)")])
+@pytest.mark.parametrize(
+    ("units", "shown"), [("rad s-1", "(rad s⁻¹)"), ("m2 s-2", "(m² s⁻²)"), ("kg", "(kg)")]
+)
 def test_units_have_their_powers_raised(units, shown):
-    rate = xr.DataArray(0.0, name="n", attrs={"long_name": "rate", "symbol": r"\Omega", "units": units})
+    rate = xr.DataArray(
+        0.0, name="n", attrs={"long_name": "rate", "symbol": r"\Omega", "units": units}
+    )
     assert label_of(rate).replace("\N{NO-BREAK SPACE}", " ") == rf"rate, $\Omega$ {shown}"
 
 
 def test_the_number_of_an_orbit_stands_in_the_title_where_it_tells_it_from_others(ds):
-    for number, words in ((-1.0, "stability of the linear motion"), (1.0, "stability of the linear motion\ni = 1")):
+    for number, words in (
+        (-1.0, "stability of the linear motion"),
+        (1.0, "stability of the linear motion\ni = 1"),
+    ):
         branch = xr.DataArray(number, name="branch", attrs={"symbol": "i"})
-        assert title_of(ds.assign_attrs(title=""), ds.verdict.assign_coords(branch=branch)).strip() == words.replace(
-            "i = 1", "$i = 1$"
-        )
+        assert title_of(
+            ds.assign_attrs(title=""), ds.verdict.assign_coords(branch=branch)
+        ).strip() == words.replace("i = 1", "$i = 1$")
 
 
 def test_titles_have_no_internals_and_repeat_nothing(ds):
     shown = ds.assign_attrs(
-        title="A map, stability of the linear motion", options="question=fate, direction=1, body=prolate"
+        title="A map, stability of the linear motion",
+        options="question=fate, direction=1, body=prolate",
     )
     assert title_of(shown, shown.verdict) == "A map, stability of the linear motion (prolate)"
 
 
 def test_orange_means_unstable_alone():
-    assert palette.colours_of({"undecided": -1, "unstable": 0, "stable": 1})["unstable"] == palette.COLOURS[0]
+    assert (
+        palette.colours_of({"undecided": -1, "unstable": 0, "stable": 1})["unstable"]
+        == palette.COLOURS[0]
+    )
     fates = survey.scenes.load("gyrostat").OUTPUTS
     for output in fates:
         if output.flags is not None:
@@ -63,7 +82,9 @@ def test_one_colour_has_one_meaning(scene):
         if output.flags is None:
             continue
         colours = palette.colours_of(output.flags)
-        meant = {name: colours[name] for name in output.flags if name not in ("undecided", "ok", "none")}
+        meant = {
+            name: colours[name] for name in output.flags if name not in ("undecided", "ok", "none")
+        }
         assert len(set(meant.values())) == len(meant)
         for name, colour in meant.items():
             assert colour != palette.COLOURS[0] or "unstable" in name, name
@@ -73,9 +94,14 @@ def test_one_colour_has_one_meaning(scene):
 def test_the_discriminant_has_lines_at_2_and_a_diverging_map(ds):
     axes = ds.survey.map("discriminant")
     lines = [c for c in axes.collections if type(c).__name__ == "QuadContourSet"]
-    assert [sorted(c.levels) for c in lines] == [[-2.0, 2.0]] and axes.collections[0].get_cmap().name == "RdBu_r"
+    assert [sorted(c.levels) for c in lines] == [[-2.0, 2.0]] and axes.collections[
+        0
+    ].get_cmap().name == "RdBu_r"
     row = ds.survey.slice(q=0.5).survey.map("discriminant")
-    assert sorted(line.get_ydata()[0] for line in row.lines if len(set(line.get_ydata())) == 1) == [-2.0, 2.0]
+    assert sorted(line.get_ydata()[0] for line in row.lines if len(set(line.get_ydata())) == 1) == [
+        -2.0,
+        2.0,
+    ]
 
 
 def test_error_bars_are_drawn(ds):
@@ -87,7 +113,9 @@ def test_error_bars_are_drawn(ds):
 
 def test_ensembles_are_scattered_over_their_parameters():
     random = np.random.default_rng(1)
-    points = {name: xr.DataArray(random.uniform(0.0, 2.0, 40), dims="sample") for name in ("a", "q")}
+    points = {
+        name: xr.DataArray(random.uniform(0.0, 2.0, 40), dims="sample") for name in ("a", "q")
+    }
     made = survey.evaluate("mathieu", **points)
     axes = made.survey.map()
     assert axes.get_xlabel().endswith("$a$") and axes.get_ylabel().endswith("$q$")
@@ -97,16 +125,30 @@ def test_ensembles_are_scattered_over_their_parameters():
 
 
 def test_narrow_tongues_are_lines_in_the_colour_of_instability(tmp_path):
-    """Edges of tongues narrower than the grid coincide: between their dashes the tongue itself is seen, undotted."""
-    axes = {"a": {"start": 0.5, "stop": 10.0, "num": 12}, "q": {"start": 0.1, "stop": 1.0, "num": 4}}
-    made = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "tongues.nc")
+    """Edges of tongues narrower than the grid coincide: between their dashes the tongue itself is
+    seen, undotted.
+    """
+    axes = {
+        "a": {"start": 0.5, "stop": 10.0, "num": 12},
+        "q": {"start": 0.1, "stop": 1.0, "num": 4},
+    }
+    made = survey.run(
+        {"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}},
+        output=tmp_path / "tongues.nc",
+    )
     for name, colour in (("verdict", palette.COLOURS[0]), ("exponent", None)):
         dashed = [line for line in made.survey.map(name).lines if line.is_dashed()]
         assert dashed and {line.get_gapcolor() for line in dashed} == {colour}
 
 
 def test_limits_and_colour_maps_are_checked_for_verdicts_too(ds):
-    for wrong in ({"vmin": "a"}, {"vmin": 2, "vmax": 1}, {"vmax": np.inf}, {"cmap": "virids"}, {"cmap": 3}):
+    for wrong in (
+        {"vmin": "a"},
+        {"vmin": 2, "vmax": 1},
+        {"vmax": np.inf},
+        {"cmap": "virids"},
+        {"cmap": 3},
+    ):
         for name in ("verdict", "exponent"):
             with pytest.raises(survey.BadInput):
                 ds.survey.map(name, **wrong)

@@ -31,7 +31,9 @@ def test_the_band_is_one_bar_wide_on_either_side(drawn):
     corners = np.concatenate([path.vertices for path in drawn.collections[0].get_paths()])
     for x in X[[0, 1, 3, 4]]:
         heights = corners[np.isclose(corners[:, 0], x), 1]
-        assert np.isclose(heights.min(), x**2 - 0.1 * x) and np.isclose(heights.max(), x**2 + 0.1 * x)
+        assert np.isclose(heights.min(), x**2 - 0.1 * x) and np.isclose(
+            heights.max(), x**2 + 0.1 * x
+        )
 
 
 def test_points_without_an_answer_are_marked(drawn):
@@ -54,7 +56,10 @@ def test_a_verdict_of_a_single_point_is_ringed_and_named():
     x = np.linspace(0.0, 1.0, 101)
     verdict = np.where(x < 0.6, 1, 0).astype(np.int8)
     verdict[37] = 2
-    flags = {"flag_values": np.array([0, 1, 2], np.int8), "flag_meanings": "unstable stable resonant"}
+    flags = {
+        "flag_values": np.array([0, 1, 2], np.int8),
+        "flag_meanings": "unstable stable resonant",
+    }
     axes = profile(x, verdict=(verdict, flags))
     rings = [line for line in axes.lines if line.get_marker() == "o"]
     assert [line.get_xdata().tolist() for line in rings] == [[x[37]]]
@@ -76,8 +81,13 @@ def test_poles_are_gaps_with_marks_on_a_symmetric_logarithmic_axis():
 
 
 def test_boundaries_on_the_only_axis_are_lines_by_kind():
-    """Edges of tongues look as on maps and share an entry of the legend; others are dotted and bear their names."""
-    kinds = {"flag_values": np.array([0, 2, 9], np.int8), "flag_meanings": "even_antiperiodic even_periodic a02_is_0"}
+    """Edges of tongues look as on maps and share an entry of the legend; others are dotted and bear
+    their names.
+    """
+    kinds = {
+        "flag_values": np.array([0, 2, 9], np.int8),
+        "flag_meanings": "even_antiperiodic even_periodic a02_is_0",
+    }
     ds = xr.Dataset(
         {
             "y": ("x", X**2, {"long_name": "square", "units": "1"}),

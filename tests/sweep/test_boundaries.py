@@ -20,7 +20,10 @@ from survey.sweep import boundaries, plan
 WORKFLOW = {
     "scene": "satellite",
     "options": {"body": "oblate"},
-    "axes": {"k": {"start": 0.1, "stop": 0.8, "num": 5}, "rho": {"start": 0.3, "stop": 2.2, "num": 60}},
+    "axes": {
+        "k": {"start": 0.1, "stop": 0.8, "num": 5},
+        "rho": {"start": 0.3, "stop": 2.2, "num": 60},
+    },
     "output": {"variables": ["verdict"]},
     "boundaries": {},
 }
@@ -36,7 +39,9 @@ def path(tmp_path_factory):
 def test_the_edges_lie_where_the_verdict_changes(path):
     ds = xr.load_dataset(path)
     assert reading.check(path) == [] and ds.edge_count.attrs["sample_dimension"] == "edge"
-    assert ds.edge_complete.values.tolist() == [1] * 5 and int(ds.edge_count.sum()) == ds.sizes["edge"]
+    assert (
+        ds.edge_complete.values.tolist() == [1] * 5 and int(ds.edge_count.sum()) == ds.sizes["edge"]
+    )
     ends = np.cumsum(ds.edge_count.values)
     for row, (last, number) in enumerate(zip(ends, ds.edge_count.values, strict=True)):
         own = ds.edge_position.values[last - number : last]
@@ -51,7 +56,9 @@ def test_the_plan_counts_rows_and_bytes(path):
     planned, ds = plan.plan(check(WORKFLOW, output=path))["edges"], xr.load_dataset(path)
     assert planned["rows"] == ds.sizes["k"]
     for dim, key in (("edge", "bytes_per_edge"), ("curve_point", "bytes_per_curve_point")):
-        assert planned[key] * ds.sizes[dim] == sum(v.nbytes for v in ds.variables.values() if v.dims == (dim,))
+        assert planned[key] * ds.sizes[dim] == sum(
+            v.nbytes for v in ds.variables.values() if v.dims == (dim,)
+        )
 
 
 def test_the_tongue_n_2_opens_with_half_the_square(path):
@@ -65,7 +72,10 @@ def test_the_tongue_n_2_opens_with_half_the_square(path):
 
 def test_each_edge_lies_on_its_curve(path):
     ds = xr.load_dataset(path)
-    assert ds.curve_count.attrs["sample_dimension"] == "curve_point" and int(ds.curve_count.sum()) == ds.curve_k.size
+    assert (
+        ds.curve_count.attrs["sample_dimension"] == "curve_point"
+        and int(ds.curve_count.sum()) == ds.curve_k.size
+    )
     assert (ds.curve_complete == 1).all() and (ds.curve_position_error < 1e-13).all()
     assert (ds.edge_curve >= 0).all()
     np.testing.assert_array_equal(ds.edge_class, ds.curve_class[ds.edge_curve])
@@ -73,7 +83,9 @@ def test_each_edge_lies_on_its_curve(path):
     ends = np.cumsum(ds.curve_count.values)
     k = np.repeat(ds.k.values, ds.edge_count.values)
     for edge in range(ds.sizes["edge"]):
-        last, number = (values[int(ds.edge_curve[edge])] for values in (ends, ds.curve_count.values))
+        last, number = (
+            values[int(ds.edge_curve[edge])] for values in (ends, ds.curve_count.values)
+        )
         own = slice(last - number, last)
         order = np.argsort(ds.curve_k.values[own])
         along = np.interp(k[edge], ds.curve_k.values[own][order], ds.curve_rho.values[own][order])
@@ -83,7 +95,10 @@ def test_each_edge_lies_on_its_curve(path):
 def test_a_curve_between_the_rows_is_found_and_its_fold_in_the_file(tmp_path):
     """Oblate tongue n = 2: its upper edge has its greatest rho, 1.149, between these rows of rho."""
     axes = {"rho": {"values": [1.1487, 1.1493]}, "k": {"start": 0.3, "stop": 0.95, "num": 4}}
-    ds = survey.run(WORKFLOW | {"axes": axes, "boundaries": {"axis": "k"}, "output": {}}, output=tmp_path / "fold.nc")
+    ds = survey.run(
+        WORKFLOW | {"axes": axes, "boundaries": {"axis": "k"}, "output": {}},
+        output=tmp_path / "fold.nc",
+    )
     assert ds.sizes["fold"] == 1 and ds.fold_rho.attrs["ancillary_variables"] == "fold_rho_error"
     assert int(ds.curve_index[int(ds.fold_curve[0])]) == 2
     assert 1.1487 < float(ds.fold_rho[0]) < 1.1493 and float(ds.fold_rho_error[0]) < 1e-12
@@ -111,16 +126,26 @@ def test_they_are_drawn_over_the_map(path):
 
 
 def test_a_map_without_tongues_has_empty_curves(tmp_path):
-    axes = {"q": {"start": 0.0, "stop": 0.1, "num": 3}, "a": {"start": -3.0, "stop": -2.0, "num": 4}}
-    ds = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {}}, output=tmp_path / "none.nc")
-    assert ds.sizes["edge"] == ds.sizes["curve"] == ds.sizes["fold"] == 0 and (ds.edge_complete == 1).all()
+    axes = {
+        "q": {"start": 0.0, "stop": 0.1, "num": 3},
+        "a": {"start": -3.0, "stop": -2.0, "num": 4},
+    }
+    ds = survey.run(
+        {"scene": "mathieu", "axes": axes, "boundaries": {}}, output=tmp_path / "none.nc"
+    )
+    assert (
+        ds.sizes["edge"] == ds.sizes["curve"] == ds.sizes["fold"] == 0
+        and (ds.edge_complete == 1).all()
+    )
     figures.draw(survey.open(tmp_path / "none.nc"))
     plt.close("all")
 
 
 @pytest.mark.slow
 def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
-    """Inertia ratio 1 is left out, and named; all other edges are those of the eigenproblem in rho, both bodies'."""
+    """Inertia ratio 1 is left out, and named; all other edges are those of the eigenproblem in rho,
+    both bodies'.
+    """
     (tmp_path / "through.toml").write_text(
         'scene = "satellite"\naxes.amplitude.values = [0.3, 1.1]\n'
         "axes.inertia_ratio = {start = 0.0, stop = 2.0, num = 20}\n"
@@ -128,11 +153,21 @@ def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
     )
     with pytest.raises(SystemExit, match="0"):
         main(["run", str(tmp_path / "through.toml"), "-o", str(tmp_path / "through.nc")])
-    assert "edges: not searched for inertia_ratio from 0.998 to 1.002, where they accumulate" in capsys.readouterr().err
+    assert (
+        "edges: not searched for inertia_ratio from 0.998 to 1.002, where they accumulate"
+        in capsys.readouterr().err
+    )
     ds = xr.load_dataset(tmp_path / "through.nc")
-    assert ds.attrs["edge_left_out"] == "inertia_ratio from 0.998 to 1.002" and ds.edge_complete.values.all()
+    assert (
+        ds.attrs["edge_left_out"] == "inertia_ratio from 0.998 to 1.002"
+        and ds.edge_complete.values.all()
+    )
     row = np.repeat([0, 1], ds.edge_count.values)
-    alpha, kind, error = ds.edge_position.values, ds.edge_class.values, ds.edge_position_error.values
+    alpha, kind, error = (
+        ds.edge_position.values,
+        ds.edge_class.values,
+        ds.edge_position_error.values,
+    )
     for number, amplitude in enumerate(ds.amplitude.values):
         for body, side in (("prolate", alpha < 1), ("oblate", alpha > 1)):
             own = (row == number) & side
@@ -140,40 +175,68 @@ def test_rows_through_a_value_where_tongues_accumulate(tmp_path, capsys):
             true = np.array(eigenproblem(body, np.sin(amplitude), 3**-0.5, 0.006**-0.5, 64))
             order, other = np.lexsort((rho, kind[own])), np.lexsort(true.T)
             np.testing.assert_array_equal(kind[own][order], true[other, 1])
-            assert (abs(rho[order] - true[other, 0]) <= 1e-12 + 1.5 * rho[order] ** 3 * error[own][order]).all()
+            assert (
+                abs(rho[order] - true[other, 0])
+                <= 1e-12 + 1.5 * rho[order] ** 3 * error[own][order]
+            ).all()
 
 
 @pytest.mark.parametrize(
     ("name", "axis"),
     # k = 1 would be the middle one of the columns that are searched
-    [("k", {"start": 0.0, "stop": 2.0, "num": 41}), ("one_minus_k", {"start": 0.5, "stop": -0.5, "num": 40})],
+    [
+        ("k", {"start": 0.0, "stop": 2.0, "num": 41}),
+        ("one_minus_k", {"start": 0.5, "stop": -0.5, "num": 40}),
+    ],
 )
 def test_rows_through_the_separatrix(tmp_path, name, axis):
     """On both sides of k = 1 the edges lie where the verdict changes, and no column is searched on it."""
     axes = {"rho": {"values": [-1.2, 0.6, 1.5]}, name: axis}
-    ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}, output=tmp_path / "both.nc")
+    ds = survey.run(
+        {"scene": "satellite", "axes": axes, "boundaries": {"axis": name}},
+        output=tmp_path / "both.nc",
+    )
     low, high = map(float, ds.attrs["edge_left_out"].removeprefix(f"{name} from ").split(" to "))
     assert ds.edge_complete.values.all()
     middle = (1.0 - axis["start"]) / (axis["stop"] - axis["start"]) if name == "k" else 0.5
-    pieces = boundaries._pieces(check({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}), name)
-    assert (abs(boundaries._columns(pieces) - middle) > 1e-4).all() and boundaries._columns(pieces).size == 9
+    pieces = boundaries._pieces(
+        check({"scene": "satellite", "axes": axes, "boundaries": {"axis": name}}), name
+    )
+    assert (abs(boundaries._columns(pieces) - middle) > 1e-4).all() and boundaries._columns(
+        pieces
+    ).size == 9
     ends = np.cumsum(ds.edge_count.values)
     places = np.sort(ds[name].values)
-    own = [ds.edge_position.values[last - count : last] for last, count in zip(ends, ds.edge_count.values, strict=True)]
+    own = [
+        ds.edge_position.values[last - count : last]
+        for last, count in zip(ends, ds.edge_count.values, strict=True)
+    ]
     for side in (places[places < low], places[places > high]):
         for row, rho in enumerate(ds.rho.values):
             inside = np.histogram(own[row], side)[0]
-            verdicts = survey.evaluate("satellite", **{name: side}, rho=rho, variables=["verdict"]).verdict.values
+            verdicts = survey.evaluate(
+                "satellite", **{name: side}, rho=rho, variables=["verdict"]
+            ).verdict.values
             np.testing.assert_array_equal(inside % 2 == 1, np.diff(verdicts) != 0)
 
 
 def test_what_is_left_out_across_the_rows_is_told(tmp_path):
-    axes = {"k": {"start": 0.8, "stop": 1.2, "num": 6}, "rho": {"start": 1.0, "stop": 1.2, "num": 9}}
-    ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {"axis": "rho"}}, output=tmp_path / "across.nc")
+    axes = {
+        "k": {"start": 0.8, "stop": 1.2, "num": 6},
+        "rho": {"start": 1.0, "stop": 1.2, "num": 9},
+    }
+    ds = survey.run(
+        {"scene": "satellite", "axes": axes, "boundaries": {"axis": "rho"}},
+        output=tmp_path / "across.nc",
+    )
     low, high = map(float, ds.attrs["edge_left_out"].removeprefix("k from ").split(" to "))
     assert (low, high) == (0.9996, 1.0004)
     inside = (ds.curve_k.values > low + 1e-9) & (ds.curve_k.values < high - 1e-9)
-    assert ds.sizes["curve"] > 0 and not inside.any() and ds.attrs["curves_lost"] == (ds.curve_complete == 0).sum()
+    assert (
+        ds.sizes["curve"] > 0
+        and not inside.any()
+        and ds.attrs["curves_lost"] == (ds.curve_complete == 0).sum()
+    )
 
 
 def test_a_value_that_rounds_to_the_one_left_out(tmp_path):
@@ -198,25 +261,36 @@ def test_lost_curves_are_told(tmp_path, capsys):
 
 
 def test_no_edge_is_missed_at_the_end_of_an_axis(tmp_path):
-    """Edges accumulate towards 1 - k = 1e-12, on an axis 5e11 times as long: two for each tongue passed in all."""
+    """Edges accumulate towards 1 - k = 1e-12, on an axis 5e11 times as long: two for each tongue
+    passed in all.
+    """
     for low, rho in ((1e-9, 1.5), (1e-12, 1.5), (1e-12, 0.7)):
         axes = {"one_minus_k": {"start": low, "stop": 0.5, "num": 4}, "rho": rho}
-        ds = survey.run({"scene": "satellite", "axes": axes, "boundaries": {}}, output=tmp_path / f"{low}-{rho}.nc")
+        ds = survey.run(
+            {"scene": "satellite", "axes": axes, "boundaries": {}},
+            output=tmp_path / f"{low}-{rho}.nc",
+        )
         assert int(ds.edge_complete) == 1
         tongues = np.floor(2 * ds.rotation_number.values)
-        assert (ds.verdict.values[[0, -1]] == 1).all() and int(ds.edge_count) == 2 * (tongues[0] - tongues[-1])
+        assert (ds.verdict.values[[0, -1]] == 1).all() and int(ds.edge_count) == 2 * (
+            tongues[0] - tongues[-1]
+        )
 
 
 def test_a_map_of_one_row_has_edges_and_no_curves(tmp_path, recwarn):
     axes = {"q": {"values": [1.0]}, "a": {"start": -1.0, "stop": 10.0, "num": 4}}
-    ds = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "one.nc")
+    ds = survey.run(
+        {"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "one.nc"
+    )
     assert ds.edge_count.values.tolist() == [7] and "curve_count" not in ds and not recwarn.list
     plt.close(figures.draw(ds))
 
 
 def test_a_row_of_its_own(tmp_path):
     axes = {"a": {"start": -1.0, "stop": 10.0, "num": 4}, "q": 1.0}
-    ds = survey.run({"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "row.nc")
+    ds = survey.run(
+        {"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "row.nc"
+    )
     assert ds.edge_index.values.tolist() == [0, 1, 1, 2, 2, 3, 3] and int(ds.edge_complete) == 1
 
 
@@ -227,9 +301,15 @@ def test_a_row_of_its_own(tmp_path):
             {"axes": WORKFLOW["axes"] | {"rho": {"values": [0.5]}}},
             "boundaries: the axis rho has one value, but edges need a range",
         ),
-        ({"boundaries": {"axis": "rhoo"}}, r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'"),
+        (
+            {"boundaries": {"axis": "rhoo"}},
+            r"boundaries.axis: unknown axis 'rhoo'; did you mean 'rho'",
+        ),
         ({"boundaries": {"axes": "rho"}}, r"unknown key boundaries.axes; did you mean 'axis'"),
-        ({"axes": {"k": 0.5, "rho": 1.0}}, r"boundaries: they are drawn along an axis, and there is none"),
+        (
+            {"axes": {"k": 0.5, "rho": 1.0}},
+            r"boundaries: they are drawn along an axis, and there is none",
+        ),
         (
             {
                 "scene": "brun",

@@ -1,4 +1,6 @@
-"""A sweep on a dask cluster: dask's own commands, with a shared folder and without, workers and schedulers that die."""
+"""A sweep on a dask cluster: dask's own commands, with a shared folder and without, workers and
+schedulers that die.
+"""
 
 import dataclasses
 import os
@@ -41,14 +43,28 @@ def worker(file, *words, **more):
     """A worker that lives in another folder."""
     away = file.parent / "away"
     away.mkdir(exist_ok=True)
-    return dask("worker", "--scheduler-file", file, "--nthreads", 1, "--no-dashboard", *words, cwd=away, **more)
+    return dask(
+        "worker",
+        "--scheduler-file",
+        file,
+        "--nthreads",
+        1,
+        "--no-dashboard",
+        *words,
+        cwd=away,
+        **more,
+    )
 
 
 @pytest.fixture
 def scheduler(tmp_path):
-    """(path of the scheduler's file, [its process]), to which a test adds the workers; all are killed at the end."""
+    """(path of the scheduler's file, [its process]), to which a test adds the workers; all are
+    killed at the end.
+    """
     file = tmp_path / "scheduler.json"
-    processes = [dask("scheduler", "--scheduler-file", file, "--port", 0, "--no-dashboard", cwd=tmp_path)]
+    processes = [
+        dask("scheduler", "--scheduler-file", file, "--port", 0, "--no-dashboard", cwd=tmp_path)
+    ]
     wait_for(file.exists)
     yield file, processes
     for process in reversed(processes):
@@ -73,7 +89,9 @@ def wait_for(what, seconds=60.0):
 
 def start(folder, file, *words, **more):
     command = [sys.executable, "-c", PROGRAM, "run", "small.toml", "--scheduler", str(file), *words]
-    return subprocess.Popen(command, cwd=folder, env=os.environ | more, stderr=subprocess.PIPE, text=True)
+    return subprocess.Popen(
+        command, cwd=folder, env=os.environ | more, stderr=subprocess.PIPE, text=True
+    )
 
 
 @pytest.mark.slow
@@ -82,7 +100,9 @@ def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
     stderr = running.communicate(timeout=180)[1]
     assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in stderr, stderr
     assert reading.check(small.with_suffix(".nc")) == []
-    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc")))
+    )
 
 
 @pytest.mark.slow
@@ -93,20 +113,26 @@ def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
     wait_for(lambda: len(list(blocks.glob("*.block"))) > 5)
     cluster[1][0].kill()
     stderr = running.communicate(timeout=120)[1]
-    assert running.returncode == 4 and stderr.splitlines()[-1].startswith("survey: the dask cluster at tcp://"), stderr
+    assert running.returncode == 4 and stderr.splitlines()[-1].startswith(
+        "survey: the dask cluster at tcp://"
+    ), stderr
     assert len(list(blocks.glob("*.block"))) > 5
 
 
 @pytest.mark.slow
 def test_workers_with_too_little_memory_end_the_run_which_can_go_on(scheduler, small, surveyed):
-    """The limit kills every worker as it imports or compiles; a nanny that is late, on a busy machine, gives up."""
+    """The limit kills every worker as it imports or compiles; a nanny that is late, on a busy
+    machine, gives up.
+    """
     file, processes = scheduler
     processes += [worker(file, "--memory-limit", "120MB") for _ in range(2)]
     running = start(small.parent, file, "--quiet", "--block-timeout", "60")
     stderr = running.communicate(timeout=300)[1]
     assert running.returncode == 4, stderr
     reasons = "keep dying, or pausing .* without finishing a block|lost its last worker"
-    assert re.fullmatch(rf"survey: .* ({reasons}).* run the command again to resume", stderr.splitlines()[-1]), stderr
+    assert re.fullmatch(
+        rf"survey: .* ({reasons}).* run the command again to resume", stderr.splitlines()[-1]
+    ), stderr
     for process in processes[1:]:
         process.kill()
     processes.append(worker(file))
@@ -114,12 +140,16 @@ def test_workers_with_too_little_memory_end_the_run_which_can_go_on(scheduler, s
     stderr = running.communicate(timeout=180)[1]
     assert running.returncode == 0, stderr
     assert reading.check(small.with_suffix(".nc")) == []
-    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc")))
+    )
 
 
 @pytest.mark.slow
 def test_a_worker_that_freezes_does_not_hold_up_the_run(cluster, small, surveyed):
-    """Its nanny goes on, and starts another; one that has finished no block yet may take COMPILE_SECONDS more."""
+    """Its nanny goes on, and starts another; one that has finished no block yet may take
+    COMPILE_SECONDS more.
+    """
     many = ("--set", "axes.w0.num=100", "--set", "solver.method='dop853'")
     whole = start(small.parent, cluster[0], *many, "-o", "whole.nc")
     assert whole.wait(300) == 0
@@ -133,13 +163,25 @@ def test_a_worker_that_freezes_does_not_hold_up_the_run(cluster, small, surveyed
     assert running.returncode == 0, stderr
     assert "finished no block for more than 3 s; their blocks go to others" in stderr, stderr
     assert not frozen.is_running()
-    xr.testing.assert_equal(*(xr.load_dataset(small.parent / name).drop_attrs() for name in ("whole.nc", "small.nc")))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(small.parent / name).drop_attrs() for name in ("whole.nc", "small.nc"))
+    )
 
 
 def certificate(folder, name, days=2):
     """Settings of dask for all roles: a certificate that is its own authority, by openssl."""
     key, asked, cert = (folder / f"{name}.{suffix}" for suffix in ("key", "csr", "pem"))
-    new = ["req", "-new", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes", "-subj", f"/CN={name}"]
+    new = [
+        "req",
+        "-new",
+        "-newkey",
+        "ec",
+        "-pkeyopt",
+        "ec_paramgen_curve:P-256",
+        "-nodes",
+        "-subj",
+        f"/CN={name}",
+    ]
     signed = ["x509", "-req", "-in", asked, "-signkey", key, "-days", str(days), "-out", cert]
     for words in ([*new, "-keyout", key, "-out", asked], signed):
         subprocess.run(["openssl", *words], check=True, capture_output=True)
@@ -148,15 +190,31 @@ def certificate(folder, name, days=2):
         for role in ("SCHEDULER", "WORKER", "CLIENT")
         for what, file in (("CERT", cert), ("KEY", key))
     }
-    return {f"DASK_DISTRIBUTED__COMM__TLS__{what}": str(file) for what, file in {"CA_FILE": cert, **files}.items()}
+    return {
+        f"DASK_DISTRIBUTED__COMM__TLS__{what}": str(file)
+        for what, file in {"CA_FILE": cert, **files}.items()
+    }
 
 
 @pytest.mark.slow
 def test_a_cluster_with_tls(small, tmp_path, surveyed):
     if not shutil.which("openssl"):
         pytest.skip("needs openssl")
-    file, tls, other = tmp_path / "scheduler.json", certificate(tmp_path, "survey"), certificate(tmp_path, "other")
-    scheduler = ("scheduler", "--protocol", "tls", "--scheduler-file", file, "--port", 0, "--no-dashboard")
+    file, tls, other = (
+        tmp_path / "scheduler.json",
+        certificate(tmp_path, "survey"),
+        certificate(tmp_path, "other"),
+    )
+    scheduler = (
+        "scheduler",
+        "--protocol",
+        "tls",
+        "--scheduler-file",
+        file,
+        "--port",
+        0,
+        "--no-dashboard",
+    )
     processes = [dask(*scheduler, cwd=tmp_path, **tls)]
     try:
         wait_for(file.exists)
@@ -169,14 +227,24 @@ def test_a_cluster_with_tls(small, tmp_path, surveyed):
                 "requires TLS; set distributed.comm.tls: ca-file, client.cert and client.key in dask's configuration",
             ),
             ({ca: tls[ca]}, 2, "requires TLS; set"),
-            (tls | {ca: str(tmp_path / "absent.pem")}, 2, "cannot be used (No such file or directory)"),
+            (
+                tls | {ca: str(tmp_path / "absent.pem")},
+                2,
+                "cannot be used (No such file or directory)",
+            ),
             (tls | {ca: str(small)}, 2, "cannot be used ("),
-            (tls | {ca: other[ca]}, 4, "reject each other's TLS certificates (certificate verify failed"),
+            (
+                tls | {ca: other[ca]},
+                4,
+                "reject each other's TLS certificates (certificate verify failed",
+            ),
             (other | {ca: tls[ca]}, 4, "reject each other's TLS certificates ("),
         ):
             running = start(small.parent, file, "--quiet", **more)
             stderr = running.communicate(timeout=60)[1]
-            assert running.returncode == code and stderr.count("\n") == 1 and words in stderr, stderr
+            assert running.returncode == code and stderr.count("\n") == 1 and words in stderr, (
+                stderr
+            )
         running = start(small.parent, file, **tls)
         stderr = running.communicate(timeout=180)[1]
         assert running.returncode == 0 and "computed 6, reused 0 of 6 blocks" in stderr, stderr
@@ -184,7 +252,9 @@ def test_a_cluster_with_tls(small, tmp_path, surveyed):
         for process in reversed(processes):
             process.kill()
             process.wait()
-    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc")))
+    )
 
 
 @pytest.mark.slow
@@ -193,7 +263,16 @@ def test_an_expired_certificate_is_told_in_one_line(small, tmp_path):
         pytest.skip("needs openssl")
     expired = certificate(tmp_path, "old", days=-1)
     file = tmp_path / "scheduler.json"
-    scheduler = ("scheduler", "--protocol", "tls", "--scheduler-file", file, "--port", 0, "--no-dashboard")
+    scheduler = (
+        "scheduler",
+        "--protocol",
+        "tls",
+        "--scheduler-file",
+        file,
+        "--port",
+        0,
+        "--no-dashboard",
+    )
     process = dask(*scheduler, cwd=tmp_path, **expired)
     try:
         wait_for(file.exists)
@@ -210,7 +289,9 @@ def test_blocks_travel_where_no_folder_is_shared(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
     with Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
         blocks = cost.blocks_of(checked)
-        job = engine.Job(checked.scene, checked.request, checked.grid, kept, fingerprint.code_version())
+        job = engine.Job(
+            checked.scene, checked.request, checked.grid, kept, fingerprint.code_version()
+        )
         first = engine.numbered(0, blocks[0])
         far = pickle.loads(pickle.dumps(kept))
         assert far.folder.is_absolute()
@@ -231,14 +312,18 @@ def test_workers_that_see_another_disk_send_their_blocks(scheduler, small, surve
     away = file.parent / "work"
     away.mkdir()
     (away / small.name).write_text(small.read_text())
-    if subprocess.run(["unshare", "-m", "mount", "-t", "tmpfs", "none", away], capture_output=True).returncode:
+    if subprocess.run(
+        ["unshare", "-m", "mount", "-t", "tmpfs", "none", away], capture_output=True
+    ).returncode:
         pytest.skip("needs the right to mount a small tmpfs")
     hidden = ("unshare", "-m", "sh", "-c", f'mount -t tmpfs none "{away}" && exec "$0" "$@"')
     processes += [worker(file, before=hidden) for _ in range(2)]
     stderr = start(away, file).communicate(timeout=180)[1]
     assert "computed 6, reused 0 of 6 blocks" in stderr, stderr
     assert reading.check(away / "small.nc") == []
-    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, away / "small.nc")))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(path).drop_attrs() for path in (surveyed, away / "small.nc"))
+    )
 
 
 @pytest.mark.slow
@@ -250,22 +335,33 @@ def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
     processes.append(worker(file, PYTHONPATH=str(file.parent / "other")))
     running = start(small.parent, file, "--quiet")
     stderr = running.communicate(timeout=180)[1]
-    assert running.returncode == 4 and stderr.count("\n") == 1 and "runs different code (sources: " in stderr, stderr
+    assert (
+        running.returncode == 4
+        and stderr.count("\n") == 1
+        and "runs different code (sources: " in stderr
+    ), stderr
 
 
 def test_a_worker_with_other_code_is_refused(small, tmp_path):
     checked = workflow.read(small, output=tmp_path / "o.nc")
     job = engine.Job(
-        checked.scene, checked.request, checked.grid, None, fingerprint.code_version() | {"sources": "other"}
+        checked.scene,
+        checked.request,
+        checked.grid,
+        None,
+        fingerprint.code_version() | {"sources": "other"},
     )
     with pytest.raises(
-        Stopped, match=r"runs different code \(sources: \w+, this run: other\); install the same survey"
+        Stopped,
+        match=r"runs different code \(sources: \w+, this run: other\); install the same survey",
     ):
         job(engine.numbered(0, cost.blocks_of(checked)[0]))
 
 
 def queue(folder, *words, **more):
-    """The batch script as a queue would start it on one machine, with stand-ins for the queue's own commands."""
+    """The batch script as a queue would start it on one machine, with stand-ins for the queue's own
+    commands.
+    """
     commands = folder / "bin"
     commands.mkdir(exist_ok=True)
     for name, text in {"srun": 'exec "$@"', "scontrol": 'echo "$@" > requeued'}.items():
@@ -289,7 +385,9 @@ def test_the_batch_script_runs_a_sweep(small, surveyed):
     running = queue(small.parent)
     stderr = running.communicate(timeout=180)[1]
     assert running.returncode == 0, stderr
-    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc")))
+    )
     assert not list(small.parent.glob("scheduler-*")) and not (small.parent / "requeued").exists()
 
 
@@ -297,12 +395,18 @@ def test_the_batch_script_runs_a_sweep(small, surveyed):
 def test_the_batch_script_takes_the_settings_of_tls(small, tmp_path, surveyed):
     if not shutil.which("openssl"):
         pytest.skip("needs openssl")
-    running = queue(small.parent, **certificate(tmp_path, "survey"), DASK_DISTRIBUTED__COMM__DEFAULT_SCHEME="tls")
+    running = queue(
+        small.parent,
+        **certificate(tmp_path, "survey"),
+        DASK_DISTRIBUTED__COMM__DEFAULT_SCHEME="tls",
+    )
     file = small.parent / "scheduler-17.json"
     wait_for(lambda: file.exists() and "tls://" in file.read_text())
     stderr = running.communicate(timeout=180)[1]
     assert running.returncode == 0, stderr
-    xr.testing.assert_equal(*(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc"))))
+    xr.testing.assert_equal(
+        *(xr.load_dataset(path).drop_attrs() for path in (surveyed, small.with_suffix(".nc")))
+    )
 
 
 @pytest.mark.slow
@@ -314,4 +418,6 @@ def test_the_batch_script_stops_before_the_walltime_and_is_queued_again(small):
     running.terminate()
     stderr = running.communicate(timeout=60)[1]
     assert running.returncode == 143 and "finished blocks are safe" in stderr, stderr
-    assert (small.parent / "requeued").read_text() == "requeue 17\n" and list(blocks.glob("*.block"))
+    assert (small.parent / "requeued").read_text() == "requeue 17\n" and list(
+        blocks.glob("*.block")
+    )

@@ -44,7 +44,9 @@ READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
         ),
     ],
 )
-def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row, lane, variables, kernels):
+def test_the_map_reads_what_the_process_beside_it_compiles(
+    tmp_path, scene, row, lane, variables, kernels
+):
     text = WORKFLOW.format(scene=scene, row=row, lane=lane, variables=variables).replace("'", '"')
     (tmp_path / "map.toml").write_text(text)
     done = subprocess.run(
@@ -54,11 +56,16 @@ def test_the_map_reads_what_the_process_beside_it_compiles(tmp_path, scene, row,
     assert done.returncode == 0, done.stderr
     found = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
     assert found == dict(
-        zip(("hill_chain", "discriminants", "exponents", "transcendental"), (COMPILED, *kernels), strict=True)
+        zip(
+            ("hill_chain", "discriminants", "exponents", "transcendental"),
+            (COMPILED, *kernels),
+            strict=True,
+        )
     )
 
 
-# the call, and kernels that it must read from disk: another signature would be compiled a second time
+# the call, and kernels that it must read from disk: another signature would be compiled a second
+# time
 READING = """
 import importlib
 import numpy as np
@@ -76,7 +83,13 @@ OWN = """scene = survey.abel(
 )
 survey.evaluate(scene, question="portrait", a=0.3, I=0.5)"""
 STATE = 'survey.evaluate("brun", A=1.0, C=0.5, epsilon=0.3, theta0=1.0, p_theta0=0.1, p_psi=0.3, p_phi=0.2{more})'
-BRUN = ["lanes:wells", "lanes_double:begin", "lanes_double:go", "lanes_double:end", "brun_lanes:enter"]
+BRUN = [
+    "lanes:wells",
+    "lanes_double:begin",
+    "lanes_double:go",
+    "lanes_double:end",
+    "brun_lanes:enter",
+]
 FLOQUET = ["steps:_over", "steps:next_term", "steps:_missing", "steps:products"]
 DANBY = ["danby_double:chain", "traces_double:measure"]
 
@@ -86,9 +99,15 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
 @pytest.mark.parametrize(
     ("call", "kernels"),
     [
-        (GYROSTAT.format(more='question="abel", phi0=0.1, w0=2.0, phi=3.0'), [FLOWS + "_abels_in_angle"]),
+        (
+            GYROSTAT.format(more='question="abel", phi0=0.1, w0=2.0, phi=3.0'),
+            [FLOWS + "_abels_in_angle"],
+        ),
         (GYROSTAT.format(more='question="fate", phi0=0.1, w0=2.0'), [FLOWS + "flow_fates"]),
-        (GYROSTAT.format(more='question="portrait"'), [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"]),
+        (
+            GYROSTAT.format(more='question="portrait"'),
+            [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
+        ),
         (
             OWN,
             [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],

@@ -121,8 +121,12 @@ def test_a_task_without_end_stops_the_run_in_one_line(in_time, monkeypatch):
         return number
 
     heard = Heard()
-    with pytest.raises(Stopped, match=r"^a block took more than 1 s, twice; run .* --block-timeout"):
-        dispatch.on_processes(endless, NUMBERS, heard.finished, heard.died, 2, dispatch.Patience(1.0))
+    with pytest.raises(
+        Stopped, match=r"^a block took more than 1 s, twice; run .* --block-timeout"
+    ):
+        dispatch.on_processes(
+            endless, NUMBERS, heard.finished, heard.died, 2, dispatch.Patience(1.0)
+        )
     assert heard.dead == [] and len(heard.results) >= 5 and not multiprocessing.active_children()
 
 
@@ -139,10 +143,14 @@ def test_patience_is_measured_from_other_tasks_and_has_a_floor():
 
 @pytest.fixture
 def cluster():
-    """Two workers, new for each test: not every nanny replaces one that dies. A task is set aside after two deaths."""
+    """Two workers, new for each test: not every nanny replaces one that dies. A task is set aside
+    after two deaths.
+    """
     distributed = pytest.importorskip("distributed")
     with dask.config.set({"distributed.scheduler.allowed-failures": 1}):
-        with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        with distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster:
             yield cluster
 
 
@@ -193,7 +201,9 @@ def test_a_cluster_replaces_a_worker_that_is_frozen(cluster, in_time, monkeypatc
 
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
-        clusters.on_cluster(stuck, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(2.0))
+        clusters.on_cluster(
+            stuck, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(2.0)
+        )
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS]
 
 
@@ -208,11 +218,16 @@ def test_a_cluster_stops_for_a_task_without_end(cluster, in_time, monkeypatch, c
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
         words = (
-            r"^(3 workers .* one block for over 1 s without finishing it|.* lost its last worker .*); .*run .* again"
+            r"^(3 workers .* one block for over 1 s without finishing it|"
+            r".* lost its last worker .*); .*run .* again"
         )
-        with pytest.raises(Stopped, match=words):  # the second where dask does not restart a worker it has killed
-            clusters.on_cluster(endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0))
-    assert "finished no block for more than 1 s" in caplog.text  # so it was this program that killed the worker
+        # the second where dask does not restart a worker it has killed
+        with pytest.raises(Stopped, match=words):
+            clusters.on_cluster(
+                endless, NUMBERS, heard.finished, heard.died, client, dispatch.Patience(1.0)
+            )
+    # so it was this program that killed the worker
+    assert "finished no block for more than 1 s" in caplog.text
     assert heard.dead == [] and len(heard.results) >= 9
 
 
@@ -223,19 +238,35 @@ def test_a_cluster_whose_workers_all_die_stops_and_blames_no_task(cluster, in_ti
     heard = Heard()
     with clusters.client_of(cluster.scheduler_address) as client:
         with pytest.raises(Stopped, match=r"keep dying, or pausing .* give|lost its last worker"):
-            clusters.on_cluster(lambda _: die(), NUMBERS, heard.finished, heard.died, client, dispatch.Patience(20.0))
+            clusters.on_cluster(
+                lambda _: die(),
+                NUMBERS,
+                heard.finished,
+                heard.died,
+                client,
+                dispatch.Patience(20.0),
+            )
     assert heard.dead == [] and heard.results == []
 
 
-LIMIT = 700  # MB; a worker that holds more than 80 % of it takes no further tasks, its nanny kills it at 95 %
+# MB; a worker that holds more than 80 % of it takes no further tasks, its nanny kills it at 95 %
+LIMIT = 700
 
 
 @pytest.fixture
 def short_of_memory():
     """The address of a cluster of two workers with little memory."""
     distributed = pytest.importorskip("distributed")
-    small = {"n_workers": 2, "threads_per_worker": 1, "memory_limit": f"{LIMIT}MB", "dashboard_address": None}
-    with dask.config.set({"distributed.scheduler.allowed-failures": 1}), distributed.LocalCluster(**small) as cluster:
+    small = {
+        "n_workers": 2,
+        "threads_per_worker": 1,
+        "memory_limit": f"{LIMIT}MB",
+        "dashboard_address": None,
+    }
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        distributed.LocalCluster(**small) as cluster,
+    ):
         yield cluster.scheduler_address
 
 
@@ -255,7 +286,9 @@ def test_a_task_that_needs_too_much_memory_costs_itself_alone(short_of_memory, i
     heard = Heard()
     with clusters.client_of(short_of_memory) as client:
         clusters.on_cluster(greedy, NUMBERS, heard.finished, heard.died, client)
-    assert heard.dead == [4] and sorted(heard.results) == sorted(n * n if n != 4 else -4 for n in NUMBERS)
+    assert heard.dead == [4] and sorted(heard.results) == sorted(
+        n * n if n != 4 else -4 for n in NUMBERS
+    )
 
 
 @pytest.mark.slow
@@ -272,12 +305,18 @@ def test_tasks_that_all_need_too_much_memory_stop_the_run(short_of_memory, in_ti
     words = r"keep dying, or pausing for lack of memory, without finishing a block; give .* again|lost its last worker"
     with clusters.client_of(short_of_memory) as client:
         with pytest.raises(Stopped, match=words):
-            clusters.on_cluster(greedy, range(24), heard.finished, heard.died, client, dispatch.Patience(20.0))
-    assert heard.dead == [] and set(heard.results) and set(heard.results) <= {n * n for n in range(6)}
+            clusters.on_cluster(
+                greedy, range(24), heard.finished, heard.died, client, dispatch.Patience(20.0)
+            )
+    assert (
+        heard.dead == [] and set(heard.results) and set(heard.results) <= {n * n for n in range(6)}
+    )
 
 
 @pytest.mark.slow
-def test_a_worker_that_pauses_for_lack_of_memory_is_restarted(short_of_memory, in_time, monkeypatch, caplog):
+def test_a_worker_that_pauses_for_lack_of_memory_is_restarted(
+    short_of_memory, in_time, monkeypatch, caplog
+):
     monkeypatch.setattr(clusters, "PAUSED_SECONDS", 1)
 
     def leaky(number):
@@ -286,13 +325,17 @@ def test_a_worker_that_pauses_for_lack_of_memory_is_restarted(short_of_memory, i
 
     heard = Heard()
     with clusters.client_of(short_of_memory) as client:
-        clusters.on_cluster(leaky, NUMBERS[:6], heard.finished, heard.died, client, dispatch.Patience(10.0))
+        clusters.on_cluster(
+            leaky, NUMBERS[:6], heard.finished, heard.died, client, dispatch.Patience(10.0)
+        )
     assert heard.dead == [] and sorted(heard.results) == [n * n for n in NUMBERS[:6]]
     assert "paused for lack of memory; they are restarted" in caplog.text
 
 
 class Starving:
-    """A cluster as its client sees it, whose one worker, started again and again, pauses before it begins a task."""
+    """A cluster as its client sees it, whose one worker, started again and again, pauses before it
+    begins a task.
+    """
 
     address, starts = "tcp://starving", 1
 
@@ -311,7 +354,10 @@ class Starving:
 
     def identity(self):
         return {
-            "workers": {worker: {"status": "paused", "metrics": {"task_counts": {}}} for worker in self.processing()}
+            "workers": {
+                worker: {"status": "paused", "metrics": {"task_counts": {}}}
+                for worker in self.processing()
+            }
         }
 
     def restart_workers(self, workers, **_):
@@ -323,7 +369,9 @@ def test_workers_that_never_have_memory_stop_the_run(in_time, monkeypatch):
     monkeypatch.setattr(clusters, "PAUSED_SECONDS", 0.1)
     starving = Starving()
     watch = clusters._Watch(starving, dispatch.Patience(1.0))
-    with pytest.raises(Stopped, match=r"keep dying, or pausing for lack of memory, without finishing a block; give"):
+    with pytest.raises(
+        Stopped, match=r"keep dying, or pausing for lack of memory, without finishing a block; give"
+    ):
         while True:
             watch.check({"key": (None, 0)})
     assert starving.starts == clusters.STRIKES
@@ -337,7 +385,9 @@ def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, 
     with distributed.LocalCluster(n_workers=0, processes=False, dashboard_address=None) as empty:
         with clusters.client_of(empty.scheduler_address) as client:
             run = threading.Thread(
-                target=clusters.on_cluster, args=(abs, range(3), heard.finished, heard.died, client), daemon=True
+                target=clusters.on_cluster,
+                args=(abs, range(3), heard.finished, heard.died, client),
+                daemon=True,
             )
             run.start()
             while "has no workers; waiting for some" not in caplog.text:
@@ -355,8 +405,13 @@ def test_a_cluster_that_has_lost_its_workers_stops_the_run(in_time, monkeypatch)
     with distributed.LocalCluster(1, processes=False, dashboard_address=None) as small:
         with clusters.client_of(small.scheduler_address) as client:
             threading.Timer(1.5, small.scale, [0]).start()
-            with pytest.raises(Stopped, match=r"lost its last worker \d+ s ago; start some .* run the command again"):
-                clusters.on_cluster(slow, range(100), heard.finished, heard.died, client, dispatch.Patience(1.0))
+            with pytest.raises(
+                Stopped,
+                match=r"lost its last worker \d+ s ago; start some .* run the command again",
+            ):
+                clusters.on_cluster(
+                    slow, range(100), heard.finished, heard.died, client, dispatch.Patience(1.0)
+                )
     assert 0 < len(heard.results) < 100
 
 

@@ -1,4 +1,6 @@
-"""A run's file grows region by region: the same bits, labels and counts for any cut, and no tile packed twice."""
+"""A run's file grows region by region: the same bits, labels and counts for any cut, and no tile
+packed twice.
+"""
 
 import netCDF4
 import numpy as np
@@ -35,7 +37,9 @@ def test_the_file_says_what_xarray_would_have_written(small, surveyed, tmp_path)
     ds = labels.describe(checked.grid, checked.scene, checked.name, checked.request, arrays)
     ds.to_netcdf(tmp_path / "other.nc", encoding={name: {"_FillValue": None} for name in ds.coords})
     with netCDF4.Dataset(surveyed) as ours, netCDF4.Dataset(tmp_path / "other.nc") as other:
-        assert set(ours.variables) == set(other.variables) and set(ours.dimensions) == set(other.dimensions)
+        assert set(ours.variables) == set(other.variables) and set(ours.dimensions) == set(
+            other.dimensions
+        )
         for name, variable in other.variables.items():
             own = ours[name]
             assert (own.dtype, own.dimensions) == (variable.dtype, variable.dimensions)
@@ -50,7 +54,10 @@ def test_the_file_says_what_xarray_would_have_written(small, surveyed, tmp_path)
 
 def test_labels_of_an_extra_dimension_are_kept(tmp_path):
     labels, values = np.array(["200", "110"]), np.array([[1.0, np.nan]] * 3)
-    coordinates = {"x": (("x",), np.arange(3.0), {"units": "1"}), "order": (("order",), labels, {"long_name": "order"})}
+    coordinates = {
+        "x": (("x",), np.arange(3.0), {"units": "1"}),
+        "order": (("order",), labels, {"long_name": "order"}),
+    }
     layout = {"c": (np.dtype(float), np.nan, (2,)), "status": (np.dtype("int8"), 0, ())}
     variables = {"c": (("x", "order"), {"units": "1"}), "status": (("x",), {"units": "1"})}
     output = MapFile(tmp_path / "o.nc", tmp_path, coordinates, variables, layout, (3,), (2,))
@@ -73,11 +80,15 @@ def test_counts_are_those_of_the_whole(small, tmp_path, monkeypatch):
     ds = survey.open(checked.path)
     missed = (ds.w_error > 1e-17 * (1 + abs(ds.w))) | (ds.phi_error > 1e-17 * (1 + abs(ds.phi)))
     assert ds.attrs["accuracy_missed"] == int(missed.sum()) > 0
-    assert finished.counts["status"] == {name: int((ds.status == code).sum()) for name, code in _codes(ds).items()}
+    assert finished.counts["status"] == {
+        name: int((ds.status == code).sum()) for name, code in _codes(ds).items()
+    }
 
 
 def _codes(ds):
-    return dict(zip(ds.status.attrs["flag_meanings"].split(), ds.status.attrs["flag_values"], strict=True))
+    return dict(
+        zip(ds.status.attrs["flag_meanings"].split(), ds.status.attrs["flag_values"], strict=True)
+    )
 
 
 def test_a_large_file_is_opened_lazily_and_checked_piece_by_piece(small, tmp_path, monkeypatch):
@@ -92,8 +103,14 @@ def test_a_large_file_is_opened_lazily_and_checked_piece_by_piece(small, tmp_pat
 
 def test_what_compiling_kernels_and_file_took_is_told_apart(surveyed, small, tmp_path):
     finished = engine.run(workflow.read(small, output=tmp_path / "o.nc"))
-    assert min(finished.compiling, finished.computing, finished.edges_and_cells, finished.writing) >= 0
-    assert 0 <= xr.load_dataset(surveyed).attrs["compile_time_s"] <= xr.load_dataset(surveyed).attrs["wall_time_s"]
+    assert (
+        min(finished.compiling, finished.computing, finished.edges_and_cells, finished.writing) >= 0
+    )
+    assert (
+        0
+        <= xr.load_dataset(surveyed).attrs["compile_time_s"]
+        <= xr.load_dataset(surveyed).attrs["wall_time_s"]
+    )
 
 
 def test_what_is_left_follows_the_cost_of_each_region(monkeypatch):

@@ -1,7 +1,8 @@
-"""The real program is killed, or meets an error, at each call that reaches its output's folder; and a read-only disk.
+"""The real program is killed, or meets an error, at each call that reaches its output's folder; and
+a read-only disk.
 
-A small library (faults.c) preloaded into it counts its calls of write, fsync, rename, unlink, open and their like,
-those of its worker processes too, and makes the n-th of them the last one or fail.
+A small library (faults.c) preloaded into it counts its calls of write, fsync, rename, unlink, open
+and their like, those of its worker processes too, and makes the n-th of them the last one or fail.
 """
 
 import ctypes
@@ -33,8 +34,8 @@ axis = "a"
 [refine]
 width = 0.2
 """
-# The program with two blocks, again and again, each time in a process of its own: a copy of this one, which has
-# imported and compiled what it needs, but opened no file and started no thread.
+# The program with two blocks, again and again, each time in a process of its own: a copy of this
+# one, which has imported and compiled what it needs, but opened no file and started no thread.
 SERVER = """
 import json, os, sys
 import dask.multiprocessing, dask.threaded, psutil
@@ -88,10 +89,17 @@ class Faults:
             self.table = Table.from_buffer(mmap.mmap(file.fileno(), 0))
         settings = {"TABLE": folder / "table", "FOLDER": self.out, "LOG": self.log}
         environment = {key: value for key, value in os.environ.items() if not key.startswith("COV")}
-        environment |= {f"FAULTS_{key}": str(value) for key, value in settings.items()} | {"LD_PRELOAD": str(library)}
+        environment |= {f"FAULTS_{key}": str(value) for key, value in settings.items()} | {
+            "LD_PRELOAD": str(library)
+        }
         words = [sys.executable, "-c", SERVER, "", "plain.toml", "beside.toml"]
         self.server = subprocess.Popen(
-            words, cwd=folder, env=environment, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            words,
+            cwd=folder,
+            env=environment,
+            text=True,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
         )
         self.known = {}
 
@@ -100,7 +108,10 @@ class Faults:
         for name, value in (("calls", 0), ("at", at), ("met", 0), ("error", error), ("ever", ever)):
             setattr(self.table, name, value)
         self.log.write_bytes(b"")
-        given = {"words": ["run", *words, "-o", "out/sweep.nc", "--quiet"], "place": Table.killed.offset}
+        given = {
+            "words": ["run", *words, "-o", "out/sweep.nc", "--quiet"],
+            "place": Table.killed.offset,
+        }
         print(json.dumps(given), file=self.server.stdin, flush=True)
         code = int(self.server.stdout.readline())
         calls = self.log.read_text().splitlines()
@@ -170,7 +181,9 @@ def faults(tmp_path_factory):
 
 def _published(calls):
     """The number of the call that publishes the output."""
-    return next(number for number, line in enumerate(calls, 1) if "rename" in line and "output.nc" in line)
+    return next(
+        number for number, line in enumerate(calls, 1) if "rename" in line and "output.nc" in line
+    )
 
 
 @pytest.mark.slow
@@ -206,7 +219,9 @@ def test_a_fault_at_any_call_loses_nothing(faults, name, workers, what):
 def test_a_disk_that_is_read_only_stops_the_run_before_any_work(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=20m", "none", disk], capture_output=True).returncode:
+    if subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", "size=20m", "none", disk], capture_output=True
+    ).returncode:
         pytest.skip("needs the right to mount a small tmpfs")
     try:
         (disk / "plain.toml").write_text(SWEEP)

@@ -17,7 +17,10 @@ from survey.sweep import announce, engine, measured, plan
 ROOT = Path(__file__).parents[2]
 TABLE = {
     "scene": "satellite",
-    "axes": {"k": {"start": 0.0, "stop": 0.9, "num": 200}, "rho": {"start": 0.6, "stop": 4.0, "num": 300}},
+    "axes": {
+        "k": {"start": 0.0, "stop": 0.9, "num": 200},
+        "rho": {"start": 0.6, "stop": 4.0, "num": 300},
+    },
 }
 
 
@@ -29,13 +32,17 @@ def mapped(tmp_path, monkeypatch):
 
 
 def with_axes(mapped, **numbers):
-    axes = {name: axis | {"num": numbers.get(name, axis["num"])} for name, axis in TABLE["axes"].items()}
+    axes = {
+        name: axis | {"num": numbers.get(name, axis["num"])} for name, axis in TABLE["axes"].items()
+    }
     return workflow.check(TABLE | {"axes": axes}, output=mapped.path)
 
 
 @pytest.mark.parametrize("slower", [0.2, 7.0])
 def test_the_next_plan_is_what_the_last_run_took(mapped, slower):
-    """Within a factor of 2, for a map four times as large, too: on a machine 5 times as fast or 7 times as slow."""
+    """Within a factor of 2, for a map four times as large, too: on a machine 5 times as fast or 7
+    times as slow.
+    """
     usual, _ = plan.estimates(mapped)
     mapped_larger = with_axes(mapped, k=20000, rho=12000)
     larger, _ = plan.estimates(mapped_larger)
@@ -62,7 +69,10 @@ def test_a_plan_says_what_it_knows_the_time_from(mapped):
 
 
 def test_compiling_is_told_apart(mapped):
-    assert plan.plan(mapped)["compiling"] == f"about {announce.SECONDS['hill']} s besides, once on this machine"
+    assert (
+        plan.plan(mapped)["compiling"]
+        == f"about {announce.SECONDS['hill']} s besides, once on this machine"
+    )
     measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 13.0)
     assert plan.plan(mapped)["compiling"] == "done already"
     path = measured._path()
@@ -76,23 +86,31 @@ def test_the_runs_most_alike_decide(mapped):
     assert measured.factor(mapped, "kernels", 1.0) == 8.0  # the same scene
     for seconds, taken in ((0.5, 1.0), (1.0, 2.0), (4.0, 8.0), (500.0, 500.0)):
         measured.note(mapped, {"kernels": seconds}, {"kernels": taken}, 0.0)
-    assert measured.factor(mapped, "kernels", 1.0) == 2.0 and measured.factor(mapped, "further", 1.0) == 1.0
+    assert (
+        measured.factor(mapped, "kernels", 1.0) == 2.0
+        and measured.factor(mapped, "further", 1.0) == 1.0
+    )
 
 
 @pytest.mark.parametrize(
-    "text", ["", "[", "{}", "[1, null]", '[{"hash": 3, "kernels": [0, "a"], "compiling": 0}]', "[" * 9**5]
+    "text",
+    ["", "[", "{}", "[1, null]", '[{"hash": 3, "kernels": [0, "a"], "compiling": 0}]', "[" * 9**5],
 )
 def test_a_file_that_is_none_of_ours_is_as_good_as_none(mapped, text):
     path = measured._path()
     path.parent.mkdir(parents=True)
     path.write_text(text)
-    assert measured.factor(mapped, "kernels", 1.0) == 1.0 and plan.plan(mapped)["estimated_seconds"] > 0
+    assert (
+        measured.factor(mapped, "kernels", 1.0) == 1.0
+        and plan.plan(mapped)["estimated_seconds"] > 0
+    )
     measured.note(mapped, {"kernels": 1.0}, {"kernels": 2.0}, 0.0)
     assert [one["kernels"] for one in json.loads(path.read_text())] == [[1.0, 2.0]]
 
 
 def test_a_run_of_almost_nothing_tells_nothing(mapped):
-    measured.note(mapped, {"kernels": 1e-3}, {"kernels": 3.0}, 0.0)  # on a slow machine it took seconds to begin
+    # on a slow machine it took seconds to begin
+    measured.note(mapped, {"kernels": 1e-3}, {"kernels": 3.0}, 0.0)
     assert measured.factor(mapped, "kernels", 10.0) == 1.0
 
 
@@ -115,7 +133,13 @@ def test_a_cache_that_cannot_be_written_is_no_error(mapped, monkeypatch, tmp_pat
 
 
 @pytest.mark.parametrize(
-    "name", ["coupled_mathieu", "ion_trap", "kapitza", pytest.param("ground_resonance", marks=pytest.mark.slow)]
+    "name",
+    [
+        "coupled_mathieu",
+        "ion_trap",
+        "kapitza",
+        pytest.param("ground_resonance", marks=pytest.mark.slow),
+    ],
 )
 def test_what_a_point_of_an_own_system_costs_is_known_before_it_is_solved(name):
     """Two states or twelve, two functions of time or 135: within a factor of 3 of the processor's time."""

@@ -19,7 +19,9 @@ ROUNDING = 1.0  # seconds, which tell nothing of a rate
 def reduced(name, output):
     """The workflow on so few points that its plan is short; curves of a map take what they take."""
     table = tomllib.loads((WORKFLOWS / f"{name}.toml").read_text(encoding="utf-8"))
-    table["output"] = {key: value for key, value in table.get("output", {}).items() if key == "variables"}
+    table["output"] = {
+        key: value for key, value in table.get("output", {}).items() if key == "variables"
+    }
     for _ in range(20):
         checked = workflow.check(table, output=output, near=WORKFLOWS)
         if sum(plan.estimates(checked)[0].values()) * cpus() < LONGEST:
@@ -40,7 +42,9 @@ NAMES = (
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_plans_are_within_a_factor_of_2(name, tmp_path, monkeypatch):
-    """In seconds of the processor, whatever else the machine does, with what has been compiled by a first run."""
+    """In seconds of the processor, whatever else the machine does, with what has been compiled by a
+    first run.
+    """
     noted = []
     monkeypatch.setattr(measured, "note", lambda *about: noted.append(about))
     checked = reduced(name, tmp_path / "map.nc")
@@ -51,4 +55,8 @@ def test_plans_are_within_a_factor_of_2(name, tmp_path, monkeypatch):
     assert compiling < 1.0
     for part, seconds in estimated.items():
         expected = seconds * cpus()
-        assert expected / 2 - ROUNDING < taken[part] < 2 * expected + ROUNDING, (part, expected, taken[part])
+        assert expected / 2 - ROUNDING < taken[part] < 2 * expected + ROUNDING, (
+            part,
+            expected,
+            taken[part],
+        )

@@ -55,7 +55,9 @@ def test_what_is_compiled_in_a_moment_is_not_named_later(monkeypatch):
 
 
 def test_a_notebook_and_a_terminal_see_a_bar_and_a_script_nothing(monkeypatch):
-    console = Console(file=io.StringIO(), force_jupyter=False, force_terminal=True, width=120, highlight=False)
+    console = Console(
+        file=io.StringIO(), force_jupyter=False, force_terminal=True, width=120, highlight=False
+    )
     monkeypatch.setattr(announce, "console", lambda: console)
     monkeypatch.setattr(progress, "LONG", 0.0)
     scene = types.SimpleNamespace(FAMILY="hill")

@@ -31,7 +31,11 @@ figures = ["verdict"]
 width = 0.05
 """
 BODIES = {
-    "prolate, librations": ("satellite", {"inertia_ratio": [0.1, 0.3], "amplitude": [0.9, 1.1]}, {}),
+    "prolate, librations": (
+        "satellite",
+        {"inertia_ratio": [0.1, 0.3], "amplitude": [0.9, 1.1]},
+        {},
+    ),
     "oblate, librations": ("satellite", {"inertia_ratio": [1.9, 2.0], "amplitude": [0.1, 0.4]}, {}),
     "rotations": ("satellite", {"inertia_ratio": [0.0, 0.1], "k": [1.2, 1.5]}, {"direction": "-1"}),
     "oblate, rotations": ("satellite", {"k": [1.2, 1.5], "rho": [0.6, 0.9]}, {"body": "oblate"}),
@@ -56,7 +60,9 @@ def test_a_map_is_proved(here, capfd):
     assert run("prove", "map.toml", "-o", "map.nc") == 0
     assert "survey-check map.cert" in capfd.readouterr().err
     statement = checker.check((here / "map.cert").read_text())
-    assert run("info", "map.nc") == 0 and run("verify", "map.nc") == 0 and (here / "map.png").exists()
+    assert (
+        run("info", "map.nc") == 0 and run("verify", "map.nc") == 0 and (here / "map.png").exists()
+    )
     ds = xr.open_dataset("map.nc")
     assert ds.attrs["proof_statement"] == statement and ds.attrs["proof_certificate"] == "map.cert"
     widths = ds.cell_a_high - ds.cell_a_low, ds.cell_q_high - ds.cell_q_low
@@ -89,7 +95,8 @@ MAPS = {  # scene: its axes
 def test_refine_agrees(scene, here):
     """The cells of `survey run` have no other verdict, and its areas lie within the proved bounds."""
     axes = "".join(
-        f"{name} = {{ start = {low}, stop = {high}, num = 20 }}\n" for name, (low, high) in MAPS[scene].items()
+        f"{name} = {{ start = {low}, stop = {high}, num = 20 }}\n"
+        for name, (low, high) in MAPS[scene].items()
     )
     (here / "map.toml").write_text(f'scene = "{scene}"\n[axes]\n{axes}[refine]\nwidth = 0.05\n')
     (here / "own.py").write_text(OWN)
@@ -101,10 +108,14 @@ def test_refine_agrees(scene, here):
     assert (ds.area.values + slack >= proved.area_low.values).all()
     assert (ds.area.values - slack <= proved.area_high.values).all()
     names = proved.attrs["refine"].split(", ")
-    middle = [0.5 * (proved[f"cell_{name}_low"] + proved[f"cell_{name}_high"]).values for name in names]
+    middle = [
+        0.5 * (proved[f"cell_{name}_low"] + proved[f"cell_{name}_high"]).values for name in names
+    ]
     ends = [ds[f"cell_{name}_{end}"].values for name in names for end in ("low", "high")]
     for low_x, high_x, low_y, high_y, verdict in zip(*ends, ds.cell_verdict.values, strict=True):
-        inside = (low_x < middle[0]) & (middle[0] < high_x) & (low_y < middle[1]) & (middle[1] < high_y)
+        inside = (
+            (low_x < middle[0]) & (middle[0] < high_x) & (low_y < middle[1]) & (middle[1] < high_y)
+        )
         assert not (proved.cell_verdict.values[inside] == 1 - verdict).any() or verdict == -1
 
 
@@ -129,18 +140,26 @@ def row(scene, axis, ends, fixed=(), options=(), parts=1):
     made.depth += 3
     made.across, made.depth = [parts], made.depth - int(np.log2(parts))
     layouts, lists = zip(*(made(number)[1] for number in made.numbers), strict=True)
-    return proofs.certificate("a test", made, "".join(layouts), [panel for some in lists for panel in some])
+    return proofs.certificate(
+        "a test", made, "".join(layouts), [panel for some in lists for panel in some]
+    )
 
 
 def edges_of(text):
     """[(low, high, letter)] of the edges that are proved; no cell may be open."""
     certificate = checker.Certificate(text)
-    assert checker.OPEN not in certificate.letters and checker.check(text) == certificate.statement()
+    assert (
+        checker.OPEN not in certificate.letters and checker.check(text) == certificate.statement()
+    )
     return [(*place[0], letter) for letter, place in certificate.cells if letter in checker.EDGES]
 
 
 @pytest.mark.parametrize(
-    "body", [pytest.param(body, marks=[pytest.mark.slow] * (body != "oblate, librations")) for body in BODIES]
+    "body",
+    [
+        pytest.param(body, marks=[pytest.mark.slow] * (body != "oblate, librations"))
+        for body in BODIES
+    ],
 )
 def test_satellites_agree_with_the_map(body):
     """The elementary form of the equation gives the verdicts of the elliptic one, in decided cells."""
@@ -149,11 +168,20 @@ def test_satellites_agree_with_the_map(body):
     _, (layout, panels) = made(0)
     sides = [[Fraction(end) for end in side] for side in made.rectangle]
     found = []
-    for place, panel in zip(checker.places(sides, {"across": [1, 1], "layout": layout}), panels, strict=True):
+    for place, panel in zip(
+        checker.places(sides, {"across": [1, 1], "layout": layout}), panels, strict=True
+    ):
         cells = checker.walk(panel["cells"], [place], checker.halved)
-        found += [(*(float(sum(side) / 2) for side in part), letter) for letter, part in cells if letter != "o"]
+        found += [
+            (*(float(sum(side) / 2) for side in part), letter)
+            for letter, part in cells
+            if letter != "o"
+        ]
     first, second, letters = zip(*found, strict=True)
-    points = {name: xr.DataArray(np.array(x), dims="cell") for name, x in zip(axes, (first, second), strict=True)}
+    points = {
+        name: xr.DataArray(np.array(x), dims="cell")
+        for name, x in zip(axes, (first, second), strict=True)
+    }
     ds = survey.evaluate(scene, **points, **options)
     assert (ds.verdict.values == np.where(np.array(letters) == "s", 1, 0)).all()
 
@@ -164,7 +192,9 @@ def test_an_own_equation_in_pieces_is_proved(here):
         "def z(u, p):\n    return p[0] + p[1] * cos(3 * u) if u < 0.75 else p[0] - p[1]\n"
     )
     made = prover("own.py", {"a": [0.5, 3.0], "b": [0.1, 2.0]}, {})
-    assert [end for end, _ in made.equation["pieces"]] == ["0.75", "2.0"] and made.equation["kind"] == "periodic"
+    assert [end for end, _ in made.equation["pieces"]] == ["0.75", "2.0"] and made.equation[
+        "kind"
+    ] == "periodic"
     _, (_, panels) = made(0)
     assert {letter for panel in panels for letter in panel["cells"]} >= {"s", "u"}
 
@@ -178,7 +208,9 @@ def mathieu_edges(q, order=40):
             diagonal[0] += start * q
             table = mpmath.diag(diagonal)
             for k in range(order - 1):
-                table[k, k + 1] = table[k + 1, k] = q * (mpmath.sqrt(2) if (letter, k) == ("2", 0) else 1)
+                table[k, k + 1] = table[k + 1, k] = q * (
+                    mpmath.sqrt(2) if (letter, k) == ("2", 0) else 1
+                )
             for value in mpmath.eigsy(table, eigvals_only=True)[: order // 2]:
                 found[Fraction(mpmath.nstr(value, 30))] = letter
     return found
@@ -193,7 +225,9 @@ def test_the_edges_of_a_row_are_those_of_mathieu():
 
 
 def test_the_edges_of_a_row_are_those_of_meissner(here):
-    """Not even, in pieces, with a third parameter that is fixed; against the zeros of the closed form of D."""
+    """Not even, in pieces, with a third parameter that is fixed; against the zeros of the closed
+    form of D.
+    """
     (here / "own.py").write_text(
         "PARAMETERS = ('a', 'b', 'c')\nPERIOD = 2.5\nEVEN = False\nBREAKS = (0.0, 1.0)\n"
         "def z(u, p):\n    return p[0] + p[1] if u < 1.0 else p[0] - p[2]\n"
@@ -202,12 +236,21 @@ def test_the_edges_of_a_row_are_those_of_meissner(here):
 
     def trace(a):
         p, q = mpmath.sqrt(a + 1.25), mpmath.sqrt(a - 0.75)
-        return 2 * mpmath.cos(p) * mpmath.cos(1.5 * q) - (p / q + q / p) * mpmath.sin(p) * mpmath.sin(1.5 * q)
+        return 2 * mpmath.cos(p) * mpmath.cos(1.5 * q) - (p / q + q / p) * mpmath.sin(
+            p
+        ) * mpmath.sin(1.5 * q)
 
     with mpmath.workdps(30):
         grid = [mpmath.mpf(1.5) + mpmath.mpf(k) / 64 for k in range(353)]
         truth = sorted(
-            (Fraction(mpmath.nstr(mpmath.findroot(lambda a, v=v: trace(a) - v, pair, solver="anderson"), 25)), letter)
+            (
+                Fraction(
+                    mpmath.nstr(
+                        mpmath.findroot(lambda a, v=v: trace(a) - v, pair, solver="anderson"), 25
+                    )
+                ),
+                letter,
+            )
             for letter, v in (("1", 2), ("2", -2))
             for pair in pairwise(grid)
             if (trace(pair[0]) - v) * (trace(pair[1]) - v) < 0
@@ -221,7 +264,8 @@ def test_the_edges_of_a_row_are_those_of_meissner(here):
     pytest.param("amplitude", [0.5, 0.9], {"inertia_ratio": 0.6}, {}, 2, marks=pytest.mark.slow),
     pytest.param("k", [1.3, 1.36], {"rho": 1.0}, {}, 2, marks=pytest.mark.slow),
     pytest.param("k", [1.2, 1.25], {"inertia_ratio": 0.2}, {"direction": "-1"}, 1, marks=pytest.mark.slow),
-    ("rho", [-0.4, 0.45], {"k": 1.3}, {"body": "oblate"}, 3),  # one at rho = 0, where the body is a sphere
+    # one at rho = 0, where the body is a sphere
+    ("rho", [-0.4, 0.45], {"k": 1.3}, {"body": "oblate"}, 3),
 ], ids=["libration", "rotation", "backward", "oblate"])  # fmt: skip
 def test_the_edges_of_a_row_of_satellites(axis, ends, fixed, options, number):
     """Against the Fourier series of `survey.edge`, which knows nothing of formulas in the angle."""
@@ -230,9 +274,16 @@ def test_the_edges_of_a_row_of_satellites(axis, ends, fixed, options, number):
     for low, high, _ in proved:
         ds = survey.edge("satellite", along=axis, near=float(low + high) / 2, **fixed, **options)
         found = zip(ds.edge.values.tolist(), ds.edge_error.values.tolist(), strict=True)
-        reach = [(Fraction(edge) - Fraction(error), Fraction(edge) + Fraction(error)) for edge, error in found]
+        reach = [
+            (Fraction(edge) - Fraction(error), Fraction(edge) + Fraction(error))
+            for edge, error in found
+        ]
         assert sum(first <= high and low <= last for first, last in reach) == 1
-        assert all(any(a <= y and x <= b for a, b, _ in proved) for x, y in reach if ends[0] < x and y < ends[1])
+        assert all(
+            any(a <= y and x <= b for a, b, _ in proved)
+            for x, y in reach
+            if ends[0] < x and y < ends[1]
+        )
 
 
 @pytest.mark.slow
@@ -242,8 +293,14 @@ def test_the_edges_of_a_row_of_danbys_map():
     listed = [row for row in csv.DictReader(table.read_text().splitlines()) if row["e"] == "0.2"]
     text = row("libration_elliptic", "mu", [0.015, 0.0425], {"e": 0.2})
     proved, statement = edges_of(text), checker.check(text)
-    assert "exactly 3 points" in statement and "det Y2 at pi is 0 once, unstable after it" in statement
-    assert [proofs.REVERSIBLE_CLASSES[checker.EDGES.index(letter)][0] for *_, letter in proved] == ["B", "A", "KC"]
+    assert (
+        "exactly 3 points" in statement and "det Y2 at pi is 0 once, unstable after it" in statement
+    )
+    assert [proofs.REVERSIBLE_CLASSES[checker.EDGES.index(letter)][0] for *_, letter in proved] == [
+        "B",
+        "A",
+        "KC",
+    ]
     for (low, high, _), name in zip(proved, ("B", "A", "KC"), strict=True):
         [own] = [row for row in listed if row["curve"] == name]
         mu, error = Fraction(own["mu"]), Fraction(own["mu_error"])
@@ -254,19 +311,29 @@ def test_the_edges_of_a_row_by_command(here, capfd):
     (here / "row.toml").write_text(
         'scene = "mathieu"\n[axes]\na = { start = 1.0, stop = 4.5, num = 8 }\nq = 1.5\n[boundaries]\n'
     )
-    assert run("prove", "row.toml", "-o", "row.nc") == 0 and "survey-check row.cert" in capfd.readouterr().err
+    assert (
+        run("prove", "row.toml", "-o", "row.nc") == 0
+        and "survey-check row.cert" in capfd.readouterr().err
+    )
     assert run("verify", "row.nc") == 0 and run("info", "row.nc") == 0
     ds = xr.open_dataset("row.nc")
     statement = checker.check((here / "row.cert").read_text())
     assert ds.attrs["proof_statement"] == statement and "exactly 2 points" in statement
     truth = sorted(value for value in mathieu_edges(mpmath.mpf(1.5)) if 1 < value < 4.5)
     assert ds.edge_complete == 1 and ds.edge_count == ds.edge.size == len(truth)
-    for edge, error, value in zip(ds.edge_position.values, ds.edge_position_error.values, truth, strict=True):
+    for edge, error, value in zip(
+        ds.edge_position.values, ds.edge_position_error.values, truth, strict=True
+    ):
         assert abs(Fraction(float(edge)) - value) <= Fraction(float(error)) and error < 1e-13
     assert run("run", "row.toml", "-o", "run.nc", "--quiet") == 0
     found = xr.open_dataset("run.nc")
-    names = [dict(zip(x.edge_class.flag_values, x.edge_class.flag_meanings.split(), strict=True)) for x in (ds, found)]
-    classes = [[own[c] for c in x.edge_class.values] for own, x in zip(names, (ds, found), strict=True)]
+    names = [
+        dict(zip(x.edge_class.flag_values, x.edge_class.flag_meanings.split(), strict=True))
+        for x in (ds, found)
+    ]
+    classes = [
+        [own[c] for c in x.edge_class.values] for own, x in zip(names, (ds, found), strict=True)
+    ]
     assert classes[0] == classes[1]
 
 
@@ -280,9 +347,15 @@ def test_what_a_row_does_not_prove_is_open():
 
 def test_cells_on_a_logarithmic_axis_are_as_narrow_as_requested():
     """A width of 0.1 is a tenth of the value; at q = 0.5, the least, 0.05."""
-    axes = {"a": {"start": 1.0, "stop": 2.0, "num": 3}, "q": {"start": 0.5, "stop": 8.0, "num": 3, "spacing": "log"}}
-    made = proofs.prover_of(check({"scene": "mathieu", "axes": axes, "refine": {"width": {"a": 0.5, "q": 0.1}}}))
-    assert made.across[1] * 2**made.depth == 256 and made.across[0] * 2**made.depth == 2  # 7.5 / 0.05 = 150
+    axes = {
+        "a": {"start": 1.0, "stop": 2.0, "num": 3},
+        "q": {"start": 0.5, "stop": 8.0, "num": 3, "spacing": "log"},
+    }
+    made = proofs.prover_of(
+        check({"scene": "mathieu", "axes": axes, "refine": {"width": {"a": 0.5, "q": 0.1}}})
+    )
+    # 7.5 / 0.05 = 150
+    assert made.across[1] * 2**made.depth == 256 and made.across[0] * 2**made.depth == 2
 
 
 @pytest.mark.parametrize("change, words", [
@@ -294,10 +367,18 @@ def test_cells_on_a_logarithmic_axis_are_as_narrow_as_requested():
      "satellite_triaxial has no formulas to prove; choose mathieu"),
 ])  # fmt: skip
 def test_what_cannot_be_proved_is_refused_in_one_line(change, words):
-    table = {"scene": "mathieu", "axes": {"a": [0.0, 1.0], "q": [0.0, 1.0]}, "refine": {"width": 0.1}} | change
-    table["axes"] = {name: {"values": ends} if ends[1:] else ends[0] for name, ends in table["axes"].items()}
+    table = {
+        "scene": "mathieu",
+        "axes": {"a": [0.0, 1.0], "q": [0.0, 1.0]},
+        "refine": {"width": 0.1},
+    } | change
+    table["axes"] = {
+        name: {"values": ends} if ends[1:] else ends[0] for name, ends in table["axes"].items()
+    }
     with pytest.raises(survey.BadInput) as error:
-        proofs.equation_of(check({key: value for key, value in table.items() if value is not None}, proves=True))
+        proofs.equation_of(
+            check({key: value for key, value in table.items() if value is not None}, proves=True)
+        )
     assert words in str(error.value) and "\n" not in str(error.value)
 
 
@@ -333,7 +414,9 @@ def test_parts_that_are_kept_are_not_proved_again(monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["mathieu_proved", "satellite_proved", "libration_elliptic_proved"])
+@pytest.mark.parametrize(
+    "name", ["mathieu_proved", "satellite_proved", "libration_elliptic_proved"]
+)
 def test_the_areas_of_refine_lie_within_the_published_bounds(name, tmp_path):
     root = Path(__file__).parents[2]
     shares = checker.Certificate((root / "results" / f"{name}.cert").read_text()).shares

@@ -1,4 +1,6 @@
-"""[refine] in a workflow: cells and areas in the netCDF file, shown by `survey info`, drawn instead of pixels."""
+"""[refine] in a workflow: cells and areas in the netCDF file, shown by `survey info`, drawn instead
+of pixels.
+"""
 
 import matplotlib.pyplot as plt
 import pytest
@@ -15,7 +17,10 @@ from survey.sweep import plan
 WORKFLOW = {
     "scene": "satellite",
     "options": {"body": "prolate"},
-    "axes": {"k": {"start": 0.7, "stop": 1.3, "num": 7}, "rho": {"start": 2.0, "stop": 0.6, "num": 40}},
+    "axes": {
+        "k": {"start": 0.7, "stop": 1.3, "num": 7},
+        "rho": {"start": 2.0, "stop": 0.6, "num": 40},
+    },
     "output": {"variables": ["verdict"]},
     "refine": {"width": 0.02},
 }
@@ -31,14 +36,24 @@ def path(tmp_path_factory):
 def test_the_cells_fill_the_map_and_agree_with_its_points(path):
     ds = xr.load_dataset(path)
     assert reading.check(path) == []
-    sides = {end: ds[f"cell_{name}_high"] - ds[f"cell_{name}_low"] for end, name in (("x", "k"), ("y", "rho"))}
+    sides = {
+        end: ds[f"cell_{name}_high"] - ds[f"cell_{name}_low"]
+        for end, name in (("x", "k"), ("y", "rho"))
+    }
     assert float((sides["x"] * sides["y"]).sum()) == pytest.approx(0.6 * 1.4)
     undecided = ds.cell_verdict == -1
-    assert (sides["x"] <= 0.02 * 0.6)[undecided].all() and (sides["y"] <= 0.02 * 1.4 + 1e-15)[undecided].all()
+    assert (sides["x"] <= 0.02 * 0.6)[undecided].all() and (sides["y"] <= 0.02 * 1.4 + 1e-15)[
+        undecided
+    ].all()
     seen = 0
     for k in ds.k.values:
         for rho in ds.rho.values:
-            inside = (ds.cell_k_low < k) & (k < ds.cell_k_high) & (ds.cell_rho_low < rho) & (rho < ds.cell_rho_high)
+            inside = (
+                (ds.cell_k_low < k)
+                & (k < ds.cell_k_high)
+                & (ds.cell_rho_low < rho)
+                & (rho < ds.cell_rho_high)
+            )
             own = ds.cell_verdict.values[inside.values]
             point = ds.sel(k=k, rho=rho).verdict
             seen += int((own >= 0).sum())
@@ -47,7 +62,9 @@ def test_the_cells_fill_the_map_and_agree_with_its_points(path):
 
 
 def test_no_cell_reaches_across_the_separatrix(path):
-    """k = 1 is no part of the domain: librations on one side, rotations on the other, edges without number between."""
+    """k = 1 is no part of the domain: librations on one side, rotations on the other, edges without
+    number between.
+    """
     ds = xr.load_dataset(path)
     assert not ((ds.cell_k_low < 1) & (ds.cell_k_high > 1)).any()
     touching = (ds.cell_k_low == 1) | (ds.cell_k_high == 1)
@@ -57,8 +74,13 @@ def test_no_cell_reaches_across_the_separatrix(path):
 def test_the_areas_are_told_with_their_bounds(path):
     ds = survey.open(path)
     total = 0.6 * 1.4
-    assert float(ds.area.sum()) == pytest.approx(total) and float(ds.area_fraction.sum()) == pytest.approx(1)
-    finer = survey.run(WORKFLOW | {"refine": {"width": {"k": 0.001, "rho": 0.004}}}, output=path.with_name("finer.nc"))
+    assert float(ds.area.sum()) == pytest.approx(total) and float(
+        ds.area_fraction.sum()
+    ) == pytest.approx(1)
+    finer = survey.run(
+        WORKFLOW | {"refine": {"width": {"k": 0.001, "rho": 0.004}}},
+        output=path.with_name("finer.nc"),
+    )
     assert (abs(finer.area - ds.area) <= ds.area_error + finer.area_error).all()
     assert (finer.area_error < 0.3 * ds.area_error).all()
     lines = summary(ds)["areas"]
@@ -70,9 +92,14 @@ def test_the_areas_are_told_with_their_bounds(path):
 
 def test_the_plan_bounds_the_cells_and_their_bytes(path):
     planned, ds = plan.plan(workflow.check(WORKFLOW, output=path)), xr.load_dataset(path)
-    bytes_of_cells = sum(variable.nbytes for variable in ds.variables.values() if variable.dims == ("cell",))
+    bytes_of_cells = sum(
+        variable.nbytes for variable in ds.variables.values() if variable.dims == ("cell",)
+    )
     assert planned["cells"]["most"] == 2 * 32 * 64 and planned["estimated_seconds"] > 0
-    assert bytes_of_cells / ds.sizes["cell"] == planned["cells"]["bytes_at_most"] / planned["cells"]["most"]
+    assert (
+        bytes_of_cells / ds.sizes["cell"]
+        == planned["cells"]["bytes_at_most"] / planned["cells"]["most"]
+    )
     assert planned["cells"]["usually"] / 5 < ds.sizes["cell"] < 5 * planned["cells"]["usually"]
 
 
@@ -86,7 +113,11 @@ def test_the_cells_are_drawn_instead_of_the_points(path):
     drawn = sum(len(collection.get_paths()) for collection in figure.axes[0].collections)
     assert drawn == survey.open(path).sizes["cell"]
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert [label.split(" ")[0] for label in labels] == ["stable", "unstable", "undecided"] and "±" in labels[0]
+    assert [label.split(" ")[0] for label in labels] == [
+        "stable",
+        "unstable",
+        "undecided",
+    ] and "±" in labels[0]
     assert figure.axes[0].get_xlim() == (0.7, 1.3)
     plt.close(figure)
 
@@ -118,9 +149,16 @@ def test_what_cannot_be_is_refused(changes, words):
 
 
 def test_a_width_in_the_units_of_a_logarithmic_axis_is_relative(tmp_path):
-    axes = {"a": {"start": 0.5, "stop": 3.0, "num": 3}, "q": {"start": 0.1, "stop": 10.0, "num": 3, "spacing": "log"}}
+    axes = {
+        "a": {"start": 0.5, "stop": 3.0, "num": 3},
+        "q": {"start": 0.1, "stop": 10.0, "num": 3, "spacing": "log"},
+    }
     workflow = {"scene": "mathieu", "axes": axes, "refine": {"width": {"a": 0.05, "q": 0.1}}}
     ds = survey.run(workflow, output=tmp_path / "log.nc")
     undecided = ds.cell_verdict == -1
     ratio = (ds.cell_q_high / ds.cell_q_low)[undecided]
-    assert 1.05 < ratio.min() and ratio.max() < 1.1 and ((ds.cell_a_high - ds.cell_a_low)[undecided] <= 0.05).all()
+    assert (
+        1.05 < ratio.min()
+        and ratio.max() < 1.1
+        and ((ds.cell_a_high - ds.cell_a_low)[undecided] <= 0.05).all()
+    )

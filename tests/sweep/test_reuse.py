@@ -1,4 +1,6 @@
-"""Extending a survey: points that an earlier file holds are taken from it, with the bits of a run without it."""
+"""Extending a survey: points that an earlier file holds are taken from it, with the bits of a run
+without it.
+"""
 
 import re
 
@@ -45,7 +47,9 @@ def brun(tmp_path, monkeypatch):
     ],
 )
 @pytest.mark.parametrize("block", [7, pytest.param(10**6, marks=pytest.mark.slow)])
-def test_what_is_held_is_not_solved_and_the_bits_are_the_same(brun, monkeypatch, overrides, points, block):
+def test_what_is_held_is_not_solved_and_the_bits_are_the_same(
+    brun, monkeypatch, overrides, points, block
+):
     monkeypatch.setattr(cost, "BLOCK_POINTS", block)
     sizes, solved = [], solve.solve_point
 
@@ -62,7 +66,10 @@ def test_what_is_held_is_not_solved_and_the_bits_are_the_same(brun, monkeypatch,
     assert sum(sizes) == checked.grid.points - points and held.points == points
     engine.run(workflow.read(brun, overrides, "own.nc"))
     new, own = survey.open("new.nc"), survey.open("own.nc")
-    assert new.attrs["points_reused"] == points and new.attrs["fingerprint"] == own.attrs["fingerprint"]
+    assert (
+        new.attrs["points_reused"] == points
+        and new.attrs["fingerprint"] == own.attrs["fingerprint"]
+    )
     xr.testing.assert_equal(new.drop_attrs(), own.drop_attrs())
 
 
@@ -78,29 +85,52 @@ def test_it_is_told_why_nothing_is_taken(brun, override, why):
     held, told = earlier.find(workflow.read(brun, [override], "new.nc"), "old.nc")
     assert held is None and re.search(why, told)
     over_it = workflow.read(brun, [override], "old.nc")
-    with pytest.raises(BadInput, match=f"{why}.*; write another file with -o, or replace it with --fresh"):
+    with pytest.raises(
+        BadInput, match=f"{why}.*; write another file with -o, or replace it with --fresh"
+    ):
         earlier.find(over_it, "old.nc")
     assert earlier.find(over_it, "old.nc", fresh=True) == (None, told)
 
 
 def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    axes = {"k": {"start": 0.1, "stop": 0.9, "num": 30}, "rho": {"start": 1.0, "stop": 3.0, "num": 40}}
+    axes = {
+        "k": {"start": 0.1, "stop": 0.9, "num": 30},
+        "rho": {"start": 1.0, "stop": 3.0, "num": 40},
+    }
     survey.run({"scene": "satellite", "axes": axes}, output="old.nc")
     axes["rho"] = {"start": 1.0, "stop": 4.0, "num": 60}
     longer = workflow.check({"scene": "satellite", "axes": axes}, output="new.nc")
     held, told = earlier.find(longer, "old.nc")
     assert held is None and "nothing is taken from this file: " in told
-    assert "on a map, its values depend on all of the axis rho" in told or "has other bits on this map" in told
+    assert (
+        "on a map, its values depend on all of the axis rho" in told
+        or "has other bits on this map" in told
+    )
 
 
 @pytest.mark.slow
 def test_fates_of_few_systems_are_not_taken_for_a_map_of_many(tmp_path, monkeypatch):
     """Maps of 1,000 starts find the curves between basins for as many as 8 systems: 9 have other bits."""
     monkeypatch.chdir(tmp_path)
-    axes = {name: {"start": -3.0, "stop": 3.0, "num": number} for name, number in (("phi0", 40), ("w0", 25))}
-    axes |= {"b12": {"start": 0.3, "stop": 0.7, "num": 2}, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
-    table = {"scene": "gyrostat", "options": {"question": "fate"}, "axes": axes, "output": {"path": "old.nc"}}
+    axes = {
+        name: {"start": -3.0, "stop": 3.0, "num": number}
+        for name, number in (("phi0", 40), ("w0", 25))
+    }
+    axes |= {
+        "b12": {"start": 0.3, "stop": 0.7, "num": 2},
+        "b31": -0.4,
+        "d": 1.1,
+        "c23": 0.3,
+        "s2": 0.5,
+        "s3": -0.2,
+    }
+    table = {
+        "scene": "gyrostat",
+        "options": {"question": "fate"},
+        "axes": axes,
+        "output": {"path": "old.nc"},
+    }
     survey.run(table)
     wider = table | {"axes": axes | {"b12": {"start": 0.3, "stop": 0.7, "num": 9}}}
     held, told = earlier.find(workflow.check(wider, output="new.nc"), "old.nc")
@@ -140,7 +170,9 @@ def test_the_command_extends_a_file_in_place(ran, small, program):
     refused = program(*words)
     assert refused.returncode == 2 and "or extend it with --reuse small.nc" in refused.stderr
     done = program(*words, "--reuse", "small.nc")
-    assert done.returncode == 0 and "small.nc: 24 of 44 points are taken from this file" in done.stderr
+    assert (
+        done.returncode == 0 and "small.nc: 24 of 44 points are taken from this file" in done.stderr
+    )
     assert survey.open(ran).attrs["points_reused"] == 24 and survey.open(ran).status.size == 44
     with pytest.raises(BadInput, match="no such file"):
         survey.run(small, output="x.nc", reuse="none.nc")

@@ -1,4 +1,6 @@
-"""[boundaries] with surfaces = true: in the netCDF file, checked, drawn, audited, resumed, refused in one line."""
+"""[boundaries] with surfaces = true: in the netCDF file, checked, drawn, audited, resumed, refused
+in one line.
+"""
 
 import math
 
@@ -72,7 +74,11 @@ def test_the_file(path):
     assert reading.check(path) == []
     ds = xr.load_dataset(path)
     schema.surfaces(ds)
-    assert ds.attrs["surfaces"] == "a, q, c" and ds.attrs["surfaces_left_out"] == 0 and "boundaries" not in ds.attrs
+    assert (
+        ds.attrs["surfaces"] == "a, q, c"
+        and ds.attrs["surfaces_left_out"] == 0
+        and "boundaries" not in ds.attrs
+    )
     assert ds.surface_vertices.sum() == ds.sizes["surface_vertex"] > 100
     assert ds.surface_triangles.sum() == ds.sizes["surface_triangle"]
     assert ds.surface_corners.dims == ("surface_triangle", "corner") and ds.sizes["corner"] == 3
@@ -84,7 +90,10 @@ def test_the_file(path):
     x = np.stack([ds[f"surface_{name}"].values for name in "aqc"], axis=1)
     step = 1e-6 * np.eye(3)[ds.surface_axis.values]
     verdicts = [
-        survey.evaluate(ds.attrs["scene"], **{n: xr.DataArray(v, dims="i") for n, v in zip("aqc", side.T, strict=True)})
+        survey.evaluate(
+            ds.attrs["scene"],
+            **{n: xr.DataArray(v, dims="i") for n, v in zip("aqc", side.T, strict=True)},
+        )
         for side in (x - step, x + step)
     ]
     low, high = (one.verdict.values for one in verdicts)
@@ -101,9 +110,9 @@ def test_pictures(path):
     axes = ds.survey.map("surfaces")
     [drawn] = axes.collections
     assert axes.name == "3d" and len(drawn.get_facecolor()) == ds.sizes["surface_triangle"]
-    assert axes.get_xlim() == (0.2, 2.0) and [t.get_text() for t in axes.figure.legends[0].texts] == [
-        "a multiplier passes -1"
-    ]
+    assert axes.get_xlim() == (0.2, 2.0) and [
+        t.get_text() for t in axes.figure.legends[0].texts
+    ] == ["a multiplier passes -1"]
     plt.close("all")
     for place in range(3):
         plane = section(ds, ds.verdict.isel(c=place))
@@ -111,7 +120,8 @@ def test_pictures(path):
         assert (abs(plane.curve_c.values - c) < 1e-15).all() and plane.sizes["curve"] == 1
         a, q = (xr.DataArray(plane[f"curve_{name}"].values, dims="i") for name in "aq")
         known = survey.evaluate("mathieu", a=a - c * c, q=q)
-        assert abs(known.discriminant.values + 2 * math.cosh(c * math.pi)).max() < 0.1  # chords of a coarse lattice
+        # chords of a coarse lattice
+        assert abs(known.discriminant.values + 2 * math.cosh(c * math.pi)).max() < 0.1
         assert np.hypot(np.diff(a), np.diff(q)).max() < 0.3  # points in order
         cut = ds.isel(c=[place])  # as survey plot --at takes it
         assert len(cut.survey.map().lines) == 1
@@ -131,7 +141,10 @@ def test_pictures(path):
 
 def test_a_logarithmic_axis_is_drawn_by_its_logarithm(workflow, tmp_path):
     log = {"c": {"start": 0.02, "stop": 0.3, "num": 3, "spacing": "log"}}
-    ds = survey.run(workflow | {"axes": AXES | log, "output": {"variables": ["verdict"]}}, output=tmp_path / "log.nc")
+    ds = survey.run(
+        workflow | {"axes": AXES | log, "output": {"variables": ["verdict"]}},
+        output=tmp_path / "log.nc",
+    )
     axes = ds.survey.map("surfaces")
     assert axes.get_zlim() == pytest.approx(np.log10([0.02, 0.3]))
     assert axes.zaxis.get_major_formatter()(-1.0) == "0.1"
@@ -146,7 +159,8 @@ def test_verify_solves_vertices_again(path, tmp_path, capsys):
     ds = xr.load_dataset(path)
     moved = ds.assign(surface_a=(ds.surface_a + 1e-6).clip(max=2.0))
     complaints = audit(moved, 30)["complaints"]
-    # those bracketed along a do not hold any more; a millionth is nothing to the others where the surface is flat
+    # those bracketed along a do not hold any more; a millionth is nothing to the others where the
+    # surface is flat
     assert len(complaints) > 10 and all("no minus_one within it" in line for line in complaints)
     with pytest.raises(Damaged, match="surface_class"):
         audit(ds.assign(surface_class=ds.surface_class.copy(data=ds.surface_class.values + 40)), 1)
@@ -155,7 +169,10 @@ def test_verify_solves_vertices_again(path, tmp_path, capsys):
 def test_the_plan(workflow, path):
     planned = plan.plan(check(workflow, output=path))["surfaces"]
     ds = xr.load_dataset(path)
-    for dim, key in (("surface_vertex", "bytes_per_vertex"), ("surface_triangle", "bytes_per_triangle")):
+    for dim, key in (
+        ("surface_vertex", "bytes_per_vertex"),
+        ("surface_triangle", "bytes_per_triangle"),
+    ):
         size = sum(v.nbytes for v in ds.variables.values() if v.dims[:1] == (dim,))
         assert planned[key] * ds.sizes[dim] == size
     assert planned["lattice"] == "13 x 13 x 13"
@@ -199,7 +216,10 @@ def test_hills_edges(tmp_path):
         "a": {"start": -1.0, "stop": 5.5, "num": 3}, "q": {"start": 0.1, "stop": 2.0, "num": 2},
         "r": {"start": -1.0, "stop": 1.0, "num": 2},
     }  # fmt: skip
-    ds = survey.run({"scene": scene, "axes": axes, "boundaries": {"surfaces": True}}, output=tmp_path / "hill.nc")
+    ds = survey.run(
+        {"scene": scene, "axes": axes, "boundaries": {"surfaces": True}},
+        output=tmp_path / "hill.nc",
+    )
 
     def eigenvalues(kind, q, r, size=30):
         """a of solutions sum c_k cos or sin of (2 k + s) u, s = 0 or 1."""
@@ -207,7 +227,8 @@ def test_hills_edges(tmp_path):
         s = 1 if anti == "antiperiodic" else 0
         k = np.arange(size) + (1 if parity == "odd" and not s else 0)
         n, sign = 2 * k + s, 1 if parity == "even" else -1
-        # -y'' - z y: 2 cos(2 j u) cos(n u) = cos((n + 2 j) u) + cos((n - 2 j) u), and reflections at 0
+        # -y'' - z y: 2 cos(2 j u) cos(n u) = cos((n + 2 j) u) + cos((n - 2 j) u), and reflections
+        # at 0
         H = np.diag(n.astype(float) ** 2)
         for amplitude, shift in ((q, 2), (r, 4)):
             for row, m in enumerate(n):
@@ -263,7 +284,9 @@ def test_damaged_files_are_refused(path):
     }  # fmt: skip
     for name, files in wrong.items():
         for file in files:
-            with pytest.raises(Damaged, match=name if name != "surface_class" else "surface_class|flag_"):
+            with pytest.raises(
+                Damaged, match=name if name != "surface_class" else "surface_class|flag_"
+            ):
                 schema.surfaces(file)
             if "surface_vertices" in file and file.status.ndim == 3:
                 with pytest.raises(Damaged):
@@ -306,15 +329,23 @@ def test_proofs_and_orbits_have_none(workflow):
     def f(t, x, p, out):
         out[0], out[1] = x[1], -p[0] * x[1] - x[0] - p[1] * x[0] ** 3 + p[2] * math.cos(t)
 
-    scene = survey.orbit(f, states=("x", "v"), period=2 * math.pi, parameters=("a", "q", "c"), start=(0.0, 0.0))
+    scene = survey.orbit(
+        f, states=("x", "v"), period=2 * math.pi, parameters=("a", "q", "c"), start=(0.0, 0.0)
+    )
     with pytest.raises(BadInput, match="periodic orbits, and surfaces are drawn of linear systems"):
         check({"scene": scene, "axes": AXES, "boundaries": {"surfaces": True}})
 
 
 def test_a_box_without_surfaces(workflow, tmp_path):
-    axes = AXES | {"a": {"start": 0.2, "stop": 0.3, "num": 2}, "q": {"start": 0.0, "stop": 0.05, "num": 2}}
+    axes = AXES | {
+        "a": {"start": 0.2, "stop": 0.3, "num": 2},
+        "q": {"start": 0.0, "stop": 0.05, "num": 2},
+    }
     ds = survey.run(workflow | {"axes": axes}, output=tmp_path / "empty.nc")
-    assert ds.sizes["surface"] == ds.sizes["surface_triangle"] == 0 and ds.attrs["surfaces_left_out"] == 0
+    assert (
+        ds.sizes["surface"] == ds.sizes["surface_triangle"] == 0
+        and ds.attrs["surfaces_left_out"] == 0
+    )
     assert ds.survey.boundary().sizes["place"] == 0
     verified(tmp_path / "empty.nc", 2)
 

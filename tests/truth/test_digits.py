@@ -37,6 +37,10 @@ def test_it_agrees_with_the_other_truths(name):
     with mp.workdps(40):
         for i in range(0, 8, 2):
             off = abs(mpf(row[i]) + mpf(row[i + 1]) - mpf(known[i]) - mpf(known[i + 1]))
-            assert off <= row[10] + known[10] and row[10] < 1e-18 * (1 + abs(known[i])), (i, off, row[10])
+            assert off <= row[10] + known[10] and row[10] < 1e-18 * (1 + abs(known[i])), (
+                i,
+                off,
+                row[10],
+            )
     value, low, _doubt = found["discriminant"]
     assert abs(float(ds.discriminant) - value[0] - np.ravel(low)[0]) <= float(ds.discriminant_error)

@@ -1,4 +1,6 @@
-"""The viewer: no point is lost on the way to a pixel, a link shows its view again, nobody sees it without the token."""
+"""The viewer: no point is lost on the way to a pixel, a link shows its view again, nobody sees it
+without the token.
+"""
 
 import asyncio
 import importlib.util
@@ -27,13 +29,22 @@ from survey.viewer.shown import Map
 
 ROOT = Path(__file__).parents[2]
 MAP = ROOT / "results/satellite_prolate_small.nc"
-served = pytest.mark.skipif(not importlib.util.find_spec("bokeh"), reason="bokeh is missing (pip install bokeh)")
-browsed = pytest.mark.skipif(bool(picture.missing()), reason=f"no browser: missing {picture.missing()}")
-FLAGS = {"flag_values": np.array([-1, 0, 1, 2], np.int8), "flag_meanings": "undecided unstable stable marginal"}
+served = pytest.mark.skipif(
+    not importlib.util.find_spec("bokeh"), reason="bokeh is missing (pip install bokeh)"
+)
+browsed = pytest.mark.skipif(
+    bool(picture.missing()), reason=f"no browser: missing {picture.missing()}"
+)
+FLAGS = {
+    "flag_values": np.array([-1, 0, 1, 2], np.int8),
+    "flag_meanings": "undecided unstable stable marginal",
+}
 
 
 def made(x, y, seed=0):
-    """A map over the axes x and y: half stable, half unstable, ten undecided, ten failed; and numbers of any sign."""
+    """A map over the axes x and y: half stable, half unstable, ten undecided, ten failed; and
+    numbers of any sign.
+    """
     rng = np.random.default_rng(seed)
     shape = x.size, y.size
     verdict = np.ones(shape, np.int8)
@@ -43,7 +54,11 @@ def made(x, y, seed=0):
     state = np.zeros(shape, np.int8)
     state.flat[rare[:10]] = status.STEP_LIMIT
     value = rng.standard_normal(shape)
-    data = {"verdict": (("x", "y"), verdict, FLAGS), "value": (("x", "y"), value), "status": (("x", "y"), state)}
+    data = {
+        "verdict": (("x", "y"), verdict, FLAGS),
+        "value": (("x", "y"), value),
+        "status": (("x", "y"), state),
+    }
     return xr.Dataset(data, {"x": x, "y": y})
 
 
@@ -73,11 +88,17 @@ def test_every_point_is_in_the_pixel_where_it_lies(axes, direct, sizes, monkeypa
     monkeypatch.setattr(raster, "OVERVIEW", 10**4 if direct else 90)
     ds = made(*axes)
     layer = raster.Layer(ds, "verdict", ("x", "y"), {})
-    xs, ys = (axis.pixels(*axis.ends, size) for axis, size in zip(map(raster.MapAxis, axes), sizes, strict=True))
+    xs, ys = (
+        axis.pixels(*axis.ends, size)
+        for axis, size in zip(map(raster.MapAxis, axes), sizes, strict=True)
+    )
     mask, value = whole(layer).pixels(xs, ys)
     assert mask.shape == sizes[::-1] and value is None
     factors = (1, 1) if direct else [-(-a.size // 90) for a in axes]
-    for kind, where in (("undecided", (ds.verdict == -1) & (ds.status == 0)), ("failed", ds.status != 0)):
+    for kind, where in (
+        ("undecided", (ds.verdict == -1) & (ds.status == 0)),
+        ("failed", ds.status != 0),
+    ):
         for i, j in np.argwhere(where.values):
             column, line = (
                 int(np.searchsorted(pixels.edges, pixels.axis.centres[at], side="right")) - 1
@@ -87,7 +108,8 @@ def test_every_point_is_in_the_pixel_where_it_lies(axes, direct, sizes, monkeypa
             spare = [0 if f == 1 else 1 + int(np.ceil(f * size / axis.size))
                      for f, size, axis in zip(factors, sizes, axes, strict=True)]  # fmt: skip
             near = mask[
-                max(line - spare[1], 0) : line + spare[1] + 1, max(column - spare[0], 0) : column + spare[0] + 1
+                max(line - spare[1], 0) : line + spare[1] + 1,
+                max(column - spare[0], 0) : column + spare[0] + 1,
             ]
             assert (near & layer.bits[kind]).any(), (kind, i, j)
 
@@ -98,7 +120,10 @@ def test_a_pixel_of_numbers_shows_the_largest_magnitude_of_its_points():
     ds["value"][50:60, 50:60] = np.nan
     for overview in (False, True):
         layer = raster.Layer(ds, "value", ("x", "y"), {})
-        xs, ys = (raster.MapAxis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, ds[dim].size // 10) for dim in "xy")
+        xs, ys = (
+            raster.MapAxis(ds[dim].values).pixels(-0.5, ds[dim].size - 0.5, ds[dim].size // 10)
+            for dim in "xy"
+        )
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(raster, "DIRECT", 0 if overview else 10**9)
             _, value = whole(layer).pixels(xs, ys)
@@ -146,15 +171,23 @@ def test_what_is_not_read_yet_is_not_drawn_and_what_is_drawn_is_true(name, monke
             np.testing.assert_array_equal(value[known], true_value[known])
         image, kinds = raster.paint(mask, value, layer)
         background = np.array([0xF4, 0xF4, 0xF4, 0xFF], np.uint8).view(np.uint32)
-        assert (image[~known] == background).all() and (("not read yet" in kinds) == (not known.all()))
+        assert (image[~known] == background).all() and (
+            ("not read yet" in kinds) == (not known.all())
+        )
         drawn.append(known.mean())
     assert len(drawn) == 22 and drawn[1] < 0.15 and drawn[-1] == 1 and sorted(drawn) == drawn
-    assert layer.limits == last.limits if name == "value" else layer.overview.number == last.overview.number
+    assert (
+        layer.limits == last.limits
+        if name == "value"
+        else layer.overview.number == last.overview.number
+    )
 
 
 def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
     """A map of Brun's problem: below the least effective potential there is no motion."""
-    ds = survey.evaluate("brun", l=np.linspace(-1, 1, 12), beta=np.linspace(-1, 1, 10), alpha=0.1, sign="1")
+    ds = survey.evaluate(
+        "brun", l=np.linspace(-1, 1, 12), beta=np.linspace(-1, 1, 10), alpha=0.1, sign="1"
+    )
     bare = ds.status.values == status.FIRST_OF_SCENE
     layer = raster.Layer(ds, "verdict", ("l", "beta"), {})
     xs, ys = (raster.MapAxis(ds[dim].values).pixels(-2, 2, 400) for dim in ("l", "beta"))
@@ -171,7 +204,9 @@ def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
     shown = Map(tmp_path / "map.nc")
     assert shown.shares("verdict")["no_motion"] == f" ({bare.sum()} in all)"
     lines = list(shown.under(shown.read(""), (0, 0)))
-    assert any("no_motion: " in line for line in lines) and not any("undecided" in line for line in lines)
+    assert any("no_motion: " in line for line in lines) and not any(
+        "undecided" in line for line in lines
+    )
     assert "undecided" not in str(ds.survey.point(l=-1, beta=-1))
 
 
@@ -203,7 +238,10 @@ def test_a_link_tells_its_view():
     lines = list(shown.under(view, (3, 5)))
     ds = xr.open_dataset(MAP).isel(k=3, rho=5)
     assert lines[0] == f"k = {float(ds.k):.8g}, rho = {float(ds.rho):.8g}"
-    assert lines[1] == f"exponent = {reading(ds, 'exponent', True)}".replace("+-", "±") and "±" in lines[1]
+    assert (
+        lines[1] == f"exponent = {reading(ds, 'exponent', True)}".replace("+-", "±")
+        and "±" in lines[1]
+    )
 
 
 def test_a_falling_axis_is_drawn_rising(tmp_path):
@@ -242,7 +280,10 @@ def test_where_an_integer_does_not_apply_it_is_no_value():
     _, value = shown.layer(view).pixels(*(axis.pixels(*axis.ends, 50) for axis in shown.axes))
     assert np.isnan(value).any() and np.nanmax(np.abs(value)) < 1000
     spun_up = tuple(np.argwhere(shown.ds.verdict.values == 5)[0])
-    assert next(line for line in shown.under(view, spun_up) if "net_turns" in line) == "net_turns = does not apply"
+    assert (
+        next(line for line in shown.under(view, spun_up) if "net_turns" in line)
+        == "net_turns = does not apply"
+    )
 
 
 def answer(address):
@@ -265,13 +306,23 @@ def test_without_the_token_there_is_nothing_and_from_elsewhere_nobody():
         assert "Only this machine" in printed and f"ssh -L {port}:127.0.0.1:{port}" in printed
         assert answer(address) == 200
         other = token[:-1] + ("B" if token.endswith("A") else "A")
-        for path in ("", "ws", "static/js/bokeh.min.js", "autoload.js", token[:-1], f"{other}/", f"x/{token}/"):
+        for path in (
+            "",
+            "ws",
+            "static/js/bokeh.min.js",
+            "autoload.js",
+            token[:-1],
+            f"{other}/",
+            f"x/{token}/",
+        ):
             assert answer(host + path) == 403, path
         with socket.socket() as other, pytest.raises(ConnectionRefusedError):
             other.connect(("127.0.0.2", port))  # another address of this machine
         words = [sys.executable, "-m", "survey", "view", MAP, "--no-browser", "--port", str(port)]
         taken = subprocess.run(words, capture_output=True, text=True)
-        assert taken.returncode == 2 and taken.stderr.startswith(f"survey: --port {port}: Address already in use")
+        assert taken.returncode == 2 and taken.stderr.startswith(
+            f"survey: --port {port}: Address already in use"
+        )
         process.send_signal(signal.SIGINT)
         assert process.wait(timeout=20) == 0
         assert process.stderr.read().endswith("stopped\n")
@@ -294,7 +345,9 @@ def test_the_socket_wants_token_origin_and_a_session_that_the_page_signed():
 
     async def check():
         server, address = start(Map(MAP), 0)
-        page = await asyncio.to_thread(lambda: urllib.request.urlopen(address, timeout=20).read().decode())
+        page = await asyncio.to_thread(
+            lambda: urllib.request.urlopen(address, timeout=20).read().decode()
+        )
         (session,) = re.findall(r'"token":"([^"]+)"', page)
         origin = address[: address.index("/", 7)]
         assert "ACK" in await first_message(f"{address}ws", origin, session)
@@ -336,7 +389,9 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path):
 
 def test_without_its_package_the_command_names_it(tmp_path):
     blocked = "import sys; sys.modules['bokeh'] = None; from survey.cli import main; main(['view', 'map.nc'])"
-    done = subprocess.run([sys.executable, "-c", blocked], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", blocked], cwd=tmp_path, capture_output=True, text=True
+    )
     assert (done.returncode, done.stderr) == (
         2,
         "survey: survey view needs the package bokeh: pip install bokeh\n",
@@ -367,7 +422,9 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
         verdict = "verdict: unstable\n"
         picture.wait(driver, lambda: any(verdict in text for text in driver.execute_script(TEXTS)))
         (near,) = (text for text in driver.execute_script(TEXTS) if verdict in text)
-        assert re.search(r"discriminant = -?[\d.e-]+ ± [\d.e-]+\n", near) and near.startswith("k = 0.8415, rho = 0.77")
+        assert re.search(r"discriminant = -?[\d.e-]+ ± [\d.e-]+\n", near) and near.startswith(
+            "k = 0.8415, rho = 0.77"
+        )
         picture.act(driver, 0.85, 0.75, click=True)
 
         def motion():
@@ -387,7 +444,9 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
         picture.wait(driver, lambda: driver.execute_script(PIXELS) == seen)
         assert driver.current_url == link
         driver.execute_script(
-            ZOOM.replace("0.5, end: 0.95", "0.8, end: 0.81").replace("0.6, end: 1.7", "0.7, end: 0.72")
+            ZOOM.replace("0.5, end: 0.95", "0.8, end: 0.81").replace(
+                "0.6, end: 1.7", "0.7, end: 0.72"
+            )
         )
         afresh = "this window is solved afresh, 240 × 160 points"
         picture.wait(driver, lambda: any(afresh in text for text in driver.execute_script(TEXTS)))
@@ -397,7 +456,11 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
         picture.wait(driver, lambda: driver.current_url != before)
         picture.wait(driver, lambda: any("survey.evaluate(&#x27;satellite&#x27;, k=0.803" in text
                                          for text in driver.execute_script(TEXTS)))  # fmt: skip
-        (copy,) = [b for b in driver.execute_script(BUTTONS, "BUTTON") if b.text == "Copy Python for this point"]
+        (copy,) = [
+            b
+            for b in driver.execute_script(BUTTONS, "BUTTON")
+            if b.text == "Copy Python for this point"
+        ]
         copy.click()
         seen, link = driver.execute_script(PIXELS), driver.current_url
         driver.get("about:blank")
@@ -412,7 +475,9 @@ def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tm
         assert side[1] >= plot[1] + plot[3] - 1 and plot[3] > 300 and plot[2] > 400  # below it
         driver.save_screenshot(tmp_path / "narrow.png")
         grave = [
-            line for line in driver.get_log("browser") if line["level"] == "SEVERE" and "favicon" not in line["message"]
+            line
+            for line in driver.get_log("browser")
+            if line["level"] == "SEVERE" and "favicon" not in line["message"]
         ]
         assert not grave
 
@@ -429,13 +494,22 @@ def test_a_window_narrower_than_the_grid_is_solved_afresh_and_is_what_evaluate_g
     view = shown.read("var=discriminant&" + FINE)
     assert finer.wanted(shown, view) and not finer.wanted(shown, shown.read(""))
     fresh = finer.of_window(shown, view)
-    assert fresh.status.shape == finer.FINE and set(fresh.data_vars) >= {"discriminant", "verdict", "status"}
-    same = survey.evaluate("satellite", k=fresh.k.values, rho=fresh.rho.values, variables=["discriminant"])
+    assert fresh.status.shape == finer.FINE and set(fresh.data_vars) >= {
+        "discriminant",
+        "verdict",
+        "status",
+    }
+    same = survey.evaluate(
+        "satellite", k=fresh.k.values, rho=fresh.rho.values, variables=["discriminant"]
+    )
     bars = fresh.discriminant_error + same.discriminant_error
-    assert (abs(fresh.discriminant - same.discriminant) <= bars).all() and fresh.discriminant_error.max() < 1e-9
+    assert (
+        abs(fresh.discriminant - same.discriminant) <= bars
+    ).all() and fresh.discriminant_error.max() < 1e-9
     (low, high), axis = view.window[0], Map("window", fresh).axes[0]
     assert axis.ends == pytest.approx((low, high), abs=1e-15)  # the cells tile the window
-    assert finer.of_window(shown, shown.read(shown.link(view))).equals(fresh)  # a link shows the same
+    # a link shows the same
+    assert finer.of_window(shown, shown.read(shown.link(view))).equals(fresh)
 
 
 def test_beyond_the_map_nothing_is_solved():
@@ -477,7 +551,9 @@ READ, RUN = "Show the file", "I have read it: allow it to run until survey view 
 
 @served
 @browsed
-def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allowed(tmp_path, monkeypatch):
+def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allowed(
+    tmp_path, monkeypatch
+):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     (tmp_path / "files").mkdir()
     ran = hostile.base(tmp_path / "files")
@@ -488,7 +564,11 @@ def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allo
             return [text for text in texts if not re.search("Copy Python|survey.evaluate", text)]
 
         def press(label):
-            (button,) = (button for button in driver.execute_script(BUTTONS, "BUTTON") if button.text == label)
+            (button,) = (
+                button
+                for button in driver.execute_script(BUTTONS, "BUTTON")
+                if button.text == label
+            )
             button.click()
 
         def choose(a, q):
@@ -501,7 +581,10 @@ def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allo
         assert seen() == []
         for a in (3.5, 6.5):  # another point hides the text again
             choose(a, 2.5)
-            picture.wait(driver, lambda: any("Read it first" in text for text in driver.execute_script(TEXTS)))
+            picture.wait(
+                driver,
+                lambda: any("Read it first" in text for text in driver.execute_script(TEXTS)),
+            )
             picture.wait(driver, lambda: seen() == [READ])
             assert seen("PRE") == []
             press(READ)
@@ -511,7 +594,10 @@ def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allo
         press(RUN)
         picture.wait(driver, ran.exists)
         for a in (6.5, 3.5):  # the second without a question
-            picture.wait(driver, lambda: any("<img class='motion'" in text for text in driver.execute_script(TEXTS)))
+            picture.wait(
+                driver,
+                lambda: any("<img class='motion'" in text for text in driver.execute_script(TEXTS)),
+            )
             assert seen() == [] == seen("PRE")
             choose(a, 5.0)
     assert not (tmp_path / "state").exists(), "allowed once, not for good"

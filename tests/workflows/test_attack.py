@@ -25,12 +25,15 @@ def found(family, seed, size, index=0):
 @pytest.mark.parametrize(("family", "size"), [
     ("satellite", 40), ("mathieu", 60), ("libration_elliptic", 40), ("libration", 60), ("own", 40), ("floquet", 60),
     ("orbit", 100),
-    *(pytest.param(*one, marks=pytest.mark.slow) for one in (("gyrostat", 150), ("brun", 150))),  # compile for long
+    # compile for long
+    *(pytest.param(*one, marks=pytest.mark.slow) for one in (("gyrostat", 150), ("brun", 150))),
 ])  # fmt: skip
 def test_there_are_no_faults(family, size):
     counts, faults = found(family, 3, size)
     assert counts["points"] >= size
-    assert not faults, "\n".join(f"{f['kind']} {f['what']} {f['said']}\n  {f['line']}" for f in faults)
+    assert not faults, "\n".join(
+        f"{f['kind']} {f['what']} {f['said']}\n  {f['line']}" for f in faults
+    )
     assert counts["unchecked"] < 0.5 * counts["points"]
 
 
@@ -48,14 +51,18 @@ def batch(**more):
     """A few points of a satellite, unstable and stable, far from every edge."""
     given = {"k": np.array([0.95, 0.5, 0.3, 0.9]), "rho": np.array([0.6, 1.3, 2.0, 0.8])}
     true = hill.satellite("k", False, 1, False)
-    return compare.Batch("satellite", "control", given, true, None, {"body": "prolate"}, "auto", 1e-8, **more)
+    return compare.Batch(
+        "satellite", "control", given, true, None, {"body": "prolate"}, "auto", 1e-8, **more
+    )
 
 
 def counted(monkeypatch, change):
     """The faults counted in answers that were changed."""
     honest = survey.evaluate
     monkeypatch.setattr(
-        compare.survey, "evaluate", lambda *given, **named: change(honest(*given, **named).copy(deep=True))
+        compare.survey,
+        "evaluate",
+        lambda *given, **named: change(honest(*given, **named).copy(deep=True)),
     )
     return compare.compare(batch())[0]
 
@@ -102,7 +109,9 @@ def in_full(out, i):
     return mpf(out[2 * i]) + mpf(out[2 * i + 1])
 
 
-@pytest.mark.parametrize(("k", "rho", "oblate"), [(0.3, 1.0, False), (0.9, 2.2, True), (1.3, -0.7, False)])
+@pytest.mark.parametrize(
+    ("k", "rho", "oblate"), [(0.3, 1.0, False), (0.9, 2.2, True), (1.3, -0.7, False)]
+)
 def test_truth_of_satellites(k, rho, oblate):
     """Against mpmath's Taylor series of the pendulum, 30 digits."""
     with mp.workdps(34):
@@ -124,7 +133,9 @@ def floquet_rows(kind, number):
     """(rows of parameters, exact monodromy matrices) of a batch of this kind, as its truth has them."""
     seen = []
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(floquet, "_compared", lambda _answer, found, _period, **_more: seen.extend(found))
+        patch.setattr(
+            floquet, "_compared", lambda _answer, found, _period, **_more: seen.extend(found)
+        )
         batch = getattr(floquet, f"_{kind}")(np.random.default_rng(4), number, "auto", 1e-10)
         batch.truth(batch.given, {})
     return np.column_stack(list(batch.given.values())), [found[2] for found in seen]
@@ -156,9 +167,13 @@ def test_truth_of_danbys_map():
     """At e = 0 the circular problem, at the tip a = -4, b = 6 to the digits of the tip's float64."""
     mu = 0.01
     root = mp.sqrt(1 - 27 * mpf(mu) * (1 - mpf(mu)))
-    true = 2 * mp.cos(2 * mp.pi * mp.sqrt((1 + root) / 2)) + 2 * mp.cos(2 * mp.pi * mp.sqrt((1 - root) / 2))
+    true = 2 * mp.cos(2 * mp.pi * mp.sqrt((1 + root) / 2)) + 2 * mp.cos(
+        2 * mp.pi * mp.sqrt((1 - root) / 2)
+    )
     assert abs(danby.solved(mu, 0.0)[0, 0] - true) < 1e-15
-    assert danby.solved(*(0.04699080701821065, 0.31450715975493514))[0, [0, 2]] == pytest.approx([-4, 6], abs=1e-13)
+    assert danby.solved(*(0.04699080701821065, 0.31450715975493514))[0, [0, 2]] == pytest.approx(
+        [-4, 6], abs=1e-13
+    )
 
 
 @pytest.mark.slow
@@ -196,7 +211,8 @@ def test_truth_of_bruns_problem():
             assert abs(in_full(out[0], i) - value) < 1e-27 * (1 + abs(value))
 
 
-# L - L_sep is 2e-27: the double-double truth of T is off by 3.75e-6, its last digits are mpmath's with 120 digits
+# L - L_sep is 2e-27: the double-double truth of T is off by 3.75e-6, its last digits are mpmath's
+# with 120 digits
 SADDLE = [2.2392854657601977, 2.129834011504694, 1.9042235387022515, 1.6708645190597524, 3.202817341372608e-14,
           -0.5746061869076509, -0.021826613975397063]  # fmt: skip
 SADDLE_PERIOD = "836.306482278309586125838774447"
@@ -204,7 +220,9 @@ SADDLE_PERIOD = "836.306482278309586125838774447"
 
 @pytest.mark.slow
 def test_truth_of_a_motion_that_turns_just_before_a_pole():
-    """P(1) = 0 exactly, P < 0 next to it: it turns at 1 - u = 3.5e-17, and takes as long as our scene says."""
+    """P(1) = 0 exactly, P < 0 next to it: it turns at 1 - u = 3.5e-17, and takes as long as our
+    scene says.
+    """
     point = [2.0, 4.0, 0.5, np.pi / 2, -1.0, -1.0, -1.0]
     brun_sums.states(np.array([point]), brun.NODES, out := np.empty((1, brun_sums.COLUMNS)))
     with mp.workdps(60):
@@ -256,7 +274,9 @@ def test_truth_of_own_equations(name):
         def z(u, piece):
             if name.startswith("harmonics"):
                 x = mpf(own.TWO_PI) * u / exact[9]
-                waves = (exact[n] * mp.cos(n * x) + exact[4 + n] * mp.sin(n * x) for n in range(1, 5))
+                waves = (
+                    exact[n] * mp.cos(n * x) + exact[4 + n] * mp.sin(n * x) for n in range(1, 5)
+                )
                 return exact[0] + sum(waves)
             if name == "spike":
                 return exact[0] + exact[1] / (1 + ((u - exact[2]) / exact[3]) ** 2)

@@ -1,4 +1,6 @@
-"""The family of Abel solutions: true to the equation solved by SciPy in time, and cut by separatrices at saddles."""
+"""The family of Abel solutions: true to the equation solved by SciPy in time, and cut by
+separatrices at saddles.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +19,9 @@ OK, TURNING = 0, 16
 def family(tmp_path_factory):
     """A small copy of the survey, with its pictures."""
     folder = tmp_path_factory.mktemp("abel")
-    checked = workflow.read(ROOT / "workflows/gyrostat_abel.toml", list(SMALL), folder / "gyrostat_abel.nc")
+    checked = workflow.read(
+        ROOT / "workflows/gyrostat_abel.toml", list(SMALL), folder / "gyrostat_abel.nc"
+    )
     engine.run(checked)
     ds = api.open(checked.path)
     return ds, api.draw(ds, checked)
@@ -32,7 +36,11 @@ def motion(row, until):
     """(times, angles, velocities) at which the motion passes phi = until or w = 0, whichever is first."""
 
     def slope(_, state):
-        return [state[1], float(row.b12 * np.cos(state[0]) - row.b31 * np.sin(state[0])) * state[1] + g(state[0], row)]
+        return [
+            state[1],
+            float(row.b12 * np.cos(state[0]) - row.b31 * np.sin(state[0])) * state[1]
+            + g(state[0], row),
+        ]
 
     def reaches(_, state):
         return state[0] - until
@@ -43,13 +51,17 @@ def motion(row, until):
     reaches.terminal = turns.terminal = True
     start = [float(row.phi0), float(row.w0)]
     span = (0.0, np.copysign(60.0, (until - start[0]) * start[1]))
-    solved = solve_ivp(slope, span, start, "DOP853", events=(reaches, turns), rtol=1e-12, atol=1e-13)
+    solved = solve_ivp(
+        slope, span, start, "DOP853", events=(reaches, turns), rtol=1e-12, atol=1e-13
+    )
     return solved.t[-1], *solved.y[:, -1]
 
 
 def test_the_survey_has_its_three_pictures(family):
     _, paths = family
-    assert [path.name for path in paths] == [f"gyrostat_abel{part}.png" for part in ("", "_t", "_phi_turning")]
+    assert [path.name for path in paths] == [
+        f"gyrostat_abel{part}.png" for part in ("", "_t", "_phi_turning")
+    ]
     assert all(path.read_bytes()[:4] == b"\x89PNG" for path in paths)
 
 
@@ -64,7 +76,9 @@ def test_solutions_and_turning_points_are_those_of_the_motion_in_time(family, en
         expected = (time, velocity if int(row.status) == OK else angle)
         assert int(row.status) in (OK, TURNING)
         for name, value in zip(names, expected, strict=True):
-            assert float(row[name]) == pytest.approx(value, abs=1e-9 + float(row[f"{name}_error"])), (i, j, name)
+            assert float(row[name]) == pytest.approx(
+                value, abs=1e-9 + float(row[f"{name}_error"])
+            ), (i, j, name)
 
 
 def test_the_turning_point_jumps_over_a_saddle(family):

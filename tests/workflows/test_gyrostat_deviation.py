@@ -12,7 +12,8 @@ LARGEST, *_ = workflow.BODIES.values()
 def test_each_condition_is_needed(name):
     """A deviation is of first order in the break, and nothing else moves w2, w3, nu1."""
     small, smaller = (
-        workflow.deviation(workflow.motion(*workflow.broken(LARGEST, name, size), TIMES)[0]) for size in (1e-5, 1e-6)
+        workflow.deviation(workflow.motion(*workflow.broken(LARGEST, name, size), TIMES)[0])
+        for size in (1e-5, 1e-6)
     )
     assert smaller[-1] > 1e-8
     np.testing.assert_allclose(small[5:], 10 * smaller[5:], rtol=2e-2, atol=1e-9)
@@ -31,7 +32,8 @@ def test_the_growth_is_that_of_a_kick():
     moved = state + 1e-7 * np.kron(np.eye(2), workflow.Q)[:, 1:4] @ kick
     other, _ = workflow.motion(G, moved, TIMES)
     grown = np.linalg.norm((other - states)[-1, 1:4]) / 1e-7
-    assert grown == pytest.approx(workflow.growth(tangent)[-1], rel=1e-3)  # the tangent map is good to 1e-5 a step
+    # the tangent map is good to 1e-5 a step
+    assert grown == pytest.approx(workflow.growth(tangent)[-1], rel=1e-3)
 
 
 def test_the_picture(tmp_path):

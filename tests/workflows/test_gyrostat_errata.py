@@ -1,4 +1,6 @@
-"""The page of the gyrostat's errata: every corrected formula holds, and no printed one that is called wrong."""
+"""The page of the gyrostat's errata: every corrected formula holds, and no printed one that is
+called wrong.
+"""
 
 import gyrostat_elliptic
 import gyrostat_errata
@@ -13,7 +15,9 @@ def test_the_corrected_formula_holds_and_the_printed_one_does_not(row):
     assert printed > 1e-4 and corrected < 1e-30
 
 
-@pytest.mark.parametrize("row", [*gyrostat_errata.RIGHT, *gyrostat_errata.GAPS], ids=lambda row: row[0])
+@pytest.mark.parametrize(
+    "row", [*gyrostat_errata.RIGHT, *gyrostat_errata.GAPS], ids=lambda row: row[0]
+)
 def test_what_is_right_and_what_is_missing(row):
     assert residual(row[-1]) < 1e-30
 
@@ -26,7 +30,15 @@ def test_a_wrong_formula_would_be_seen(monkeypatch):
         "moment",
         lambda self, w, nu: whole(self, w, nu) + gyrostat_errata.matrix([1e-9, 1e-9, 1e-9]),
     )
-    for name in ("full_equations", "integrals", "rotation", "second_equation", "conditions", "set_a", "set_b"):
+    for name in (
+        "full_equations",
+        "integrals",
+        "rotation",
+        "second_equation",
+        "conditions",
+        "set_a",
+        "set_b",
+    ):
         assert residual(getattr(gyrostat_errata, name)) > 1e-12, name
 
 

@@ -1,4 +1,6 @@
-"""Critical mass ratios: the exact algebra against the published digits, the kept table, and a polynomial by hand."""
+"""Critical mass ratios: the exact algebra against the published digits, the kept table, and a
+polynomial by hand.
+"""
 
 import csv
 from fractions import Fraction
@@ -22,7 +24,10 @@ def known():
     found = {symbol: exact.CONSTANTS[name] for symbol, name in names.items()}
     found |= {f"c{label}": zeros for label, zeros in exact.CONSTANTS["coeff_zeros"].items()}
     found["M"] = exact.CONSTANTS["M_zeros_on_lines"]["lines of L = N = 0, any sign"]
-    return {symbol: sorted([value] if isinstance(value, str) else value) for symbol, value in found.items()}
+    return {
+        symbol: sorted([value] if isinstance(value, str) else value)
+        for symbol, value in found.items()
+    }
 
 
 def test_the_kept_values_have_the_known_digits_and_none_is_missing():
@@ -30,7 +35,9 @@ def test_the_kept_values_have_the_known_digits_and_none_is_missing():
     with mp.workdps(40):
         for row in ROWS:
             if not row["symbol"].startswith("("):
-                kept.setdefault("M" if row["symbol"] in ("M1", "M2") else row["symbol"], []).append(mpf(row["mu"]))
+                kept.setdefault("M" if row["symbol"] in ("M1", "M2") else row["symbol"], []).append(
+                    mpf(row["mu"])
+                )
         assert kept.keys() == known().keys()
         for symbol, values in known().items():
             assert len(kept[symbol]) == len(values), symbol
@@ -40,7 +47,12 @@ def test_the_kept_values_have_the_known_digits_and_none_is_missing():
 
 
 def test_the_command_finds_the_kept_values_again():
-    found = critical.boundaries() + critical.determinants() + critical.coefficients() + critical.resonances()
+    found = (
+        critical.boundaries()
+        + critical.determinants()
+        + critical.coefficients()
+        + critical.resonances()
+    )
     assert [(v.symbol, str(v.mu)) for v in found] == [(row["symbol"], row["mu"]) for row in ROWS]
     assert all(float(row["error"]) < 1e-15 * float(row["mu"]) for row in ROWS)
 
@@ -79,10 +91,15 @@ def test_every_claim_holds():
 
 
 def test_sturm_counts_by_hand():
-    """(5v - 1)^2 (4v - 1) (v - 2) has two different zeros below 1/2; resultants vanish where zeros are shared."""
+    """(5v - 1)^2 (4v - 1) (v - 2) has two different zeros below 1/2; resultants vanish where zeros
+    are shared.
+    """
     a = critical.times([-1, 5], [-1, 5], [-1, 4], [-2, 1])
     assert critical.count(critical.sturm(a), Fraction(0), Fraction(1, 2)) == 2
     assert critical.zeros(critical.times([-1, 4], [-2, 1])) == [(Fraction(1, 4), Fraction(1, 4))]
     assert critical.always([1, 0, 1]) and not critical.always([-1, 3])
     # the zero v of x - v is a zero of x^2 - 1/4 times 4 at v = +-1/2
-    assert critical.primitive(critical.resultant([[0, -1], [1]], [[-1], [], [4]])) in ([-1, 0, 4], [1, 0, -4])
+    assert critical.primitive(critical.resultant([[0, -1], [1]], [[-1], [], [4]])) in (
+        [-1, 0, 4],
+        [1, 0, -4],
+    )

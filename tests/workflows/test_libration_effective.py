@@ -1,4 +1,6 @@
-"""The page and picture of effective stability: its resonances, its ellipses, and what it says for few orders."""
+"""The page and picture of effective stability: its resonances, its ellipses, and what it says for
+few orders.
+"""
 
 import libration_effective as workflow
 import libration_exact as exact

@@ -13,7 +13,9 @@ from danby_exact import factors
 from mpmath import mp, mpf
 
 ROOT = Path(__file__).parents[2]
-REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
+REFERENCE = json.loads(
+    resources.files("survey.reference").joinpath("libration_elliptic.json").read_text()
+)
 
 with (ROOT / "results/libration_elliptic_boundaries.csv").open() as file:
     ROWS = {(row["curve"], row["e"]): row for row in csv.DictReader(file)}
@@ -30,13 +32,17 @@ def test_known_points_of_the_curves(row):
 
 
 @pytest.mark.parametrize(
-    "name", [("B", "0.5"), ("B", "0.9"), ("A", "0.2"), ("KC", "0.31"), ("A", "0.3145")], ids="-".join
+    "name",
+    [("B", "0.5"), ("B", "0.9"), ("A", "0.2"), ("KC", "0.31"), ("A", "0.3145")],
+    ids="-".join,
 )
 def test_the_curve_lies_within_its_error(name):
     row = ROWS[name]
     with mp.workdps(28):
         mu, error, e = mpf(float(row["mu"])), mpf(row["mu_error"]), mpf(float(row["e"]))
-        low, high = (factors(mu + side * error, e, 40 if e > 0.6 else 16)[name[0]] for side in (-1, 1))
+        low, high = (
+            factors(mu + side * error, e, 40 if e > 0.6 else 16)[name[0]] for side in (-1, 1)
+        )
     assert low * high < 0
 
 
@@ -53,7 +59,9 @@ def test_the_tip():
 def test_a_row_of_the_table_is_found_again():
     for curve, e in (("B", "0.2"), ("A", "0.314"), ("KC", "0.314")):
         [point] = boundaries.trace(curve, boundaries.np.array([float(e)]))
-        assert abs(point.mu - float(ROWS[curve, e]["mu"])) <= point.error + float(ROWS[curve, e]["mu_error"])
+        assert abs(point.mu - float(ROWS[curve, e]["mu"])) <= point.error + float(
+            ROWS[curve, e]["mu_error"]
+        )
 
 
 def test_the_strip_narrows_to_nothing():

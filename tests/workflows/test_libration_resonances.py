@@ -23,7 +23,9 @@ def images(mu, e, starts, turns=1):
 
     states, out = starts.T.ravel(), []
     for _ in range(turns):
-        states = solve_ivp(slope, (0.0, 2 * np.pi), states, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+        states = solve_ivp(
+            slope, (0.0, 2 * np.pi), states, method="DOP853", rtol=1e-12, atol=1e-14
+        ).y[:, -1]
         out.append(states.reshape(4, -1).T)
     return np.array(out)
 
@@ -42,12 +44,27 @@ def test_the_polynomials_are_those_of_the_full_motion(mu, e):
 def test_on_circles_the_normal_form_is_that_of_deprit_and_deprit_bartholome():
     for mu in (0.005, 0.01, 0.02, 0.03, 0.036):
         one, two = np.sqrt(0.5 * (1 + np.array([1, -1]) * np.sqrt(1 - 27 * mu * (1 - mu))))
-        a = two**2 * (81 - 696 * one**2 + 124 * one**4) / (144 * (1 - 2 * one**2) ** 2 * (1 - 5 * one**2))
-        b = -one * two * (43 + 64 * (one * two) ** 2) / (6 * (4 * (one * two) ** 2 - 1) * (25 * (one * two) ** 2 - 4))
-        c = one**2 * (81 - 696 * two**2 + 124 * two**4) / (144 * (1 - 2 * two**2) ** 2 * (1 - 5 * two**2))
+        a = (
+            two**2
+            * (81 - 696 * one**2 + 124 * one**4)
+            / (144 * (1 - 2 * one**2) ** 2 * (1 - 5 * one**2))
+        )
+        b = (
+            -one
+            * two
+            * (43 + 64 * (one * two) ** 2)
+            / (6 * (4 * (one * two) ** 2 - 1) * (25 * (one * two) ** 2 - 4))
+        )
+        c = (
+            one**2
+            * (81 - 696 * two**2 + 124 * two**4)
+            / (144 * (1 - 2 * two**2) ** 2 * (1 - 5 * two**2))
+        )
         theta, _, cubic = command.normal_form(mu, 0.0)
         assert np.allclose(command.twist(theta, cubic) / (2 * np.pi), [a, b, c], rtol=1e-7)
-        assert np.allclose(np.exp(1j * theta), np.exp(2j * np.pi * np.array([one, -two])), atol=1e-9)
+        assert np.allclose(
+            np.exp(1j * theta), np.exp(2j * np.pi * np.array([one, -two])), atol=1e-9
+        )
 
 
 @pytest.mark.slow
@@ -87,7 +104,9 @@ def test_at_a_resonance_of_order_3_motions_leave_and_beside_it_they_stay():
         _, V = command.diagonal(linear)
         phases = np.exp(1j * np.linspace(0.0, 2 * np.pi, 3, endpoint=False))
         q = 0.0015 * np.stack([phases, np.sqrt(2.0) * np.ones(3)], axis=1)
-        paths = images(at, 0.2, np.array([(V @ np.concatenate([x, x.conj()])).real for x in q]), 100)
+        paths = images(
+            at, 0.2, np.array([(V @ np.concatenate([x, x.conj()])).real for x in q]), 100
+        )
         sizes = abs(np.linalg.inv(V) @ paths.transpose(0, 2, 1))[:, 0]
         away.append(sizes.max() / 0.0015)
     assert away[0] > 10.0 > 2.0 > away[1], away

@@ -23,6 +23,8 @@ def test_full_and_reduced_models_agree(tmp_path, monkeypatch):
 def test_a_wrong_model_is_seen(monkeypatch):
     """Periods that are wrong by a thousandth are."""
     real = models.integrate
-    monkeypatch.setattr(models, "integrate", lambda slope, y, span, steps: real(slope, y, 1.001 * span, steps))
+    monkeypatch.setattr(
+        models, "integrate", lambda slope, y, span, steps: real(slope, y, 1.001 * span, steps)
+    )
     row = models.satellite(40, np.random.default_rng(1))
     assert float(row[5]) > 1e-4

@@ -18,7 +18,9 @@ def test_coupled_oscillators_resonate_at_the_sum_alone():
     epsilon = 0.02
     half_width = epsilon / (2 * np.sqrt(first * second))
     for k in (0.9, 1.1):
-        ds = survey.evaluate(scene, Omega=first + second + k * half_width * np.array([-1, 1]), epsilon=epsilon)
+        ds = survey.evaluate(
+            scene, Omega=first + second + k * half_width * np.array([-1, 1]), epsilon=epsilon
+        )
         assert (ds.verdict.values == (0 if k < 1 else 1)).all()
     beside = first - second + half_width * np.linspace(-2, 2, 41)
     assert (survey.evaluate(scene, Omega=beside, epsilon=epsilon).verdict == 1).all()
@@ -30,7 +32,10 @@ def test_damping_suppresses_resonances_from_a_strength_on(frequency, product):
     scene, c = str(FOLDER / "damped_oscillators.py"), 0.004
     limit = 4 * c * np.sqrt(product)
     Omega = frequency + 0.5 * limit * np.linspace(-1, 1, 41)
-    below, above = (survey.evaluate(scene, Omega=Omega, epsilon=k * limit, c=c).verdict.values for k in (0.98, 1.02))
+    below, above = (
+        survey.evaluate(scene, Omega=Omega, epsilon=k * limit, c=c).verdict.values
+        for k in (0.98, 1.02)
+    )
     assert (below == 1).all() and (above == 0).any()
 
 
@@ -48,7 +53,9 @@ def test_ground_resonance_by_plain_integration(lost):
         return np.concatenate([v, -np.linalg.solve(M, C @ v + K @ q)]).ravel()
 
     period = ground_resonance.PERIOD(p)
-    solved = solve_ivp(slope, (0, period), np.eye(12).ravel(), method="DOP853", rtol=1e-11, atol=1e-13)
+    solved = solve_ivp(
+        slope, (0, period), np.eye(12).ravel(), method="DOP853", rtol=1e-11, atol=1e-13
+    )
     exact = np.linalg.eigvals(solved.y[:, -1].reshape(12, 12))
     names = ["multiplier_re", "spectral_radius", "exponent", "verdict", "monodromy"]
     ds = survey.evaluate(
@@ -105,9 +112,18 @@ def test_duffings_folds_against_scipy():
         def rhs(t, y):
             force = F * np.cos(omega * t) - 2 * zeta * y[1] - y[0] - y[0] ** 3
             rest = -(1 + 3 * y[0] ** 2)
-            return [y[1], force, y[4], y[5], rest * y[2] - 2 * zeta * y[4], rest * y[3] - 2 * zeta * y[5]]
+            return [
+                y[1],
+                force,
+                y[4],
+                y[5],
+                rest * y[2] - 2 * zeta * y[4],
+                rest * y[3] - 2 * zeta * y[5],
+            ]
 
-        y = solve_ivp(rhs, (0, 2 * np.pi / omega), [x, v, 1, 0, 0, 1], "DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+        y = solve_ivp(
+            rhs, (0, 2 * np.pi / omega), [x, v, 1, 0, 0, 1], "DOP853", rtol=1e-11, atol=1e-12
+        ).y[:, -1]
         return [y[0] - x, y[1] - v, (y[2] - 1) * (y[5] - 1) - y[3] * y[4]]
 
     scene, omega = str(FOLDER / "duffing.py"), np.linspace(1.1, 2.6, 76)
@@ -122,7 +138,9 @@ def test_duffings_folds_against_scipy():
 
 
 def test_entrainment_by_averaging():
-    """rho ((1 - rho)^2 + sigma^2) = F^2 / 4; stable where rho > 1/2 and (1 - rho)(1 - 3 rho) + sigma^2 > 0."""
+    """rho ((1 - rho)^2 + sigma^2) = F^2 / 4; stable where rho > 1/2 and (1 - rho)(1 - 3 rho) +
+    sigma^2 > 0.
+    """
     mu = 0.02
     for sigma, low, high in ((0.2, 0.1, 1.5), (0.9, 0.5, 2.0)):
         rho = np.linspace(1e-3, 2.0, 400001)

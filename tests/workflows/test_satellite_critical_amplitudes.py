@@ -1,4 +1,6 @@
-"""The kept table of critical amplitudes: every edge within its error by multiprecision, all of them, to 12 digits."""
+"""The kept table of critical amplitudes: every edge within its error by multiprecision, all of
+them, to 12 digits.
+"""
 
 import csv
 from pathlib import Path
@@ -13,7 +15,8 @@ ROOT = Path(__file__).parents[2]
 
 with (ROOT / "results/satellite_critical_amplitudes.csv").open() as file:
     ROWS = list(csv.DictReader(file))
-PLACE = {"even_antiperiodic": 0, "even_periodic": 1, "odd_periodic": 2, "odd_antiperiodic": 3}  # in mp_factors
+# in mp_factors
+PLACE = {"even_antiperiodic": 0, "even_periodic": 1, "odd_periodic": 2, "odd_antiperiodic": 3}
 CASES = {(case.body, case.motion): case for case in critical.CASES}
 
 
@@ -32,16 +35,23 @@ def assert_within(row, digits=40):
     """The factor of the row's class changes its sign within the error, in mpmath."""
     with mp.workdps(digits):
         place, error = mpf(float(row["one_minus_k"])), mpf(float(row["one_minus_k_error"]))
-        low, high = (exactly(case_of(row), place + side * error, digits)[PLACE[row["class"]]] for side in (-1, 1))
+        low, high = (
+            exactly(case_of(row), place + side * error, digits)[PLACE[row["class"]]]
+            for side in (-1, 1)
+        )
         assert low * high < 0
         if row["rest_rad"]:  # a libration: the angles as exactly as 1 - k
             angle = 2 * mp.asin(mp.sqrt(place / 2))
             assert abs(mpf(float(row["rest_rad"])) - angle) < float(row["rest_error_rad"])
-            assert abs(mpf(float(row["amplitude_rad"])) - mp.pi / 2 + angle) < float(row["amplitude_error_rad"])
+            assert abs(mpf(float(row["amplitude_rad"])) - mp.pi / 2 + angle) < float(
+                row["amplitude_error_rad"]
+            )
             assert abs(mpf(float(row["amplitude_deg"])) - mp.degrees(mp.pi / 2 - angle)) < 1e-13
 
 
-@pytest.mark.parametrize("row", [ROWS[i] for i in (0, 1, 2, 5, 45, 67, 68)] + ROWS[-3:], ids=lambda row: row["class"])
+@pytest.mark.parametrize(
+    "row", [ROWS[i] for i in (0, 1, 2, 5, 45, 67, 68)] + ROWS[-3:], ids=lambda row: row["class"]
+)
 def test_edges_lie_within_their_errors(row):
     assert_within(row, 30)
 
@@ -71,11 +81,15 @@ def test_the_reference_to_thirty_digits():
     assert abs(mpf(float(near["k"])) - known) < float(near["k_error"]) < 1e-14
 
 
-@pytest.mark.parametrize("case", [critical.CASES[i] for i in (0, 2, 3)], ids=lambda case: case.motion)
+@pytest.mark.parametrize(
+    "case", [critical.CASES[i] for i in (0, 2, 3)], ids=lambda case: case.motion
+)
 def test_the_command_finds_the_kept_edges_again(case):
     rows = [row for row in ROWS if case_of(row) == case]
     found = critical.edges(case, panels=11)
-    assert [(edge.kind, edge.index) for edge in found] == [(row["class"], int(row["tongue"])) for row in rows]
+    assert [(edge.kind, edge.index) for edge in found] == [
+        (row["class"], int(row["tongue"])) for row in rows
+    ]
     for edge, row in zip(found, rows, strict=True):
         short, error = abs(float(row["one_minus_k"])), float(row["one_minus_k_error"])
         assert abs(edge.short - short) <= error + edge.error * edge.short
@@ -87,7 +101,9 @@ def test_the_largest_growth_of_the_rod():
     x, value = critical.largest(case, *(edge.x for edge in critical.edges(case)[:2]))
     assert 90 - np.degrees(critical.rest(np.exp(-x))) == pytest.approx(67.6, abs=0.05)
     with mp.workdps(30):
-        there, *beside = (exact_growth(case, mp.exp(-mpf(x) + step)) for step in (0, mpf("-1e-3"), mpf("1e-3")))
+        there, *beside = (
+            exact_growth(case, mp.exp(-mpf(x) + step)) for step in (0, mpf("-1e-3"), mpf("1e-3"))
+        )
     assert abs(there - value) < 1e-12 and max(beside) < there
 
 

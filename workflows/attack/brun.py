@@ -1,4 +1,6 @@
-"""Points of Brun's problem: states and scaled integrals, about poles, separatrices, precessions, without field."""
+"""Points of Brun's problem: states and scaled integrals, about poles, separatrices, precessions,
+without field.
+"""
 
 from math import pi
 
@@ -21,13 +23,29 @@ def chunk(random, size):
         if random.random() < 0.6:
             kind, points = _states(random, number)
             yield Batch(
-                "brun states", kind, dict(zip(true.NAMES, points.T, strict=True)), true.states, "brun", {}, method, rtol
+                "brun states",
+                kind,
+                dict(zip(true.NAMES, points.T, strict=True)),
+                true.states,
+                "brun",
+                {},
+                method,
+                rtol,
             )
         else:
             kind, sign, points = _integrals(random, number)
             ratio = float(random.choice([0.5, 1.0, 2.0, 1e-3, random.uniform(0.01, 2)]))
             given = dict(zip(("l", "alpha", "beta"), points.T, strict=True)) | {"ratio": ratio}
-            yield Batch("brun integrals", kind, given, true.integrals(sign), "brun", {"sign": str(sign)}, method, rtol)
+            yield Batch(
+                "brun integrals",
+                kind,
+                given,
+                true.integrals(sign),
+                "brun",
+                {"sign": str(sign)},
+                method,
+                rtol,
+            )
         used += number
 
 
@@ -60,7 +78,11 @@ def _states(random, number):
         a, b = np.where(signs[1] > 0, 0.0, a), np.where(signs[1] > 0, b, 0.0)
     elif kind in ("regular precession", "saddle"):
         k = np.abs(k) if kind == "saddle" else k
-        u = random.uniform(-0.33, 0.33, number) if kind == "saddle" else random.uniform(-0.99, 0.99, number)
+        u = (
+            random.uniform(-0.33, 0.33, number)
+            if kind == "saddle"
+            else random.uniform(-0.99, 0.99, number)
+        )
         y = signs[1] * np.sqrt(np.abs(k)) * 10 ** random.uniform(-0.4, 0.7, number)
         if kind == "saddle":
             wide = k / 2 * np.sqrt((1 - u * u) * (1 - 9 * u * u))
@@ -71,12 +93,17 @@ def _states(random, number):
     elif kind == "upright":
         k = -np.abs(k)
         a, epsilon = random.uniform(-2.5, 2.5, number) * np.sqrt(-k), k / (A * A * (1 - C))
-        theta, p, b = 10 ** -random.uniform(2, 9, number), 10 ** -random.uniform(2, 9, number), a * close
+        theta, p, b = (
+            10 ** -random.uniform(2, 9, number),
+            10 ** -random.uniform(2, 9, number),
+            a * close,
+        )
     elif kind == "special":
         theta = random.choice([pi / 2, pi / 3, 1.0, 0.5, 3.0, 2.0], number)
         p, b, a = (random.choice([0.0, 1.0, -1.0, 0.5, 2.0], number) for _ in range(3))
         A, C, epsilon = (
-            random.choice(x, number) for x in ([1.0, 2.0, 0.5], [0.5, 1.0, 2.0, 0.25], [1.0, -1.0, 0.5, 0.0])
+            random.choice(x, number)
+            for x in ([1.0, 2.0, 0.5], [0.5, 1.0, 2.0, 0.25], [1.0, -1.0, 0.5, 0.0])
         )
     elif kind == "large":
         scale = 10 ** random.uniform(-10, 10, number)
@@ -110,7 +137,10 @@ def _integrals(random, number):
         sign, u = 1, random.uniform(-0.33, 0.33, number)
         wide = 0.5 * np.sqrt((1 - u * u) * (1 - 9 * u * u)) * random.uniform(-1, 1, number)
         if kind == "cusp":
-            wide = wide * 10 ** -random.uniform(3, 16, number) + 0.5 * np.sqrt((1 - u * u) * (1 - 9 * u * u)) * side[1]
+            wide = (
+                wide * 10 ** -random.uniform(3, 16, number)
+                + 0.5 * np.sqrt((1 - u * u) * (1 - 9 * u * u)) * side[1]
+            )
         y = side[0] * np.sqrt(np.maximum(0.5 * (1 - 3 * u * u) + wide, 1e-6))
     if kind in ("saddle", "cusp", "regular precession"):
         alpha, beta = u * (y - sign / y), y - sign * u * u / y
@@ -121,7 +151,13 @@ def _integrals(random, number):
         beta = side[0] * alpha * (1 + close * side[1])
     elif kind == "upright":
         beta = side[0] * alpha * (1 + close)
-        return kind, sign, np.column_stack([alpha * alpha - sign + random.uniform(0, 100, number) * close, alpha, beta])
+        return (
+            kind,
+            sign,
+            np.column_stack(
+                [alpha * alpha - sign + random.uniform(0, 100, number) * close, alpha, beta]
+            ),
+        )
     elif kind == "fast spin":
         alpha = alpha * 10 ** random.uniform(1, 8, number)
     elif kind == "tiny field":
@@ -129,8 +165,14 @@ def _integrals(random, number):
         alpha, beta = large * alpha, large * beta
     elif kind == "special":
         alpha, beta = (random.choice([0.0, 1.0, -1.0, 0.5, 2.0], number) for _ in range(2))
-        return kind, sign, np.column_stack([random.choice([0.0, 1.0, 2.0, 3.0, 0.5, 4.0, -0.25], number), alpha, beta])
-    level = np.maximum(alpha * alpha, beta * beta) * (1 + 10 ** random.uniform(-3, 1, number)) + random.uniform(
-        -1, 1, number
-    )
+        return (
+            kind,
+            sign,
+            np.column_stack(
+                [random.choice([0.0, 1.0, 2.0, 3.0, 0.5, 4.0, -0.25], number), alpha, beta]
+            ),
+        )
+    level = np.maximum(alpha * alpha, beta * beta) * (
+        1 + 10 ** random.uniform(-3, 1, number)
+    ) + random.uniform(-1, 1, number)
     return kind, sign, np.column_stack([level, alpha, beta])

@@ -1,4 +1,6 @@
-"""The attack as a whole: chunks of points, each of its own seed, in processes; what is done is kept; the table."""
+"""The attack as a whole: chunks of points, each of its own seed, in processes; what is done is
+kept; the table.
+"""
 
 import csv
 import hashlib
@@ -34,7 +36,8 @@ FAMILIES = {
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
 LATER = ("floquet", "orbit")
-SEEDS = (*sorted(FAMILIES.keys() - set(LATER)), *LATER)  # later families last: those before keep their points
+# later families last: those before keep their points
+SEEDS = (*sorted(FAMILIES.keys() - set(LATER)), *LATER)
 FOLDER, TRUTHS = Path(__file__).parent, Path(truth.__file__).parent
 LISTED = 60  # faults in the page
 
@@ -106,13 +109,19 @@ def run(points, scenes, seed, output, workers, minutes, fresh):
     chunks = plan(points, scenes)
     left = [c for c in chunks if not _path(kept, c).exists()]
     _work(left, seed, kept, workers, minutes, console, len(chunks) - len(left), len(chunks))
-    found = [json.loads(_path(kept, c).read_text(encoding="utf-8")) for c in chunks if _path(kept, c).exists()]
+    found = [
+        json.loads(_path(kept, c).read_text(encoding="utf-8"))
+        for c in chunks
+        if _path(kept, c).exists()
+    ]
     if not found:
         return 4
     count = write(output, found, identity, len(found) == len(chunks))
     console.print(f"attack: {output}: {count or 'no'} faults", soft_wrap=True)
     if len(found) < len(chunks):
-        console.print(f"attack: {len(chunks) - len(found)} of {len(chunks)} chunks left: give the same command again")
+        console.print(
+            f"attack: {len(chunks) - len(found)} of {len(chunks)} chunks left: give the same command again"
+        )
         return 4
     return 1 if count else 0
 
@@ -140,13 +149,26 @@ def _work(left, seed, kept, workers, minutes, console, done, number):
             for future in ready:
                 chunk = waiting.pop(future)
                 path = _path(kept, chunk)
-                path.with_suffix(".part").write_text(json.dumps(future.result(), default=str), encoding="utf-8")
+                path.with_suffix(".part").write_text(
+                    json.dumps(future.result(), default=str), encoding="utf-8"
+                )
                 os.replace(path.with_suffix(".part"), path)
                 done += 1
                 progress(done, number, reused, "chunks")
 
 
-COLUMNS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wrong", "silent", "tracebacks", "slow")
+COLUMNS = (
+    "points",
+    "undecided",
+    "missed",
+    "refused",
+    "unchecked",
+    "lies",
+    "wrong",
+    "silent",
+    "tracebacks",
+    "slow",
+)
 
 
 def _merged(rows, key):
@@ -159,14 +181,26 @@ def _merged(rows, key):
 
 def _table(rows, key, titles):
     counts, worst = _merged(rows, key)
-    shares, numbers = ("undecided", "missed", "refused", "unchecked"), ("lies", "wrong", "silent", "tracebacks", "slow")
-    heads = [*titles, "points", *(f"{x} %" for x in shares), "worst error / bar", *numbers, "us a point"]
+    shares, numbers = (
+        ("undecided", "missed", "refused", "unchecked"),
+        ("lies", "wrong", "silent", "tracebacks", "slow"),
+    )
+    heads = [
+        *titles,
+        "points",
+        *(f"{x} %" for x in shares),
+        "worst error / bar",
+        *numbers,
+        "us a point",
+    ]
     lines = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
     for name in sorted(counts):
         c = counts[name]
         share = [f"{100 * c[x] / c['points']:.1f}" for x in shares]
         cells = [f"{c['points']:,}", *share, f"{worst[name]:.2g}", *(str(c[x]) for x in numbers)]
-        lines.append("| " + " | ".join([*name, *cells, f"{1e6 * c['seconds'] / c['points']:.0f}"]) + " |")
+        lines.append(
+            "| " + " | ".join([*name, *cells, f"{1e6 * c['seconds'] / c['points']:.0f}"]) + " |"
+        )
     return lines
 
 
@@ -180,7 +214,9 @@ def write(output, found, identity, complete):
         writer.writerow(["scene", "method", "region", *COLUMNS, "worst_error_over_bar", "seconds"])
         for name in sorted(counts):
             c = counts[name]
-            writer.writerow([*name, *(c[x] for x in COLUMNS), f"{worst[name]:.4g}", f"{c['seconds']:.4g}"])
+            writer.writerow(
+                [*name, *(c[x] for x in COLUMNS), f"{worst[name]:.4g}", f"{c['seconds']:.4g}"]
+            )
     total = sum(counts.values(), Counter())
     count = sum(total[x] for x in FAULTS)
     seconds = sum(part["seconds"] for part in found)
@@ -190,7 +226,9 @@ def write(output, found, identity, complete):
     if faults:
         page += ["## Faults", ""]
     for fault in _spread(faults):
-        words = f"{fault['kind']}, {fault['scene']}, {fault['region']}: {fault['what']} {fault['said']}"
+        words = (
+            f"{fault['kind']}, {fault['scene']}, {fault['region']}: {fault['what']} {fault['said']}"
+        )
         shown = [f"  {line}" for line in fault["line"].splitlines()]
         page += [f"- {words} (chunk {fault['chunk']})", "", "  ```text", *shown, "  ```"]
     output.parent.mkdir(parents=True, exist_ok=True)

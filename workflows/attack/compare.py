@@ -1,8 +1,9 @@
 """One batch of points solved and compared: the answer at each against a truth of higher accuracy.
 
-A lie is a value farther from the truth than its error bar and the truth's own doubt together; a wrong verdict one that
-the truth contradicts beyond its doubt. Silent is what the contract forbids without a word: a value or bar that is not
-finite although the status is ok, a negative bar, a status without a sentence, a verdict beside a status that is not ok.
+A lie is a value farther from the truth than its error bar and the truth's own doubt together; a
+wrong verdict one that the truth contradicts beyond its doubt. Silent is what the contract forbids
+without a word: a value or bar that is not finite although the status is ok, a negative bar, a
+status without a sentence, a verdict beside a status that is not ok.
 """
 
 import time
@@ -20,7 +21,18 @@ from survey.request import user_scene
 from survey.scene import exists
 from survey.truth import distance
 
-COUNTS = ("points", "undecided", "missed", "refused", "unchecked", "lies", "wrong", "silent", "tracebacks", "slow")
+COUNTS = (
+    "points",
+    "undecided",
+    "missed",
+    "refused",
+    "unchecked",
+    "lies",
+    "wrong",
+    "silent",
+    "tracebacks",
+    "slow",
+)
 FAULTS = ("lies", "wrong", "silent", "tracebacks")
 SLOW, HALF = 5.0, 0.5  # seconds of a batch, and for each of its points
 TINY = 1e-200
@@ -29,10 +41,12 @@ SHOWN = 6  # faults of a kind that are described for a batch
 
 @dataclass
 class Batch:
-    """Points of one request: `given` holds arrays (N) of parameters, `options` the rest of the call.
+    """Points of one request: `given` holds arrays (N) of parameters, `options` the rest of the
+    call.
 
-    `truth(given, answer)` returns {output: (value, low, doubt)}, arrays that broadcast to the output, NaN where nothing
-    is known, and may hold "wrong": {what: mask}. `how` is the source text of the scene where it is not a name.
+    `truth(given, answer)` returns {output: (value, low, doubt)}, arrays that broadcast to the
+    output, NaN where nothing is known, and may hold "wrong": {what: mask}. `how` is the source text
+    of the scene where it is not a name.
     """
 
     name: str
@@ -70,13 +84,18 @@ def solve(batch, part=slice(None)):
             given[key] = xr.DataArray(np.asarray(values, float)[part], dims="point")
         else:
             given[key] = values
-    return survey.evaluate(batch.scene or batch.name, method=batch.method, rtol=batch.rtol, **given, **batch.options)
+    return survey.evaluate(
+        batch.scene or batch.name, method=batch.method, rtol=batch.rtol, **given, **batch.options
+    )
 
 
 def line(batch, i):
     """One line of Python that solves point i alone."""
     words = [batch.how or repr(batch.scene or batch.name)]
-    words += [f"{key}={float(values[i] if np.ndim(values) else values)!r}" for key, values in batch.each().items()]
+    words += [
+        f"{key}={float(values[i] if np.ndim(values) else values)!r}"
+        for key, values in batch.each().items()
+    ]
     words += [f"{key}={value!r}" for key, value in batch.options.items()]
     return f"survey.evaluate({', '.join(words)}, method={batch.method!r}, rtol={batch.rtol!r})"
 
@@ -99,15 +118,26 @@ def compare(batch):
         counts["refused"] += batch.size
         return counts, 0.0, faults
     except Exception:
-        _report(batch, counts, faults, "tracebacks", [0], "traceback", traceback.format_exc(limit=-3))
+        _report(
+            batch, counts, faults, "tracebacks", [0], "traceback", traceback.format_exc(limit=-3)
+        )
         return counts, 0.0, faults
     counts["seconds"] = seconds = time.perf_counter() - began - (_compile_seconds() - compiled)
-    if seconds > SLOW + HALF * np.prod(shape(batch)):  # again, as the first call loads what was compiled
+    # again, as the first call loads what was compiled
+    if seconds > SLOW + HALF * np.prod(shape(batch)):
         began = time.process_time()
         solve(batch)
         counts["seconds"] = seconds = time.process_time() - began
         if seconds > SLOW + HALF * np.prod(shape(batch)):
-            _report(batch, counts, faults, "slow", [0], "seconds a point", f"{seconds / np.prod(shape(batch)):.3g}")
+            _report(
+                batch,
+                counts,
+                faults,
+                "slow",
+                [0],
+                "seconds a point",
+                f"{seconds / np.prod(shape(batch)):.3g}",
+            )
     answer = {name: _flat(batch, ds[name]) for name in ds.data_vars}
     _, module = user_scene.find(batch.scene or batch.name)
     _silent(batch, module, answer, counts, faults)
@@ -120,7 +150,15 @@ def compare(batch):
 def failed(batch):
     """The same where the comparison itself ended in an exception, which is being handled."""
     counts, faults = Counter(points=batch.size), []
-    _report(batch, counts, faults, "tracebacks", [0], "in the comparison", traceback.format_exc(limit=-3))
+    _report(
+        batch,
+        counts,
+        faults,
+        "tracebacks",
+        [0],
+        "in the comparison",
+        traceback.format_exc(limit=-3),
+    )
     return counts, 0.0, faults
 
 
@@ -165,20 +203,31 @@ def _silent(batch, module, answer, counts, faults):
         real = np.isfinite(values)
         with np.errstate(invalid="ignore"):
             wrong = np.isinf(values) | (real & ~(np.isfinite(bars) & (bars >= 0)))
-            wrong |= real & (bars == 0) & (values != 0) & (np.abs(values) < TINY)  # the bar has underflowed
+            # the bar has underflowed
+            wrong |= real & (bars == 0) & (values != 0) & (np.abs(values) < TINY)
             missed |= _any(real & (bars > batch.rtol * (1 + np.abs(values)))) & ok
         if not o.applies:
             wrong |= ~real & _as(ok, values)
         wrong |= real & _as(said == status.INVALID_PARAMETERS, values)
         if wrong.any():
-            _report(batch, counts, faults, "silent", np.flatnonzero(_any(wrong)), f"{o.name} or its bar", "")
+            _report(
+                batch,
+                counts,
+                faults,
+                "silent",
+                np.flatnonzero(_any(wrong)),
+                f"{o.name} or its bar",
+                "",
+            )
     counts["missed"] += int(missed.sum())
     if bad.any():
         _report(batch, counts, faults, "silent", np.flatnonzero(bad), "status or flag", "")
 
 
 def _defaults(module, batch):
-    return {o.name: o.default for o in module.OPTIONS if not o.only_with and o.name not in batch.options}
+    return {
+        o.name: o.default for o in module.OPTIONS if not o.only_with and o.name not in batch.options
+    }
 
 
 def _any(mask):
@@ -196,7 +245,15 @@ def _truth(batch, answer, counts, faults):
         mask = np.broadcast_to(mask, answer["status"].shape)
         if mask.any():
             verdicts = answer.get("verdict", answer["status"])
-            _report(batch, counts, faults, "wrong", np.flatnonzero(mask), what, lambda i, v=verdicts: f"said {v[i]}")
+            _report(
+                batch,
+                counts,
+                faults,
+                "wrong",
+                np.flatnonzero(mask),
+                what,
+                lambda i, v=verdicts: f"said {v[i]}",
+            )
     checked = np.zeros(answer["status"].shape, bool) | truth.pop("checked", False)
     for name, (value, low, doubt) in truth.items():
         said, bar = answer[name], answer[f"{name}_error"].astype(float)
@@ -224,8 +281,8 @@ def _truth(batch, answer, counts, faults):
 
 
 def _order(answer, own, part):
-    """For each multiplier of the points `part` the nearest of their `own`: moduli that are nearly equal may be sorted
-    one way or the other.
+    """For each multiplier of the points `part` the nearest of their `own`: moduli that are nearly
+    equal may be sorted one way or the other.
     """
     mine, theirs = (found["multiplier_re"] + 1j * found["multiplier_im"] for found in (answer, own))
     off = np.nan_to_num(abs(mine[part][:, :, None] - theirs[:, None, :]), nan=1.0)
@@ -233,11 +290,17 @@ def _order(answer, own, part):
 
 
 def _solved_again(batch, answer, counts, faults):
-    """Some of the points in another order, alone, at another rtol: within the sum of both bars, no other verdict."""
+    """Some of the points in another order, alone, at another rtol: within the sum of both bars, no
+    other verdict.
+    """
     random = np.random.default_rng(int(batch.rtol * 1e16))
     part = random.permutation(batch.size)[:3]
-    each = {key: values[part] if np.ndim(values) else values for key, values in batch.each().items()}
-    other = replace(batch, given=each, cross=(), chosen=None, rtol=float(10.0 ** -random.uniform(6, 13)))
+    each = {
+        key: values[part] if np.ndim(values) else values for key, values in batch.each().items()
+    }
+    other = replace(
+        batch, given=each, cross=(), chosen=None, rtol=float(10.0 ** -random.uniform(6, 13))
+    )
     ds = solve(other)
     ok = (answer["status"][part] == status.OK) & (ds["status"].values == status.OK)
     own = {name: _flat(other, ds[name]) for name in ds.data_vars}
@@ -256,7 +319,13 @@ def _solved_again(batch, answer, counts, faults):
                   lambda i, a=a, b=b: f"{a[i]!r} in its batch at rtol {batch.rtol!r}, {b[i]!r} alone")  # fmt: skip
     if "verdict" in ds:
         a, b = answer["verdict"][part], _flat(other, ds["verdict"])
-        apart = ok & (a >= 0) & (b >= 0) & (a != b) & ~((batch.name == "brun states") & (np.minimum(a, b) >= 1))
+        apart = (
+            ok
+            & (a >= 0)
+            & (b >= 0)
+            & (a != b)
+            & ~((batch.name == "brun states") & (np.minimum(a, b) >= 1))
+        )
         if apart.any():
             _report(other, counts, faults, "wrong", np.flatnonzero(apart), "verdict alone or at another rtol",
                   lambda i, a=a, b=b: f"{a[i]} in its batch at rtol {batch.rtol!r}, {b[i]} alone")  # fmt: skip

@@ -20,14 +20,27 @@ def chunk(random, size):
         number = int(random.choice([1, NUMBERS.get(method, 48)]))
         kind = str(
             random.choice(
-                ["generic", "tip", "curve", "e to 1", "e to 0", "mu to 0", "mu to 1/2", "special", "dense row"]
+                [
+                    "generic",
+                    "tip",
+                    "curve",
+                    "e to 1",
+                    "e to 0",
+                    "mu to 0",
+                    "mu to 1/2",
+                    "special",
+                    "dense row",
+                ]
             )
         )
         mu, e = random.uniform(0, 0.06, number), random.uniform(0, 0.9, number)
         small = 10 ** -random.uniform(1, 17, number)
         signs = random.choice([-1.0, 1.0], (2, number))
         if kind == "tip":
-            mu, e = TIP[0] + signs[0] * small * TIP[0], TIP[1] + signs[1] * small * 10 ** random.uniform(-1, 1, number)
+            mu, e = (
+                TIP[0] + signs[0] * small * TIP[0],
+                TIP[1] + signs[1] * small * 10 ** random.uniform(-1, 1, number),
+            )
         elif kind == "e to 1":
             e = np.minimum(1 - 10 ** -random.uniform(1, 14, number), np.nextafter(1, 0))
             mu = 10 ** random.uniform(-13, -0.302, number)
@@ -38,17 +51,24 @@ def chunk(random, size):
             mu = 10 ** -random.uniform(2, 300, number)
         elif kind == "mu to 1/2":
             mu = np.where(
-                random.random(number) < 0.3, 0.5 - random.integers(0, 9, number) * 2.0**-54, 0.5 - small * 0.5
+                random.random(number) < 0.3,
+                0.5 - random.integers(0, 9, number) * 2.0**-54,
+                0.5 - small * 0.5,
             )
             mu = np.minimum(mu, 0.5)
             if random.random() < 0.5:
                 e = random.choice([1 - small * 0.99, small, e])
         elif kind == "special":
-            mu = random.choice([0.0, 0.5, 5e-324, 1e-300, POINT[0], ROUTH, np.nextafter(0.5, 0), 0.25, 0.125], number)
+            mu = random.choice(
+                [0.0, 0.5, 5e-324, 1e-300, POINT[0], ROUTH, np.nextafter(0.5, 0), 0.25, 0.125],
+                number,
+            )
             e = random.choice([0.0, 5e-324, 1e-300, 0.5, 0.9, np.nextafter(1, 0), TIP[1]], number)
         elif kind == "curve":
             fixed = float(
-                random.uniform(0.0, 0.8) if random.random() < 0.6 else TIP[1] * (1 - 10 ** -random.uniform(0.3, 7))
+                random.uniform(0.0, 0.8)
+                if random.random() < 0.6
+                else TIP[1] * (1 - 10 ** -random.uniform(0.3, 7))
             )
             x = _curve(random, fixed)
             if x is None:
@@ -59,10 +79,24 @@ def chunk(random, size):
             mu = random.uniform(0, 0.5 if random.random() < 0.3 else 0.06, 150)
             mu[:4] = 0.5 - np.arange(4) * 2.0**-54  # (two of them are 1/2)
             mu = np.unique(mu)
-            chosen = np.append(random.choice(mu.size - 3, 27, replace=False), mu.size - 1 - np.arange(3))
+            chosen = np.append(
+                random.choice(mu.size - 3, 27, replace=False), mu.size - 1 - np.arange(3)
+            )
             method = "taylor16" if method == "taylor16" else "auto"
             given = {"mu": mu, "e": np.array([e])}
-            yield Batch("libration_elliptic", kind, given, truth, None, {}, method, rtol, "", ("mu", "e"), chosen)
+            yield Batch(
+                "libration_elliptic",
+                kind,
+                given,
+                truth,
+                None,
+                {},
+                method,
+                rtol,
+                "",
+                ("mu", "e"),
+                chosen,
+            )
             used += 30
             continue
         yield Batch("libration_elliptic", kind, {"mu": mu, "e": e}, truth, None, {}, method, rtol)

@@ -28,9 +28,19 @@ def chunk(random, size):
         if random.random() < 0.2:
             kind, p = "degenerate", _degenerate(random, number)
         if portrait:
-            yield Batch("gyrostat portrait", kind, p, _portrait, "gyrostat", {"question": "portrait"}, method, rtol)
+            yield Batch(
+                "gyrostat portrait",
+                kind,
+                p,
+                _portrait,
+                "gyrostat",
+                {"question": "portrait"},
+                method,
+                rtol,
+            )
         else:
-            p = {name: np.full(number, values[0]) for name, values in p.items()}  # one system, many starts
+            # one system, many starts
+            p = {name: np.full(number, values[0]) for name, values in p.items()}
             phi, w = random.uniform(-7, 7, number), random.normal(size=number) * 2
             for i in range(0, number, 3):
                 found = _separatrix({name: values[i] for name, values in p.items()}, random)
@@ -38,7 +48,9 @@ def chunk(random, size):
                     phi[i], w[i] = found
             w[1], phi[-1] = 0.0, 0.0
             given = p | {"phi0": phi, "w0": w}
-            yield Batch("gyrostat fate", kind, given, _fate, "gyrostat", {"question": "fate"}, method, rtol)
+            yield Batch(
+                "gyrostat fate", kind, given, _fate, "gyrostat", {"question": "fate"}, method, rtol
+            )
         used += number
 
 
@@ -80,8 +92,13 @@ def _sinks(p):
         for _ in range(55):
             c = 0.5 * (a + b)
             a, b = (c, b) if force(p, c) > 0 else (a, c)
-        f, slope = p["b12"] * np.cos(a) - p["b31"] * np.sin(a), (force(p, a + 1e-5) - force(p, a - 1e-5)) / 2e-5
-        rate = max(abs(p[name]) for name in ("b12", "b31")) + np.sqrt(max(abs(p[name]) for name in SYSTEM[2:]))
+        f, slope = (
+            p["b12"] * np.cos(a) - p["b31"] * np.sin(a),
+            (force(p, a + 1e-5) - force(p, a - 1e-5)) / 2e-5,
+        )
+        rate = max(abs(p[name]) for name in ("b12", "b31")) + np.sqrt(
+            max(abs(p[name]) for name in SYSTEM[2:])
+        )
         if f < -0.1 * rate and slope < -0.1 * rate**2:
             found.append(a)
     return found
@@ -90,7 +107,9 @@ def _sinks(p):
 def _fate(given, answer):
     n = len(answer["status"])
     p = {name: float(given[name][0]) for name in SYSTEM}
-    points = np.ascontiguousarray(np.column_stack([given[name] for name in (*SYSTEM, "phi0", "w0")]))
+    points = np.ascontiguousarray(
+        np.column_stack([given[name] for name in (*SYSTEM, "phi0", "w0")])
+    )
     section, sinks = _section(p), _sinks(p)
     out = np.full((n, 8), np.nan)
     ok = answer["status"] == 0
@@ -100,14 +119,20 @@ def _fate(given, answer):
     wrong, checked = np.zeros(n, bool), np.zeros(n, bool)
     for i in np.flatnonzero(ok & (said >= 0) & (out[:, 7] == 1)):
         at = (out[i, 0] + np.pi) % (2 * np.pi) - np.pi
-        rest = [s for s in sinks if abs((at - s + np.pi) % (2 * np.pi) - np.pi) < 1e-3 and abs(out[i, 1]) < 1e-3]
+        rest = [
+            s
+            for s in sinks
+            if abs((at - s + np.pi) % (2 * np.pi) - np.pi) < 1e-3 and abs(out[i, 1]) < 1e-3
+        ]
         if rest:
             limit = answer["limit_phi"][i]
             here = said[i] == 0 and abs((limit - rest[0] + np.pi) % (2 * np.pi) - np.pi) < 1e-6
             wrong[i], checked[i] = not here, True
         elif said[i] in (2, 3):
             speed = out[i, 2] * out[i, 6]
-            checked[i] = np.isfinite(speed) and abs(speed - answer["limit_w"][i]) < 1e-3 * (1 + abs(speed))
+            checked[i] = np.isfinite(speed) and abs(speed - answer["limit_w"][i]) < 1e-3 * (
+                1 + abs(speed)
+            )
         elif said[i] in (5, 6):
             checked[i] = np.sign(out[i, 1]) == (1 if said[i] == 5 else -1)
         elif said[i] == 4:
@@ -117,10 +142,11 @@ def _fate(given, answer):
 
 
 def _same(given, answer, options, mirror):
-    """Where the exact mirror image (S2), scaled by powers of two (S5), has another fate, or portrait: a mask.
+    """Where the exact mirror image (S2), scaled by powers of two (S5), has another fate, or
+    portrait: a mask.
 
-    Verdict 0 of a portrait, degenerate within its bars, contradicts no other: where both are 1, they have the same
-    numbers of equilibria and of cycles.
+    Verdict 0 of a portrait, degenerate within its bars, contradicts no other: where both are 1,
+    they have the same numbers of equilibria and of cycles.
     """
     image = {}
     for name, values in given.items():
@@ -130,15 +156,26 @@ def _same(given, answer, options, mirror):
     solved, said = _solved(image, options), answer["verdict"]
     other = solved["verdict"].values
     if options["question"] == "portrait":
-        two = np.array([[x[name] for name in ("equilibria", "saddles", "librations")] for x in (answer, solved)])
+        two = np.array(
+            [
+                [x[name] for name in ("equilibria", "saddles", "librations")]
+                for x in (answer, solved)
+            ]
+        )
         rotations = [x["rotations_plus"] + x["rotations_minus"] for x in (answer, solved)]
-        return (said == 1) & (other == 1) & ((two[0] != two[1]).any(axis=0) | (rotations[0] != np.array(rotations[1])))
+        return (
+            (said == 1)
+            & (other == 1)
+            & ((two[0] != two[1]).any(axis=0) | (rotations[0] != np.array(rotations[1])))
+        )
     turned = np.array([MIRROR.get(int(v), int(v)) for v in said])
     return (said >= 0) & (other >= 0) & (turned != other)
 
 
 def _solved(given, options):
-    return survey.evaluate("gyrostat", **{k: xr.DataArray(v, dims="point") for k, v in given.items()}, **options)
+    return survey.evaluate(
+        "gyrostat", **{k: xr.DataArray(v, dims="point") for k, v in given.items()}, **options
+    )
 
 
 def _portrait(given, answer):
@@ -148,7 +185,8 @@ def _portrait(given, answer):
     angles = np.full(answer["equilibrium_phi"].shape, np.nan, LONG)
     doubts = np.full(angles.shape, np.nan)
     cycles = {
-        name: np.full(answer["cycle_w"].shape, np.nan) for name in ("cycle_w", "cycle_period", "cycle_multiplier")
+        name: np.full(answer["cycle_w"].shape, np.nan)
+        for name in ("cycle_w", "cycle_period", "cycle_multiplier")
     }
     slack = {name: np.full(answer["cycle_w"].shape, np.nan) for name in cycles}
     wrong = {name: np.zeros(n, bool) for name in ("equilibria", "parity", "ends")}
@@ -165,7 +203,9 @@ def _portrait(given, answer):
         x = np.linspace(0, 2 * np.pi, 2881)[:-1] + 1e-4
         signs = np.signbit(force(p, x))
         crossings = int((signs != np.roll(signs, 1)).sum())
-        wrong["equilibria"][i] = decided and any(p[name] for name in SYSTEM[2:]) and answer["equilibria"][i] < crossings
+        wrong["equilibria"][i] = (
+            decided and any(p[name] for name in SYSTEM[2:]) and answer["equilibria"][i] < crossings
+        )
         # within the rounding of the parameters K counts as 0, as the scene's text says
         if decided and abs(K) > 1e-15 * (abs(q["b12"] * q["s3"]) + abs(q["b31"] * q["s2"])):
             plus, minus = answer["end_plus"][i], answer["end_minus"][i]
@@ -180,11 +220,15 @@ def _portrait(given, answer):
             good = np.abs(slope) > 1e-4 * size
             angles[i] = np.where(good, e - g / slope, np.nan)
             doubts[i] = np.where(
-                good, 16 * ULP * size / np.abs(slope) + 10 * (g / slope) ** 2 * size / np.abs(slope), np.nan
+                good,
+                16 * ULP * size / np.abs(slope) + 10 * (g / slope) ** 2 * size / np.abs(slope),
+                np.nan,
             )
         if decided:
             _cycles(p, answer, i, cycles, slack)
-    found = {name: (values[0], values[1], 1e-30 * np.abs(values[0])) for name, values in exact.items()}
+    found = {
+        name: (values[0], values[1], 1e-30 * np.abs(values[0])) for name, values in exact.items()
+    }
     found["L"] = found["L"][0], found["L"][1], 8 * ULP * np.abs(found["L"][0])
     found["equilibrium_phi"] = angles, 0.0, doubts
     for name in cycles:
@@ -203,7 +247,12 @@ def _cycles(p, answer, i, cycles, slack):
     section = _section(p)
     for j in range(answer["cycle_w"].shape[1]):
         w, m = answer["cycle_w"][i, j], answer["cycle_multiplier"][i, j]
-        if answer["cycle_kind"][i, j] not in (1, 2) or not np.isfinite(w + m) or abs(m - 1) < 1e-3 or m > 1e3:
+        if (
+            answer["cycle_kind"][i, j] not in (1, 2)
+            or not np.isfinite(w + m)
+            or abs(m - 1) < 1e-3
+            or m > 1e3
+        ):
             continue
         step = 1e-7 * abs(w)
         goal = section + np.copysign(2 * np.pi, w)
@@ -215,8 +264,12 @@ def _cycles(p, answer, i, cycles, slack):
         slope = (out[2, 0] - out[0, 0]) / (2 * step)
         defect = (out[1, 0] - w) + out[1, 1]
         cycles["cycle_w"][i, j] = w + defect / (1 - slope)
-        slack["cycle_w"][i, j] = 1e-13 * (1 + abs(w)) / abs(1 - slope) + 1e-3 * abs(defect / (1 - slope))
+        slack["cycle_w"][i, j] = 1e-13 * (1 + abs(w)) / abs(1 - slope) + 1e-3 * abs(
+            defect / (1 - slope)
+        )
         cycles["cycle_multiplier"][i, j] = slope
         slack["cycle_multiplier"][i, j] = 1e-6 * (1 + slope) / min(1, abs(w))
-        cycles["cycle_period"][i, j] = out[1, 2] + (out[2, 2] - out[0, 2]) / (2 * step) * (cycles["cycle_w"][i, j] - w)
+        cycles["cycle_period"][i, j] = out[1, 2] + (out[2, 2] - out[0, 2]) / (2 * step) * (
+            cycles["cycle_w"][i, j] - w
+        )
         slack["cycle_period"][i, j] = 1e-13 * (1 + out[1, 2]) * (1 + 1 / abs(w)) / abs(1 - slope)

@@ -1,8 +1,9 @@
-"""Points of linear periodic systems of one's own, held against systems whose monodromy matrix is known exactly.
+"""Points of linear periodic systems of one's own, held against systems whose monodromy matrix is
+known exactly.
 
 scaled      x' = (1 + c cos wt) B x, B = S L S^-1: M = S exp(G L) S^-1, G = T + c sin(wT) / w. S is a unimodular matrix
-            of integers and L has blocks of few bits, so that float64 holds B exactly; constant systems have c = 0;
-            blocks of two may be Jordan's, or nearly
+            of integers and L has blocks of few bits, so that float64 holds B exactly; constant
+            systems have c = 0; blocks of two may be Jordan's, or nearly
 damped      y'' + 2 c y' + z(t) y = 0: exp(-cT) times the solutions of v'' + (z - c^2) v = 0, in double-double
 coupled     M q'' + K(t) q = 0, M = U'U, K = U' diag(z_i(t)) U: Hill equations that do not know of each other
 """
@@ -23,7 +24,15 @@ from survey.truth.hill_flow import HARMONICS, TWO_PI
 
 DIGITS = 45
 DOUBT = 1e-20  # multipliers that nearly meet follow from a trace of 30 digits
-VARIABLES = ["multiplier_re", "multiplier_im", "spectral_radius", "exponent", "monodromy", "period", "verdict"]
+VARIABLES = [
+    "multiplier_re",
+    "multiplier_im",
+    "spectral_radius",
+    "exponent",
+    "monodromy",
+    "period",
+    "verdict",
+]
 METHODS = ("auto", "auto", "auto", "auto", "taylor16", "dop853")
 NAMES = ("a", "q", "s", "c", "T")
 
@@ -33,11 +42,17 @@ def chunk(random, size):
 
 
 def mixed(random, size, kinds, numbers):
-    """Batches of these kinds, functions of (random, number, method, rtol), and numbers of points; `size` in all."""
+    """Batches of these kinds, functions of (random, number, method, rtol), and numbers of points;
+    `size` in all.
+    """
     used = 0
     while used < size:
         kind = kinds[random.choice(len(kinds))]
-        number, rtol, method = int(random.choice(numbers)), accuracy(random), str(random.choice(METHODS))
+        number, rtol, method = (
+            int(random.choice(numbers)),
+            accuracy(random),
+            str(random.choice(METHODS)),
+        )
         number = min(number, 4) if method == "dop853" else number
         yield kind(random, number, method, rtol)
         used += number
@@ -45,9 +60,13 @@ def mixed(random, size, kinds, numbers):
 
 def _batch(kind, region, names, p, truth, scene, method, rtol, n):
     given = dict(zip(names, p.T, strict=True))
-    variables = VARIABLES if kind != "coupled" else [name for name in VARIABLES if name != "monodromy"]
+    variables = (
+        VARIABLES if kind != "coupled" else [name for name in VARIABLES if name != "monodromy"]
+    )
     how = f"{kind}_scene({n})"
-    return Batch(f"floquet {kind}", region, given, truth, scene, {"variables": variables}, method, rtol, how)
+    return Batch(
+        f"floquet {kind}", region, given, truth, scene, {"variables": variables}, method, rtol, how
+    )
 
 
 # Scaled
@@ -61,7 +80,9 @@ def scaled_scene(n):
                 out[i, j] = (1.0 + p[n * n] * cos(p[n * n + 1] * t)) * p[n * i + j]
 
     names = _names(n)
-    return survey.floquet(A, period=lambda p: p[-1], parameters=names, states=[f"x{i}" for i in range(n)])
+    return survey.floquet(
+        A, period=lambda p: p[-1], parameters=names, states=[f"x{i}" for i in range(n)]
+    )
 
 
 def _names(n):
@@ -83,10 +104,22 @@ def _blocks(random, n, region, period):
     """L in units of 2^-40, and the kinds of its blocks: [(first, kind)]."""
     unit, L, kinds, i = 2.0**40, np.zeros((n, n), dtype=object), [], 0
     while i < n:
-        kind = str(random.choice(["real", "turning", "defective", "near"] if region == "generic" else ["turning"]))
+        kind = str(
+            random.choice(
+                ["real", "turning", "defective", "near"] if region == "generic" else ["turning"]
+            )
+        )
         kind = kind if i + 1 < n else "real"
-        growth = random.uniform(-3, 1) if region != "edge" else random.normal() * 10 ** random.uniform(-12, -2)
-        growth = int(np.rint(growth / period * 2.0**16)) << 24 if region != "edge" else int(growth / period * unit)
+        growth = (
+            random.uniform(-3, 1)
+            if region != "edge"
+            else random.normal() * 10 ** random.uniform(-12, -2)
+        )
+        growth = (
+            int(np.rint(growth / period * 2.0**16)) << 24
+            if region != "edge"
+            else int(growth / period * unit)
+        )
         turn = int(np.rint(random.uniform(-8, 8) / period * 2.0**16)) << 24
         L[i, i] = growth
         if kind != "real":
@@ -106,12 +139,17 @@ def _entries(S, L, R):
 
 
 def _scaled(random, number, method, rtol):
-    n = int(random.choice([2, 3, 4, 6, 9, 12], p=[0.3, 0.22, 0.26, 0.2, 0.01, 0.01]))  # 9 and 12 take long
+    # 9 and 12 take long
+    n = int(random.choice([2, 3, 4, 6, 9, 12], p=[0.3, 0.22, 0.26, 0.2, 0.01, 0.01]))
     region = str(random.choice(["generic", "generic", "edge", "constant"]))
     rows, known = [], {}
     while len(rows) < number:
         period = float(random.choice([1.0, 2 * pi, 0.3, 10.0]))
-        S, R = _unimodular(random, n, int(random.choice([1, 3, 20], p=[0.4, 0.4, 0.2] if n < 6 else [0.6, 0.39, 0.01])))
+        S, R = _unimodular(
+            random,
+            n,
+            int(random.choice([1, 3, 20], p=[0.4, 0.4, 0.2] if n < 6 else [0.6, 0.39, 0.01])),
+        )
         L, kinds = _blocks(random, n, "edge" if region == "edge" else "generic", period)
         B = _entries(S, L, R)
         if B is None:
@@ -126,7 +164,17 @@ def _scaled(random, number, method, rtol):
         p = np.column_stack([given[name] for name in _names(n)])
         return _compared(answer, [_flow(n, row, known[tuple(row)]) for row in p], p[:, -1])
 
-    return _batch("scaled", f"{region} {n}", _names(n), np.array(rows), truth, scaled_scene(n), method, rtol, n)
+    return _batch(
+        "scaled",
+        f"{region} {n}",
+        _names(n),
+        np.array(rows),
+        truth,
+        scaled_scene(n),
+        method,
+        rtol,
+        n,
+    )
 
 
 def _flow(n, row, parts):
@@ -180,7 +228,11 @@ def _waves(random, number, period):
     """a, q, s of z = a + q cos x + s cos 2x, with so few bits that a - c^2 is exact."""
     unit = (pi / period) ** 2
     a = random.uniform(-1, 12, number) * unit
-    q = random.uniform(-1, 1, number) * np.minimum(50.0, 300 * unit) * 10 ** -random.uniform(0, 6, number)
+    q = (
+        random.uniform(-1, 1, number)
+        * np.minimum(50.0, 300 * unit)
+        * 10 ** -random.uniform(0, 6, number)
+    )
     s = q * random.uniform(-1, 1, number) * (random.random(number) < 0.5)
     return np.round(a * 2.0**20) / 2.0**20, q, s
 
@@ -233,7 +285,9 @@ def coupled_scene(m):
 
     def U(p):
         entries = iter(p[3 * m : -1])
-        return [[1.0 if i == j else next(entries) if j < i else 0.0 for j in range(m)] for i in range(m)]
+        return [
+            [1.0 if i == j else next(entries) if j < i else 0.0 for j in range(m)] for i in range(m)
+        ]
 
     def between(u, i, j, d):
         return sum(u[k][i] * u[k][j] * d[k] for k in range(max(i, j), m))
@@ -256,11 +310,18 @@ def coupled_scene(m):
 
 
 def _coupled_names(m):
-    return (*(f"{name}{k}" for k in range(m) for name in "aqs"), *(f"u{k}" for k in range(m * (m - 1) // 2)), "T")
+    return (
+        *(f"{name}{k}" for k in range(m) for name in "aqs"),
+        *(f"u{k}" for k in range(m * (m - 1) // 2)),
+        "T",
+    )
 
 
 def _coupled(random, number, method, rtol):
-    m, period = int(random.choice([2, 3, 6], p=[0.6, 0.39, 0.01])), float(random.choice([pi, 1.0, 5.0]))
+    m, period = (
+        int(random.choice([2, 3, 6], p=[0.6, 0.39, 0.01])),
+        float(random.choice([pi, 1.0, 5.0])),
+    )
     waves = [np.column_stack(_waves(random, number, period)) for _ in range(m)]
     if random.random() < 0.2:
         waves[1][:, 0] = waves[0][:, 0]  # multipliers that meet, or nearly
@@ -278,7 +339,9 @@ def _coupled(random, number, method, rtol):
                 found.append((all_of, growth if growth > mpf(10) ** -20 else mpf(0), None))
         return _compared(answer, found, p[:, -1], strict=False)
 
-    return _batch("coupled", str(2 * m), _coupled_names(m), p, truth, coupled_scene(m), method, rtol, m)
+    return _batch(
+        "coupled", str(2 * m), _coupled_names(m), p, truth, coupled_scene(m), method, rtol, m
+    )
 
 
 # What is compared
@@ -294,7 +357,9 @@ def _compared(answer, found, period, strict=True):
     with mp.workdps(DIGITS):
         for i, (true, growth, matrix) in enumerate(found):
             said, ok = answer["verdict"][i], answer["status"][i] == 0
-            wrong[i] = (said == 1 and (growth >= 0 if strict else growth > 0)) or (said == 0 and growth <= 0)
+            wrong[i] = (said == 1 and (growth >= 0 if strict else growth > 0)) or (
+                said == 0 and growth <= 0
+            )
             wrong[i] |= said == 2 and growth != 0
             if not ok:
                 continue
@@ -309,7 +374,12 @@ def _compared(answer, found, period, strict=True):
                 for a in range(n):
                     for b in range(n):
                         M[:, i, a, b] = _pair(mpf(matrix[a][b]))
-    out = {"multiplier_re": re, "multiplier_im": im, "spectral_radius": radius, "exponent": exponent}
+    out = {
+        "multiplier_re": re,
+        "multiplier_im": im,
+        "spectral_radius": radius,
+        "exponent": exponent,
+    }
     out |= {"monodromy": M} if "monodromy" in answer else {}
     doubted = {name: (high, low, DOUBT * (1 + abs(high))) for name, (high, low) in out.items()}
     return doubted | {"wrong": {"verdict": wrong}}

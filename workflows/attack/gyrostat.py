@@ -7,7 +7,8 @@ from attack.hill import accuracy
 from survey.truth.gyrostat import SYSTEM, along, flow
 
 METHODS = {
-    "trajectory": ("auto",) * 7 + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "full", "full", "rk4"),
+    "trajectory": ("auto",) * 7
+    + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "full", "full", "rk4"),
     "abel": ("auto",) * 7 + ("taylor", "taylor", "dop853", "dop853", "closed", "closed", "rk4"),
 }
 NUMBERS = {"dop853": 16, "full": 8, "rk4": 2}
@@ -18,13 +19,26 @@ def system(random, number):
     p = {name: random.normal(size=number) for name in SYSTEM}
     kind = str(
         random.choice(
-            ["any", "b = 0", "g = 0", "(61)", "K near 0", "stiff", "tiny b", "pendulum", "whole numbers", "scaled"]
+            [
+                "any",
+                "b = 0",
+                "g = 0",
+                "(61)",
+                "K near 0",
+                "stiff",
+                "tiny b",
+                "pendulum",
+                "whole numbers",
+                "scaled",
+            ]
         )
     )
     if kind in ("b = 0", "pendulum"):
         p["b12"], p["b31"] = np.zeros(number), np.zeros(number)
     if kind == "pendulum":
-        for name in random.choice(["d", "c23", "s2", "s3"], 3 if random.random() < 0.5 else 2, replace=False):
+        for name in random.choice(
+            ["d", "c23", "s2", "s3"], 3 if random.random() < 0.5 else 2, replace=False
+        ):
             p[name] = np.zeros(number)
     if kind == "g = 0":
         p |= {name: np.zeros(number) for name in SYSTEM[2:]}
@@ -49,7 +63,9 @@ def system(random, number):
     if kind == "stiff":
         p["b12"], p["b31"] = p["b12"] * 30, p["b31"] * 30
     if kind == "tiny b":
-        p["b12"], p["b31"] = (p[name] * 10 ** -random.uniform(2, 300, number) for name in ("b12", "b31"))
+        p["b12"], p["b31"] = (
+            p[name] * 10 ** -random.uniform(2, 300, number) for name in ("b12", "b31")
+        )
     if kind == "whole numbers":
         p = {name: random.integers(-2, 3, number).astype(float) for name in SYSTEM}
     if kind == "scaled":
@@ -93,7 +109,10 @@ def _separatrix(p, random):
     for _ in range(60):
         c = 0.5 * (a + b)
         a, b = (c, b) if force(p, c) < 0 else (a, c)
-    f, slope = p["b12"] * np.cos(a) - p["b31"] * np.sin(a), (force(p, a + 1e-6) - force(p, a - 1e-6)) / 2e-6
+    f, slope = (
+        p["b12"] * np.cos(a) - p["b31"] * np.sin(a),
+        (force(p, a + 1e-6) - force(p, a - 1e-6)) / 2e-6,
+    )
     away = 10 ** -random.uniform(1, 15)
     rate = (f - np.sqrt(f * f + 4 * max(slope, 0))) / 2
     if p["b12"] == 0 == p["b31"] and random.random() < 0.7:
@@ -125,7 +144,9 @@ def chunk(random, size):
         region = f"{kind}{', ' + start if start else ''}"
         if question == "trajectory":
             long = random.random() < 0.08
-            t = random.choice([-1, 1, 1], number) * 10 ** random.uniform(-3, 3 if long else 1.3, number)
+            t = random.choice([-1, 1, 1], number) * 10 ** random.uniform(
+                -3, 3 if long else 1.3, number
+            )
             t = np.clip(t / np.maximum(k, 1e-300) / np.maximum(1, np.abs(w0) / k / 10), -1e12, 1e12)
             if random.random() < 0.1:
                 t = np.zeros(number)
@@ -136,7 +157,9 @@ def chunk(random, size):
                 "phi": phi0
                 + random.choice([-1, 1], number)
                 * np.where(
-                    random.random(number) < 0.5, 10 ** -random.uniform(0, 12, number), random.uniform(0, 12, number)
+                    random.random(number) < 0.5,
+                    10 ** -random.uniform(0, 12, number),
+                    random.uniform(0, 12, number),
                 )
             }
         given = p | {"phi0": phi0, "w0": w0} | more

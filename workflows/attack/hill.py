@@ -1,4 +1,6 @@
-"""Points of Hill's equation: the satellite in all ways of naming it, Mathieu's equation, and equations of one's own."""
+"""Points of Hill's equation: the satellite in all ways of naming it, Mathieu's equation, and
+equations of one's own.
+"""
 
 from functools import lru_cache
 from math import pi
@@ -14,14 +16,44 @@ from survey.truth.hill_flow import INERTIA, RHO
 from survey.truth.own import OWN
 
 METHODS = ("auto", "auto", "auto", "taylor16", "magnus6", "rk4", "dop853")
-SPECIAL_K = (0.0, 5e-324, 1e-300, 1e-16, 0.5, np.sqrt(0.5), np.nextafter(1, 0), np.nextafter(1, 2), 2.0, 3.0, 1e3)
-SPECIAL_RHO = (0.0, 5e-324, 1e-300, 1e-8, 0.5, 1.0, 1.5, 2.0, np.sqrt(1.25), np.sqrt(3.0), 1 / np.sqrt(3.0), 10.0, -1.0)
+SPECIAL_K = (
+    0.0,
+    5e-324,
+    1e-300,
+    1e-16,
+    0.5,
+    np.sqrt(0.5),
+    np.nextafter(1, 0),
+    np.nextafter(1, 2),
+    2.0,
+    3.0,
+    1e3,
+)
+SPECIAL_RHO = (
+    0.0,
+    5e-324,
+    1e-300,
+    1e-8,
+    0.5,
+    1.0,
+    1.5,
+    2.0,
+    np.sqrt(1.25),
+    np.sqrt(3.0),
+    1 / np.sqrt(3.0),
+    10.0,
+    -1.0,
+)
 SPECIAL_ALPHA = (0.0, 2.0, 0.5, 1.5, 11 / 15, 8 / 9, 59 / 63, 4 / 3, 31 / 27, 13 / 12, 1.25, 1e-300)
 
 
 def accuracy(random):
     """An asked accuracy, 1e-6 to 1e-13."""
-    return float(10.0 ** -random.uniform(6, 13)) if random.random() < 0.7 else float(10.0 ** -random.integers(6, 14))
+    return (
+        float(10.0 ** -random.uniform(6, 13))
+        if random.random() < 0.7
+        else float(10.0 ** -random.integers(6, 14))
+    )
 
 
 def beside(random, x, size):
@@ -35,7 +67,9 @@ def beside(random, x, size):
 
 
 def _edge(random, f, low, high, points=14):
-    """A zero of one of four functions of x in [low, high], f(x) (N) -> (N, 4): the double next to it, or None."""
+    """A zero of one of four functions of x in [low, high], f(x) (N) -> (N, 4): the double next to
+    it, or None.
+    """
     x = np.sort(random.uniform(low, high, points))
     values = f(x)
     rows, columns = np.nonzero(np.signbit(values[1:]) != np.signbit(values[:-1]))
@@ -66,7 +100,9 @@ def _factors(out):
 
 def _draw_modulus(random, size):
     """(region, way, values) of librations or rotations."""
-    kind = random.choice(["generic", "separatrix", "small k", "rotation", "special", "fast rotation"])
+    kind = random.choice(
+        ["generic", "separatrix", "small k", "rotation", "special", "fast rotation"]
+    )
     way = random.choice(["k", "k", "one_minus_k", "amplitude"])
     if kind == "rotation":
         values = 1 + 10 ** random.uniform(-3, 1, size)
@@ -85,14 +121,20 @@ def _draw_modulus(random, size):
                 kind,
                 way,
                 np.where(
-                    1 + random.choice([-1, 1]) * short == 1, np.nextafter(1, 0), 1 + random.choice([-1, 1]) * short
+                    1 + random.choice([-1, 1]) * short == 1,
+                    np.nextafter(1, 0),
+                    1 + random.choice([-1, 1]) * short,
                 ),
             )
         if way == "one_minus_k":
             return kind, way, random.choice([-1, 1], size) * short
         return kind, way, np.minimum(pi / 2 - np.maximum(short, 1e-17), np.nextafter(pi / 2, 0))
     values = random.uniform(0, 0.99, size)
-    return kind, way, np.arcsin(values) if way == "amplitude" else 1 - values if way == "one_minus_k" else values
+    return (
+        kind,
+        way,
+        np.arcsin(values) if way == "amplitude" else 1 - values if way == "one_minus_k" else values,
+    )
 
 
 def _off_one(k):
@@ -105,13 +147,23 @@ def _draw_rate(random, kind, k, size):
     if sub == "special rho":
         return sub, random.choice(SPECIAL_RHO, size)
     if sub == "large rho":
-        return sub, random.choice([-1, 1], size) * 10 ** random.uniform(1, random.choice([2, 3]), size)
+        return sub, random.choice([-1, 1], size) * 10 ** random.uniform(
+            1, random.choice([2, 3]), size
+        )
     if "rotation" in kind:
-        ratio = random.choice([-4.0, -3, -2, -1, 0, 1, 2, 3], size) if sub else random.uniform(-5, 4, size)
-        return sub, k * (ratio + (sub != "") * random.choice([-1, 1], size) * 10 ** -random.uniform(1, 17, size))
+        ratio = (
+            random.choice([-4.0, -3, -2, -1, 0, 1, 2, 3], size)
+            if sub
+            else random.uniform(-5, 4, size)
+        )
+        return sub, k * (
+            ratio + (sub != "") * random.choice([-1, 1], size) * 10 ** -random.uniform(1, 17, size)
+        )
     if sub:
         n = random.integers(1, 9, size)
-        tips = np.where((n >= 3) & (random.random(size) < 0.5), np.sqrt(np.maximum(n * n / 4 - 1, 0)), n / 2)
+        tips = np.where(
+            (n >= 3) & (random.random(size) < 0.5), np.sqrt(np.maximum(n * n / 4 - 1, 0)), n / 2
+        )
         return sub, tips * (1 + random.choice([-1, 1], size) * 10 ** -random.uniform(1, 17, size))
     return sub, random.uniform(-4, 4, size)
 
@@ -136,13 +188,29 @@ def satellites(random, size):
                 given, rho, sub = *found, "beside an edge"
         direction = int(random.choice([1, -1]))
         names = {way: given, "inertia_ratio" if inertia else "rho": rho}
-        options = {"direction": str(direction)} if inertia else {"body": "oblate" if oblate else "prolate"}
+        options = (
+            {"direction": str(direction)}
+            if inertia
+            else {"body": "oblate" if oblate else "prolate"}
+        )
         if not inertia and number > 1 and random.random() < 0.1:
             names = {way: np.unique(given[:4]), "rho": np.unique(random.uniform(0, 4, 150))}
             chosen = random.choice(names[way].size * 150, 60, replace=False)
             method = "auto" if method in ("rk4", "dop853") else str(method)
             true = satellite(way, False, 1, oblate)
-            yield Batch("satellite", f"{kind}, map", names, true, None, options, method, rtol, "", (way, "rho"), chosen)
+            yield Batch(
+                "satellite",
+                f"{kind}, map",
+                names,
+                true,
+                None,
+                options,
+                method,
+                rtol,
+                "",
+                (way, "rho"),
+                chosen,
+            )
             used += 60
             continue
         region = f"{kind}{', ' + sub if sub else ''}{', inertia ratio' if inertia else ''}"
@@ -155,11 +223,14 @@ def _draw_inertia(random, size):
     sub = random.choice(["", "special", "near 1"])
     if sub == "special":
         return sub, random.choice(
-            [0.0, 2.0, 0.5, 1.5, 11 / 15, 8 / 9, 59 / 63, 4 / 3, 31 / 27, 13 / 12, 1.25, 1e-300], size
+            [0.0, 2.0, 0.5, 1.5, 11 / 15, 8 / 9, 59 / 63, 4 / 3, 31 / 27, 13 / 12, 1.25, 1e-300],
+            size,
         )
     if sub == "near 1":
         return sub, 1 + random.choice([-1, 1], size) * 10 ** -random.uniform(1, 5, size)
-    return sub, np.where(random.random(size) < 0.5, random.uniform(0, 0.98, size), random.uniform(1.02, 2, size))
+    return sub, np.where(
+        random.random(size) < 0.5, random.uniform(0, 0.98, size), random.uniform(1.02, 2, size)
+    )
 
 
 def _beside_edge(random, way, given, inertia, oblate, size):
@@ -172,7 +243,12 @@ def _beside_edge(random, way, given, inertia, oblate, size):
     if way == "one_minus_k" and abs(given) < 1e-20:
         return None
     rates = INERTIA if inertia else RHO
-    x = _edge(random, lambda x: _factors(solved(WAYS[way], given, rates, x, 1.0, oblate, 1e-31)), low, high)
+    x = _edge(
+        random,
+        lambda x: _factors(solved(WAYS[way], given, rates, x, 1.0, oblate, 1e-31)),
+        low,
+        high,
+    )
     if x is None:
         return None
     return np.full(size, given), beside(random, x, size)
@@ -202,7 +278,13 @@ def mathieu(random, size):
         elif kind == "beside an edge":
             scale = 10 ** random.uniform(-3, 1.5)
             fixed = scale * random.choice([-1, 1])
-            x = _edge(random, lambda x, fixed=fixed: _factors(mathieu_solved(x, fixed)), -2 * scale - 1, 20.0, 24)
+            x = _edge(
+                random,
+                lambda x, fixed=fixed: _factors(mathieu_solved(x, fixed)),
+                -2 * scale - 1,
+                20.0,
+                24,
+            )
             if x is None:
                 continue
             a, q = beside(random, x, number), np.full(number, fixed)
@@ -229,13 +311,23 @@ def own(random, size):
     while used < size:
         name, rtol = str(random.choice(list(OWN), p=OWN_SHARES)), accuracy(random)
         number = int(random.choice([1, 16, 48]))
-        method = str(random.choice(["auto", "auto", "auto", "auto", "taylor16", "magnus6", "dop853"]))
+        method = str(
+            random.choice(["auto", "auto", "auto", "auto", "taylor16", "magnus6", "dop853"])
+        )
         number = min(number, 4) if method == "dop853" else number
-        draw = _draw_harmonics if name.startswith("harmonics") else _draw_spikes if "spike" in name else _draw_pieces
+        draw = (
+            _draw_harmonics
+            if name.startswith("harmonics")
+            else _draw_spikes
+            if "spike" in name
+            else _draw_pieces
+        )
         region, p, low, high = draw(random, name, number)
         if random.random() < 0.2 and not region.startswith("narrow"):
             row = p[0].copy()
-            x = _edge(random, lambda x, row=row, name=name: _own_margin(name, x, row), low, high, 20)
+            x = _edge(
+                random, lambda x, row=row, name=name: _own_margin(name, x, row), low, high, 20
+            )
             if x is not None:
                 region, p[:] = "beside an edge", row
                 p[:, 0] = beside(random, x, number)
@@ -263,9 +355,13 @@ def _draw_harmonics(random, name, size):
     elif kind == "large":
         p[:, 0] = 10 ** random.uniform(2, 5, size) * unit
         strength = p[:, 0] * random.uniform(0, 0.9)
-    p[:, 1 : 1 + number] = random.uniform(-1, 1, (size, number)) * np.reshape(strength, (-1, 1)) / number
+    p[:, 1 : 1 + number] = (
+        random.uniform(-1, 1, (size, number)) * np.reshape(strength, (-1, 1)) / number
+    )
     if name == "harmonics":
-        p[:, 5 : 5 + number] = random.uniform(-1, 1, (size, number)) * np.reshape(strength, (-1, 1)) / number
+        p[:, 5 : 5 + number] = (
+            random.uniform(-1, 1, (size, number)) * np.reshape(strength, (-1, 1)) / number
+        )
     p[:, 9] = period
     return kind, p, -unit[0], 12 * unit[0]
 
@@ -279,13 +375,20 @@ def _draw_pieces(random, name, size):
     if random.random() < 0.3:
         kind, p[:, -1] = "break at an end", random.choice([0.0, end, 1e-12, end - 1e-12])
     elif random.random() < 0.4:
-        kind, p[:, :-1] = "special", random.choice([0.0, 1e-300, -1e-30, pi * pi, 4 * pi * pi, 1e4], p[:, :-1].shape)
+        kind, p[:, :-1] = (
+            "special",
+            random.choice([0.0, 1e-300, -1e-30, pi * pi, 4 * pi * pi, 1e4], p[:, :-1].shape),
+        )
     return kind, p, -5.0, 60.0
 
 
 def _draw_spikes(random, name, size):
     narrow = name == "spike" and random.random() < NARROW
-    width = 10 ** (random.uniform(-4, -2.5) if narrow else random.uniform(-4 if "named" in name else -1.5, -0.5))
+    width = 10 ** (
+        random.uniform(-4, -2.5)
+        if narrow
+        else random.uniform(-4 if "named" in name else -1.5, -0.5)
+    )
     p = np.empty((size, 4))
     p[:, 0] = random.uniform(0, 60, size)
     p[:, 1] = random.normal(size=size) / width * 10 ** random.uniform(-1, 1)

@@ -30,6 +30,10 @@ def chunk(random, size):
         elif kind == "to 1/2":
             mu = 0.5 - 10 ** -random.uniform(0.4, 16, number)
         elif kind == "special":
-            mu = random.choice([1e-100, 0.5, 0.25, 2.0**-10, 2.0**-53, 0.01, 0.0385, 0.03852089650455140], number)
-        yield Batch("libration", kind, {"mu": np.clip(mu, 1e-100, 0.5)}, truth, None, {}, method, rtol)
+            mu = random.choice(
+                [1e-100, 0.5, 0.25, 2.0**-10, 2.0**-53, 0.01, 0.0385, 0.03852089650455140], number
+            )
+        yield Batch(
+            "libration", kind, {"mu": np.clip(mu, 1e-100, 0.5)}, truth, None, {}, method, rtol
+        )
         used += number

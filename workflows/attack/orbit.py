@@ -1,13 +1,15 @@
-"""Periodic orbits of one's own, held against orbits that are known, with multipliers that are known to 45 digits.
+"""Periodic orbits of one's own, held against orbits that are known, with multipliers that are known
+to 45 digits.
 
 forced      y = x - h(t), h_i = c cos(2 pi t / T + i):  y' = B y + s (y_i y_{i+1} + y_i^3).  The orbit is h, and its
-            multipliers are those of the constant matrix B (see `attack.floquet`). Where B has an eigenvalue near 0
-            other orbits may be as near, so that s is 0 there
+            multipliers are those of the constant matrix B (see `attack.floquet`). Where B has an
+            eigenvalue near 0 other orbits may be as near, so that s is 0 there
 rotating    y1 and y2 rotate: r' = r (m - r^2), with the angular velocity v (1 + k r^2); further ones follow them,
             y_i' = g_i y_i + (r^2 - m) y_1.  The orbit is r^2 = m, with multipliers exp(-2 m T) and exp(g_i T). All is
             seen in curved coordinates: x_i = y_i + e y_1 y_{i-1} + e sin y_{i-1}, x_1 = y_1
 
-Newton's method begins beside the orbit. An answer about another orbit, farther from it than NEAR, is not compared.
+Newton's method begins beside the orbit. An answer about another orbit, farther from it than NEAR,
+is not compared.
 """
 
 from functools import lru_cache
@@ -23,7 +25,15 @@ from survey.truth.hill_flow import TWO_PI
 NEAR = 1e-3
 LEAST = 0.02  # growth per time of an eigenvalue beside which there may be other orbits
 DOUBT = 1e-15  # of x0: the period of float64 is not quite that of h
-VARIABLES = ["multiplier_re", "multiplier_im", "spectral_radius", "exponent", "x0", "period", "verdict"]
+VARIABLES = [
+    "multiplier_re",
+    "multiplier_im",
+    "spectral_radius",
+    "exponent",
+    "x0",
+    "period",
+    "verdict",
+]
 
 
 def chunk(random, size):
@@ -33,7 +43,9 @@ def chunk(random, size):
 def _batch(kind, region, names, p, truth, scene, method, rtol, n):
     given = dict(zip(names, np.array(p).T, strict=True))
     how = f"{kind}_scene({n})"
-    return Batch(f"orbit {kind}", region, given, truth, scene, {"variables": VARIABLES}, method, rtol, how)
+    return Batch(
+        f"orbit {kind}", region, given, truth, scene, {"variables": VARIABLES}, method, rtol, how
+    )
 
 
 # Forced
@@ -79,12 +91,17 @@ def _forced(random, number, method, rtol):
 
     def truth(given, answer):
         p = np.column_stack([given[name] for name in _names(n)])
-        found = [(*_flow(n, [*row[: n * n], 0.0, 1.0, row[-1]], known[tuple(row)])[:2], None) for row in p]
+        found = [
+            (*_flow(n, [*row[: n * n], 0.0, 1.0, row[-1]], known[tuple(row)])[:2], None)
+            for row in p
+        ]
         with mp.workdps(DIGITS):
             at = [[mpf(row[n * n]) * mp.cos(i) for i in range(n)] for row in p]
         return _near(answer, found, p[:, -1], at)
 
-    return _batch("forced", f"{region} {n}", _names(n), rows, truth, forced_scene(n), method, rtol, n)
+    return _batch(
+        "forced", f"{region} {n}", _names(n), rows, truth, forced_scene(n), method, rtol, n
+    )
 
 
 # Rotating
@@ -115,7 +132,13 @@ def rotating_scene(n):
             x[i] += p[3] * (y[0] * y[i - 1] + np.sin(y[i - 1]))
         return np.append(x, TWO_PI / (p[1] * (1.0 + p[2] * p[0])))
 
-    return survey.orbit(f, period=None, parameters=_rotating_names(n), states=[f"x{i}" for i in range(n)], start=start)
+    return survey.orbit(
+        f,
+        period=None,
+        parameters=_rotating_names(n),
+        states=[f"x{i}" for i in range(n)],
+        start=start,
+    )
 
 
 def _rotating_names(n):
@@ -125,7 +148,8 @@ def _rotating_names(n):
 def _rotating(random, number, method, rtol):
     n, region = int(random.choice([2, 3, 4])), str(random.choice(["generic", "edge"]))
     names, rows = _rotating_names(n), []
-    growths, sizes = ((-3, -0.3), (-2, 0.2)) if region == "generic" else ((-13, -3), (-4, -2))  # their powers of ten
+    # their powers of ten
+    growths, sizes = ((-3, -0.3), (-2, 0.2)) if region == "generic" else ((-13, -3), (-4, -2))
     for _ in range(number):
         growth = random.choice([-1, 1], n - 2) * 10 ** random.uniform(*growths, n - 2)
         m = 10 ** random.uniform(*sizes)
@@ -145,7 +169,9 @@ def _rotating(random, number, method, rtol):
         high, low = np.array([_pair(T) for T in periods]).T
         return out | {"period": (high, low, 1e-20 * high)}
 
-    return _batch("rotating", f"{region} {n}", names, rows, truth, rotating_scene(n), method, rtol, n)
+    return _batch(
+        "rotating", f"{region} {n}", names, rows, truth, rotating_scene(n), method, rtol, n
+    )
 
 
 # What is compared

@@ -1,7 +1,8 @@
-"""The graph of imports: read from the code, checked against the layers in `pyproject.toml`, and drawn.
+"""The graph of imports: read from the code, checked against the layers in `pyproject.toml`, and
+drawn.
 
-A box is a package, or a module directly in `survey/`; an arrow from one to another says that the first
-imports the second.
+A box is a package, or a module directly in `survey/`; an arrow from one to another says that the
+first imports the second.
 """
 
 import ast
@@ -52,7 +53,11 @@ def layers():
 
 def of_arrays():
     """The packages that know no labels, files or processes."""
-    (rule,) = (rule for rule in rules().values() if {"dask", "xarray"} <= set(rule.get("forbidden_modules", ())))
+    (rule,) = (
+        rule
+        for rule in rules().values()
+        if {"dask", "xarray"} <= set(rule.get("forbidden_modules", ()))
+    )
     return {name.removeprefix("survey.") for name in rule["source_modules"]}
 
 
@@ -84,20 +89,28 @@ def check(imports):
     try:
         list(graphlib.TopologicalSorter(imports).static_order())
     except graphlib.CycleError as error:
-        raise ValueError(f"these modules import each other in a cycle: {' -> '.join(error.args[1])}") from None
+        raise ValueError(
+            f"these modules import each other in a cycle: {' -> '.join(error.args[1])}"
+        ) from None
     depth = {name: number for number, layer in enumerate(layers()) for name in layer}
     for one, others in packages(imports).items():
         for other in others:
             if one not in depth or other not in depth:
-                raise ValueError(f"pyproject.toml has no layer for {one if one not in depth else other}")
+                raise ValueError(
+                    f"pyproject.toml has no layer for {one if one not in depth else other}"
+                )
             if depth[one] >= depth[other]:
-                raise ValueError(f"{one} imports {other}, which is not below it in pyproject.toml's layers")
+                raise ValueError(
+                    f"{one} imports {other}, which is not below it in pyproject.toml's layers"
+                )
 
 
 def meaning(package):
     """The first sentence of its docstring, without its name and what is in brackets."""
     path = ROOT / "survey" / package
-    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(encoding="utf-8")
+    text = (path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text(
+        encoding="utf-8"
+    )
     line = ast.get_docstring(ast.parse(text)).partition("\n")[0]
     line = re.sub(r" \([^)]*\)", "", line.removeprefix(f"The {package}: "))
     words = re.split(r"\.(?: |$)|; ", line)[0]
@@ -119,8 +132,12 @@ def implied(arrows):
     """The arrows that a path of other arrows implies."""
     below = {}
     for name in graphlib.TopologicalSorter(arrows).static_order():
-        below[name] = arrows.get(name, set()).union(*(below[other] for other in arrows.get(name, ())))
-    return {(a, b) for a in arrows for b in arrows[a] if any(b in below[c] for c in arrows[a] - {b})}
+        below[name] = arrows.get(name, set()).union(
+            *(below[other] for other in arrows.get(name, ()))
+        )
+    return {
+        (a, b) for a in arrows for b in arrows[a] if any(b in below[c] for c in arrows[a] - {b})
+    }
 
 
 def draw(imports, path):
@@ -132,7 +149,9 @@ def draw(imports, path):
 
     rows, arrows, blue = layers(), packages(imports), of_arrays()
     foot = set().union(*rows[1 + max(i for i, row in enumerate(rows) if set(row) & blue) :])
-    main = {a: {b for b in others if b not in foot} for a, others in arrows.items() if a not in foot}
+    main = {
+        a: {b for b in others if b not in foot} for a, others in arrows.items() if a not in foot
+    }
     positions = _positions(rows, main)
     figure = plt.figure(figsize=(COLUMNS * (WIDTH + MARGIN), len(rows) * (HEIGHT + GAP)))
     axes = figure.add_axes((0, 0, 1, 1))
@@ -155,11 +174,31 @@ def _box(axes, x, y, name, words, fill):
 
     corner = (x - WIDTH / 2, y - HEIGHT / 2)
     axes.add_patch(
-        FancyBboxPatch(corner, WIDTH, HEIGHT, "round,pad=0,rounding_size=0.06", fc=fill, ec="#555", lw=0.8, zorder=3)
+        FancyBboxPatch(
+            corner,
+            WIDTH,
+            HEIGHT,
+            "round,pad=0,rounding_size=0.06",
+            fc=fill,
+            ec="#555",
+            lw=0.8,
+            zorder=3,
+        )
     )
     lines = textwrap.wrap(words, LETTERS)
-    axes.text(x, y + HEIGHT / 2 - 0.13, name, ha="center", va="center", size=11, weight="bold", zorder=4)
-    axes.text(x, y - 0.11, "\n".join(lines[:4]), ha="center", va="center", size=8.5, linespacing=1.05, zorder=4)
+    axes.text(
+        x, y + HEIGHT / 2 - 0.13, name, ha="center", va="center", size=11, weight="bold", zorder=4
+    )
+    axes.text(
+        x,
+        y - 0.11,
+        "\n".join(lines[:4]),
+        ha="center",
+        va="center",
+        size=8.5,
+        linespacing=1.05,
+        zorder=4,
+    )
 
 
 def _arrow(axes, start, end, light, foot):
@@ -169,7 +208,9 @@ def _arrow(axes, start, end, light, foot):
     pale = {"color": "#dddddd" if foot else "#b5b5b5", "lw": 0.5, "zorder": 1}
     style = pale if light else {"color": "#222222", "lw": 1.3, "zorder": 2}
     ends = (x0, y0 - HEIGHT / 2), (x1, y1 + HEIGHT / 2)
-    axes.add_patch(FancyArrowPatch(*ends, arrowstyle="-|>", shrinkA=0, shrinkB=0, mutation_scale=8, **style))
+    axes.add_patch(
+        FancyArrowPatch(*ends, arrowstyle="-|>", shrinkA=0, shrinkB=0, mutation_scale=8, **style)
+    )
 
 
 def _positions(rows, arrows):
@@ -192,7 +233,11 @@ def _positions(rows, arrows):
     for _ in range(6):
         for row in rows:
             free = [0.5 * i for i in range(2 * COLUMNS - 1)]
-            orders = (p for p in permutations(free, len(row)) if all(abs(x - y) >= 1 for x, y in combinations(p, 2)))
+            orders = (
+                p
+                for p in permutations(free, len(row))
+                if all(abs(x - y) >= 1 for x, y in combinations(p, 2))
+            )
 
             def tried(order, row=row):
                 column.update(zip(row, order, strict=True))
@@ -200,4 +245,7 @@ def _positions(rows, arrows):
 
             column.update(zip(row, min(orders, key=tried), strict=True))
     pitch = WIDTH + MARGIN
-    return {name: (pitch * (column[name] + 0.5), -(depth[name] + 0.5) * (HEIGHT + GAP)) for name in column}
+    return {
+        name: (pitch * (column[name] + 0.5), -(depth[name] + 0.5) * (HEIGHT + GAP))
+        for name in column
+    }

@@ -1,7 +1,8 @@
-"""Build the documentation, notebooks executed, warnings as errors, without network: `python workflows/docs/build.py`.
+"""Build the documentation, notebooks executed, warnings as errors, without network: `python
+workflows/docs/build.py`.
 
-Needs `pip install -e ".[docs]"`. The site is build/docs/html/index.html; the executed notebooks lie in
-build/docs/source/notebooks.
+Needs `pip install -e ".[docs]"`. The site is build/docs/html/index.html; the executed notebooks lie
+in build/docs/source/notebooks.
 """
 
 import argparse
@@ -21,7 +22,16 @@ import scene_pages
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 OUT = ROOT / "build/docs"
-NBMAKE = ["-o", "addopts=", "-p", "no:cacheprovider", "-q", "--nbmake", "--overwrite", "--nbmake-timeout=300"]
+NBMAKE = [
+    "-o",
+    "addopts=",
+    "-p",
+    "no:cacheprovider",
+    "-q",
+    "--nbmake",
+    "--overwrite",
+    "--nbmake-timeout=300",
+]
 
 
 def assemble(source):
@@ -50,14 +60,18 @@ def assemble(source):
 def _notebooks(folder):
     names = sorted(path.stem for path in folder.glob("*.ipynb"))
     words = "Each starts from a physical question and ends with the figure that answers it (`workflows/notebooks/`)."
-    return "\n".join(["# Notebooks", "", words, "", "```{toctree}", ":maxdepth: 1", "", *names, "```", ""])
+    return "\n".join(
+        ["# Notebooks", "", words, "", "```{toctree}", ":maxdepth: 1", "", *names, "```", ""]
+    )
 
 
 def check(folder):
     """Every executed notebook ends with the figure that answers its question."""
     for path in sorted(folder.glob("*.ipynb")):
         *_, last = (
-            cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"
+            cell
+            for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]
+            if cell["cell_type"] == "code"
         )
         if not any("image/png" in output.get("data", {}) for output in last["outputs"]):
             sys.exit(f"{path}: its last cell shows no figure")
@@ -65,7 +79,11 @@ def check(folder):
 
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("--no-notebooks", action="store_true", help="leave the notebooks as they are, without outputs")
+    words.add_argument(
+        "--no-notebooks",
+        action="store_true",
+        help="leave the notebooks as they are, without outputs",
+    )
     given = words.parse_args()
     source = OUT / "source"
     assemble(source)
@@ -74,14 +92,26 @@ def main():
         run("pytest", *NBMAKE, "-n", "2", str(source / "notebooks"))
         check(source / "notebooks")
     print("making the pages", flush=True)
-    run("sphinx", "-q", "-W", "--keep-going", "-E", "-d", str(OUT / "doctrees"), str(source), str(OUT / "html"))
+    run(
+        "sphinx",
+        "-q",
+        "-W",
+        "--keep-going",
+        "-E",
+        "-d",
+        str(OUT / "doctrees"),
+        str(source),
+        str(OUT / "html"),
+    )
     print(OUT / "html/index.html")
 
 
 def run(module, *arguments):
     # `!survey` in a notebook is that of this environment, active or not
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
-    done = subprocess.run([sys.executable, "-m", module, *arguments], cwd=ROOT, env=os.environ | {"PATH": path})
+    done = subprocess.run(
+        [sys.executable, "-m", module, *arguments], cwd=ROOT, env=os.environ | {"PATH": path}
+    )
     if done.returncode:
         sys.exit(done.returncode)
 

@@ -31,13 +31,17 @@ def page():
             f"![{scene}: error against time](results/{path.stem}.png)",
         ]
         works = dict.fromkeys(record["work"] for record in measured["records"])
-        parts += [_table(work, [r for r in measured["records"] if r["work"] == work]) for work in works]
+        parts += [
+            _table(work, [r for r in measured["records"] if r["work"] == work]) for work in works
+        ]
     return "\n\n".join(parts) + "\n"
 
 
 def _machine(machine):
     versions = ", ".join(
-        f"{name.removeprefix('version_')} {value}" for name, value in machine.items() if name.startswith("version_")
+        f"{name.removeprefix('version_')} {value}"
+        for name, value in machine.items()
+        if name.startswith("version_")
     )
     return f"Measured on {machine['cpu']}, one thread, commit {machine['commit'][:10]}; {versions}."
 
@@ -47,8 +51,16 @@ def _table(work, records):
     names = dict.fromkeys((record["method"], record["peer"]) for record in records)
     rows = [(name, [best(records, *name, accuracy) for accuracy in ACCURACY]) for name in names]
     auto = next((found for (method, _), found in rows if method == "auto"), None)
-    rows.sort(key=lambda row: (row[0][0] != "auto", row[1][-1] is None, row[1][-1] and row[1][-1]["seconds_per_point"]))
-    head = " | ".join(f"to {accuracy:.0e}".replace("e-0", "e-") + " | of auto's | wrong" for accuracy in ACCURACY)
+    rows.sort(
+        key=lambda row: (
+            row[0][0] != "auto",
+            row[1][-1] is None,
+            row[1][-1] and row[1][-1]["seconds_per_point"],
+        )
+    )
+    head = " | ".join(
+        f"to {accuracy:.0e}".replace("e-0", "e-") + " | of auto's | wrong" for accuracy in ACCURACY
+    )
     lines = [f"### {work}", "", f"| | {head} |", "|---|" + "---:|" * (3 * len(ACCURACY))]
     for (method, peer), found in rows:
         cells = [_cells(one, auto[i] if auto else None) for i, one in enumerate(found)]
@@ -58,7 +70,9 @@ def _table(work, records):
 
 def best(records, method, peer, accuracy):
     """The fastest record of a method or peer whose error is at most `accuracy`, or None."""
-    good = [r for r in records if (r["method"], r["peer"]) == (method, peer) and r["error"] <= accuracy]
+    good = [
+        r for r in records if (r["method"], r["peer"]) == (method, peer) and r["error"] <= accuracy
+    ]
     return min(good, key=lambda record: record["seconds_per_point"], default=None)
 
 

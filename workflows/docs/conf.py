@@ -1,4 +1,6 @@
-"""Sphinx's configuration; `build.py` beside this file assembles the pages and calls it. No network is needed."""
+"""Sphinx's configuration; `build.py` beside this file assembles the pages and calls it. No network
+is needed.
+"""
 
 import re
 import sys
@@ -45,14 +47,18 @@ def setup(app):
 
 
 def _as_written(app, doctree):
-    r"""Displayed formulas go to MathJax as they are: Sphinx would put several lines into `split`, which has no \tag."""
+    r"""Displayed formulas go to MathJax as they are: Sphinx would put several lines into `split`,
+    which has no \tag.
+    """
     for node in doctree.findall(nodes.math_block):
         node["no-wrap"] = node["nowrap"] = True  # the second until Sphinx 8.2
         node[:] = [nodes.Text(rf"\[{node.astext()}\]")]
 
 
 def _plain(app, what, name, thing, options, lines):
-    """Docstrings are plain text: formulas are typeset, bars are no markup; those of modules stand as they are."""
+    """Docstrings are plain text: formulas are typeset, bars are no markup; those of modules stand
+    as they are.
+    """
     if what == "module":
         lines[:] = ["::", "", *(f"   {line}" for line in lines), ""]
         return

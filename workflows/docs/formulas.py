@@ -1,5 +1,5 @@
-"""Formulas of the public docstrings and of the scenes' tables as TeX: in a terminal they are read as they stand, on the
-site they are typeset.
+"""Formulas of the public docstrings and of the scenes' tables as TeX: in a terminal they are read
+as they stand, on the site they are typeset.
 """
 
 import re
@@ -26,20 +26,28 @@ TYPESET = {
     "|error| <= rtol (1 + |value|)": r"\lvert\mathrm{error}\rvert \le \mathrm{rtol}\,(1 + \lvert\mathrm{value}\rvert)",
     "df/dx": r"\partial f / \partial x",
 }
-_FORMULA = re.compile("|".join(rf"(?<![\w`]){re.escape(text)}(?!\w)" for text in sorted(TYPESET, key=len)[::-1]))
+_FORMULA = re.compile(
+    "|".join(rf"(?<![\w`]){re.escape(text)}(?!\w)" for text in sorted(TYPESET, key=len)[::-1])
+)
 
 
 def typeset(line):
-    """A line of a docstring with its formulas as math roles; examples and what stands in backticks stay as they are."""
+    """A line of a docstring with its formulas as math roles; examples and what stands in backticks
+    stay as they are.
+    """
     if line.lstrip().startswith((">>>", "...")):
         return line
     parts = re.split(r"(`[^`]*`)", line)
-    parts[::2] = [_FORMULA.sub(lambda found: f":math:`{TYPESET[found[0]]}`", part) for part in parts[::2]]
+    parts[::2] = [
+        _FORMULA.sub(lambda found: f":math:`{TYPESET[found[0]]}`", part) for part in parts[::2]
+    ]
     return "".join(parts)
 
 
 GREEK = "Delta|alpha|beta|gamma|delta|epsilon|theta|lambda|mu|nu|rho|sigma|phi|psi|omega|Omega|pi|zeta|eta|kappa|tau"
-FUNCTIONS = {name: rf"\operatorname{{{name}}}" for name in ("sech", "asin", "sin", "cos", "ln")} | {"sqrt": r"\sqrt"}
+FUNCTIONS = {name: rf"\operatorname{{{name}}}" for name in ("sech", "asin", "sin", "cos", "ln")} | {
+    "sqrt": r"\sqrt"
+}
 RELATIONS = {"<=": r"\le", ">=": r"\ge", "!=": r"\ne", "->": r"\to", "=": "=", "<": "<", ">": ">"}
 BINARY = {*RELATIONS, "+", "-", "/"}
 OTHER_NAMES = {"Iz": "I_z", "inf": r"\infty", "mu**": r"\mu^{**}"}
@@ -48,19 +56,25 @@ _TOKEN = re.compile(
     r"|(?P<name>[A-Za-z]+\d*(?:_[A-Za-z\d]+)*\*{0,2}'{0,2})"
     r"|(?P<power>\^[-+]?\w+)|(?P<modulus>\|[^\s|]+\|)|(?P<sign><=|>=|!=|->|[-+/=<>()])|(?P<space>\s+)|."
 )
-_REFERENCE = re.compile(r"(?<= )\((?:[\w.]+|\w+ = -?\w+)\)")  # to an equation, or a condition: apart from what precedes
+# to an equation, or a condition: apart from what precedes
+_REFERENCE = re.compile(r"(?<= )\((?:[\w.]+|\w+ = -?\w+)\)")
 _NAME = re.compile(rf"({GREEK}|[A-Za-z])(\d*)(?:_({GREEK}|[A-Za-z]|\d+))?")
 
 
 def in_words(text, symbols):
-    """Words of a table with their formulas as TeX between dollars, as [(is it a formula?, piece), ...].
+    """Words of a table with their formulas as TeX between dollars, as [(is it a formula?, piece),
+    ...].
 
-    A formula is a run of numbers, signs and names, those of `symbols` {name: TeX}, Greek and single letters, in which
-    something is related, divided, added, raised to a power or Greek.
+    A formula is a run of numbers, signs and names, those of `symbols` {name: TeX}, Greek and single
+    letters, in which something is related, divided, added, raised to a power or Greek.
     """
     pieces, run = [], []
     for token in [*_TOKEN.finditer(text), None]:
-        tex = _tex(token, symbols) if token and not (run and _REFERENCE.match(text, token.start())) else None
+        tex = (
+            _tex(token, symbols)
+            if token and not (run and _REFERENCE.match(text, token.start()))
+            else None
+        )
         if tex is not None:
             run.append((token[0], tex))
             continue
@@ -76,12 +90,16 @@ def _tex(token, symbols):
     if kind == "number":
         base, _, power = text.removesuffix("...").partition("e")
         times = (
-            f"10^{{{int(power)}}}" if base == "1" and power else base + (rf"\cdot 10^{{{int(power)}}}" if power else "")
+            f"10^{{{int(power)}}}"
+            if base == "1" and power
+            else base + (rf"\cdot 10^{{{int(power)}}}" if power else "")
         )
         return times + (r"\ldots" if text.endswith("...") else "")
     if kind == "name":
         before, after = token.string[: token.start()].rstrip(), token.string[token.end() :].lstrip()
-        bounded = text in symbols and (before.endswith(("<", "<=")) or after.startswith(("<", "!=")))
+        bounded = text in symbols and (
+            before.endswith(("<", "<=")) or after.startswith(("<", "!="))
+        )
         return symbols[text] if bounded else _of_name(text, symbols)
     if kind == "power":
         return f"^{{{_of_name(text[1:], symbols) or text[1:]}}}"
@@ -106,13 +124,22 @@ def _of_name(text, symbols):
         return symbols[name] + primes
     if not match:
         return None
-    letter, number, index = (rf"\{part}" if part and re.fullmatch(GREEK, part) else part for part in match.groups())
+    letter, number, index = (
+        rf"\{part}" if part and re.fullmatch(GREEK, part) else part for part in match.groups()
+    )
     below = ", ".join(part for part in (number, index) if part)
-    return letter + (f"_{{{below}}}" if below else "") + ("^{" + "*" * stars + "}" if stars else "") + primes
+    return (
+        letter
+        + (f"_{{{below}}}" if below else "")
+        + ("^{" + "*" * stars + "}" if stars else "")
+        + primes
+    )
 
 
 def _pieces(run):
-    """The pieces of a run of (text, TeX): a formula, without what does not belong to it at its ends, or text."""
+    """The pieces of a run of (text, TeX): a formula, without what does not belong to it at its
+    ends, or text.
+    """
     first, last = 0, len(run)
     while first < last and (run[first][0].isspace() or _stray(run[first:last], 0)):
         first += 1
@@ -121,7 +148,10 @@ def _pieces(run):
     inner = run[first:last]
     if not _is_formula(inner):
         return [(False, "".join(text for text, _ in run))] if run else []
-    before, after = "".join(text for text, _ in run[:first]), "".join(text for text, _ in run[last:])
+    before, after = (
+        "".join(text for text, _ in run[:first]),
+        "".join(text for text, _ in run[last:]),
+    )
     formula = re.sub("  +", " ", "".join(tex for _, tex in _spaced(inner)))
     formula = re.sub(r"\\sqrt\s*(\S.*?rvert|\S+)", r"\\sqrt{\1}", formula)
     return [(False, before), (True, f"${formula}$"), (False, after)]
@@ -132,7 +162,9 @@ def _spaced(run):
 
 
 def _stray(run, end):
-    """Is the token at this end a sign that needs another one beyond it, or a bracket without its counterpart?"""
+    """Is the token at this end a sign that needs another one beyond it, or a bracket without its
+    counterpart?
+    """
     text, texts = run[end][0], [text for text, _ in run]
     if text in "()":
         outward = (text == "(") == (end == 0)

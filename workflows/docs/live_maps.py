@@ -1,6 +1,8 @@
-"""The documentation's own maps as pages that zoom (`survey share`), in the place of pictures, which stay as a fallback.
+"""The documentation's own maps as pages that zoom (`survey share`), in the place of pictures, which
+stay as a fallback.
 
-A page is drawn from series where the map has them, so that a few of its points are enough to make it; else from points.
+A page is drawn from series where the map has them, so that a few of its points are enough to make
+it; else from points.
 """
 
 import html
@@ -44,7 +46,9 @@ MAPS = {  # {workflow whose pictures the pages show: points along each axis, at 
 
 
 def pages(folder):
-    """Write the pages, and the pictures that stand for them, to the folder; {picture: its page and what it shows}."""
+    """Write the pages, and the pictures that stand for them, to the folder; {picture: its page and
+    what it shows}.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     found = {}
     for name, points in MAPS.items():
@@ -80,7 +84,11 @@ def _solved(name, points, path):
     given = _given(name)
     axes = {key: own | {"num": min(own["num"], points)} if isinstance(own, dict) else own
             for key, own in given["axes"].items()}  # fmt: skip
-    scene = str(_path(name).with_name(given["scene"])) if given["scene"].endswith(".py") else given["scene"]
+    scene = (
+        str(_path(name).with_name(given["scene"]))
+        if given["scene"].endswith(".py")
+        else given["scene"]
+    )
     output = {key: own for key, own in given["output"].items() if key != "path"}
     fewer = {key: own for key, own in given.items() if key not in ("boundaries", "refine")}
     ds = survey.run(fewer | {"scene": scene, "axes": axes, "output": output}, output=path)

@@ -1,4 +1,6 @@
-"""A page for each scene that is found in its folder: its explanation, pictures, parameters, outputs and methods."""
+"""A page for each scene that is found in its folder: its explanation, pictures, parameters, outputs
+and methods.
+"""
 
 import re
 from pathlib import Path
@@ -24,16 +26,30 @@ def pages():
         "",
         "| scene | answers |",
     ]
-    index += ["|---|---|", *(f"| [`{name}`]({name}.md) | {title} |" for name, title in titles.items()), ""]
+    index += [
+        "|---|---|",
+        *(f"| [`{name}`]({name}.md) | {title} |" for name, title in titles.items()),
+        "",
+    ]
     toctree = ["```{toctree}", ":hidden:", "", *titles, "```", ""]
-    return {"scenes/index.md": "\n".join(index + toctree)} | {f"scenes/{name}.md": _page(name) for name in titles}
+    return {"scenes/index.md": "\n".join(index + toctree)} | {
+        f"scenes/{name}.md": _page(name) for name in titles
+    }
 
 
 def _page(name):
     scene = survey.api.scene(name)
-    parts = [f"# {name}", f"**{escaped(scene['title'])}.**", _explanation(name) or f"```text\n{scene['about']}\n```"]
+    parts = [
+        f"# {name}",
+        f"**{escaped(scene['title'])}.**",
+        _explanation(name) or f"```text\n{scene['about']}\n```",
+    ]
     symbols = _symbols(name)
-    parts += [*_results(name, survey.api.scenes(), symbols), "## Reference", f"What `survey scenes {name}` prints."]
+    parts += [
+        *_results(name, survey.api.scenes(), symbols),
+        "## Reference",
+        f"What `survey scenes {name}` prints.",
+    ]
     for heading in LISTS:
         rows = [f"| `{key}` | {_cell(words, symbols)} |" for key, words in scene[heading].items()]
         parts += ["\n".join([f"| {heading} | |", "|---|---|", *rows])] if rows else []
@@ -50,7 +66,8 @@ def _symbols(name):
 def _cell(words, symbols):
     """Words in a cell of a table, their formulas typeset."""
     return "".join(
-        piece if is_formula else escaped(piece).replace("|", r"\|") for is_formula, piece in in_words(words, symbols)
+        piece if is_formula else escaped(piece).replace("|", r"\|")
+        for is_formula, piece in in_words(words, symbols)
     )
 
 
@@ -58,7 +75,9 @@ def _explanation(name):
     """NAME.md, without its title, as it stands beside the scene; "" if there is none."""
     path = ROOT / f"survey/scenes/{name}.md"
     text = path.read_text(encoding="utf-8").partition("\n")[2].strip() if path.exists() else ""
-    return text.replace("](../../results/", "](../results/").replace("](../../workflows/docs/", "](../")
+    return text.replace("](../../results/", "](../results/").replace(
+        "](../../workflows/docs/", "](../"
+    )
 
 
 def _results(name, names, symbols):
@@ -77,7 +96,9 @@ def _results(name, names, symbols):
     for path in seen:
         words = figures.caption(path.name)
         shown = _cell(words[0].upper() + words[1:], symbols)
-        parts.append(f"![{words}](../results/{path.name})\n\n{shown}: `{figures.maker(path.name)}`.")
+        parts.append(
+            f"![{words}](../results/{path.name})\n\n{shown}: `{figures.maker(path.name)}`."
+        )
     return parts
 
 
@@ -86,6 +107,10 @@ def _title(path):
 
 
 def escaped(text):
-    """Plain text as Markdown: stars, underscores, angles, dollars and brackets outside of code are themselves."""
+    """Plain text as Markdown: stars, underscores, angles, dollars and brackets outside of code are
+    themselves.
+    """
     parts = re.split(r"(`[^`]*`|\*\*[^*\n]+\*\*)", text)
-    return "".join(part if i % 2 else re.sub(r"([*_<$\[\]\\~])", r"\\\1", part) for i, part in enumerate(parts))
+    return "".join(
+        part if i % 2 else re.sub(r"([*_<$\[\]\\~])", r"\\\1", part) for i, part in enumerate(parts)
+    )

@@ -1,1 +1,3 @@
-"""One file per scene, found by its name: the planes on which its methods should break (see `survey.failures`)."""
+"""One file per scene, found by its name: the planes on which its methods should break (see
+`survey.failures`).
+"""

@@ -27,7 +27,15 @@ def _separatrix(share):
     u = np.linspace(-0.32, 0.32, few(share, 13))
     y = np.sqrt(0.5 * (1 - 3 * u * u) + 0.3 * 0.5 * np.sqrt((1 - u * u) * (1 - 9 * u * u)))
     level, alpha, beta = (values[:, None] for values in _at_double_root(u, y, 1))
-    return _scaled("beside the separatrix", x, plain("$u$ of the saddle", u), 1, level + away[None], alpha, beta)
+    return _scaled(
+        "beside the separatrix",
+        x,
+        plain("$u$ of the saddle", u),
+        1,
+        level + away[None],
+        alpha,
+        beta,
+    )
 
 
 def _pole(share):
@@ -36,7 +44,9 @@ def _pole(share):
     size = 10.0 ** alpha[:, None]
     beta = size * (1 + away[None])
     level = np.maximum(size, beta) ** 2 * 1.5 + 1.0
-    return _scaled("passing a pole closely", x, logarithmic(r"$\alpha$", alpha), -1, level, size, beta)
+    return _scaled(
+        "passing a pole closely", x, logarithmic(r"$\alpha$", alpha), -1, level, size, beta
+    )
 
 
 def _precession(share):
@@ -53,7 +63,14 @@ def _scaled(title, x, y, sign, level, alpha, beta):
 
 def _states(share):
     theta, near = np.linspace(-12.0, 0.4, few(share, 20)), np.linspace(-16.0, 0.3, few(share, 14))
-    given = {"A": 1.3, "C": 0.8, "epsilon": 0.4, "theta0": 10.0 ** theta[None], "p_theta0": 0.3, "p_phi": 0.9}
+    given = {
+        "A": 1.3,
+        "C": 0.8,
+        "epsilon": 0.4,
+        "theta0": 10.0 ** theta[None],
+        "p_theta0": 0.3,
+        "p_phi": 0.9,
+    }
     given["p_psi"] = 0.9 * (1 + 10.0 ** near[:, None])
     axes = logarithmic(r"$\theta_0$", theta), logarithmic(r"$p_\psi / p_\varphi - 1$", near)
     return Plane("states beside the pole", *axes, "brun", given, brun.states, SOURCE)
@@ -62,7 +79,14 @@ def _states(share):
 def _field(share):
     y, field = two_sided(r"$\epsilon$", np.linspace(-24.0, 1.0, few(share, 8)))
     spin = np.linspace(-2.0, 8.0, few(share, 20))
-    given = {"A": 1.3, "C": 0.8, "epsilon": field[:, None], "theta0": 1.1, "p_theta0": 0.5, "p_psi": 1.3}
+    given = {
+        "A": 1.3,
+        "C": 0.8,
+        "epsilon": field[:, None],
+        "theta0": 1.1,
+        "p_theta0": 0.5,
+        "p_psi": 1.3,
+    }
     given["p_phi"] = 10.0 ** spin[None]
     axes = logarithmic(r"spin $p_\varphi$", spin), y
     return Plane("tiny fields, fast spin", *axes, "brun", given, brun.states, SOURCE)

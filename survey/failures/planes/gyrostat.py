@@ -14,7 +14,9 @@ where one applies and its bar meets rtol: with b = 0 its cost is free of t, but 
 w^2 merge, and it loses its digits first; (61) holds for parameters to their rounding only. Else `taylor` is asked,
 and taken if its bar is no wider. Near enough to a stable separatrix or a turning point every method in binary64
 fails, as the solutions themselves part; there `auto` solves in double-double."""
-SOURCE = "Truth: Taylor series of order 26 in double-double, solved twice where a bar seems to miss it."
+SOURCE = (
+    "Truth: Taylor series of order 26 in double-double, solved twice where a bar seems to miss it."
+)
 NAMES = (*true.SYSTEM, "phi0", "w0")
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
 
@@ -30,7 +32,9 @@ def planes(share):
 
 def _plane(title, x, y, question, six, phi0, w0, at):
     """`six`: numbers or arrays; `at`: times or angles, last in `given`."""
-    given = dict(zip(NAMES, (*six, phi0, w0), strict=True)) | {"t" if question == "trajectory" else "phi": at}
+    given = dict(zip(NAMES, (*six, phi0, w0), strict=True)) | {
+        "t" if question == "trajectory" else "phi": at
+    }
     truth = true.flow if question == "trajectory" else true.along
     return Plane(title, x, y, "gyrostat", given, truth, SOURCE, {"question": question}, shared=True)
 
@@ -41,7 +45,9 @@ def _separatrix(six, phi0, saddle):
         _b12, _b31, d, c23, s2, s3 = (mp.mpf(float(v)) for v in six)
 
         def V(x):
-            return d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+            return (
+                d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+            )
 
         def slope(x):
             return d / 2 * mp.sin(2 * x) + c23 * mp.cos(2 * x) - s2 * mp.cos(x) + s3 * mp.sin(x)
@@ -59,7 +65,9 @@ def _ends(six, phi0, w0, angle=1e9):
 
 
 def _threshold(six, phi0, low, high):
-    """w at phi0 between `low`, which turns back, and `high`, which passes the next turn: on a stable separatrix."""
+    """w at phi0 between `low`, which turns back, and `high`, which passes the next turn: on a
+    stable separatrix.
+    """
     while low < (middle := 0.5 * (low + high)) < high:
         turns = _ends(six, phi0, [middle], phi0 + 2.0)[1][0]
         low, high = (middle, high) if turns else (low, middle)
@@ -71,11 +79,15 @@ def _phase(n):
     phi0, w0 = np.linspace(-np.pi, np.pi, n), np.linspace(-3.0, 3.0, max(3 * n // 4, 3))
     axes = plain(r"initial angle $\varphi_0$", phi0), plain("initial velocity $w_0$", w0)
     six = (0.0, 0.0, *SIX[2:])
-    return _plane("b = 0: initial states,\n$t = 20$", *axes, "trajectory", six, phi0[None], w0[:, None], 20.0)
+    return _plane(
+        "b = 0: initial states,\n$t = 20$", *axes, "trajectory", six, phi0[None], w0[:, None], 20.0
+    )
 
 
 def _roots(n):
-    """b = 0: two roots of w^2 merge on the separatrix, and a third where the saddle itself does (g = g' = 0)."""
+    """b = 0: two roots of w^2 merge on the separatrix, and a third where the saddle itself does (g
+    = g' = 0).
+    """
     x, away = two_sided("distance to the separatrix, $w_0 - w_s$", np.linspace(-15.5, -0.5, n))
     gaps, phi0, place = np.linspace(-6.0, 0.0, n), 0.3, 2.0
     s, c, s2, c2 = math.sin(place), math.cos(place), math.sin(2 * place), math.cos(2 * place)
@@ -87,7 +99,9 @@ def _roots(n):
     y = logarithmic("distance to a fold,\n$g'$ at the saddle", gaps)
     six = (0.0, 0.0, d, c23, *(values[:, None] for values in np.array(systems).T[4:]))
     w0 = np.array(speeds)[:, None] + away[None]
-    return _plane("b = 0: double and triple\nroots, $t = 20$", x, y, "trajectory", six, phi0, w0, 20.0)
+    return _plane(
+        "b = 0: double and triple\nroots, $t = 20$", x, y, "trajectory", six, phi0, w0, 20.0
+    )
 
 
 def _beside(n):
@@ -112,7 +126,9 @@ def _stiff(n):
 
 def _turning(six, phi0, limit, title, n):
     """Abel solutions: angles around the turning point, of solutions ever closer to the separatrix."""
-    x, away = two_sided(r"distance to the turning point, $\varphi - \varphi_T$", np.linspace(-16.0, -1.0, n))
+    x, away = two_sided(
+        r"distance to the turning point, $\varphi - \varphi_T$", np.linspace(-16.0, -1.0, n)
+    )
     gaps = np.linspace(-14.0, -1.0, max(n + 4, 3))
     w0 = limit - 10.0**gaps
     at = np.sort(_ends(six, phi0, w0)[0][:, None] + away[None], axis=1)

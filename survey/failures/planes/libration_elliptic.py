@@ -9,7 +9,9 @@ ABOUT = """The monodromy matrix grows as a power of 1 / (1 - e); at the tip (mu 
 curves touch, where all multipliers are -1 and both invariants' first differences vanish; as mu goes to 0 two
 multipliers go to 1. `auto` takes panels of series over dense rows and 16th-order Taylor steps, and double-double
 where float64 misses rtol or leaves a verdict open."""
-SOURCE = "Truth: Taylor series of order 32 in double-double, in the eccentric anomaly; M multiplied out."
+SOURCE = (
+    "Truth: Taylor series of order 32 in double-double, in the eccentric anomaly; M multiplied out."
+)
 TIP = 0.04699080701821065, 0.31450715975493514
 SLOW = ("rk4",)
 
@@ -25,7 +27,10 @@ def _plain(share):
 
 
 def _to_one(share):
-    mu, short = np.linspace(-12.0, np.log10(0.5), few(share, 20)), np.linspace(-14.0, -0.1, few(share, 16))
+    mu, short = (
+        np.linspace(-12.0, np.log10(0.5), few(share, 20)),
+        np.linspace(-14.0, -0.1, few(share, 16)),
+    )
     return Plane("e to 1", logarithmic(r"$\mu$", mu), logarithmic("$1 - e$", short), "libration_elliptic",
                  {"mu": 10.0 ** mu[None], "e": 1.0 - 10.0 ** short[:, None]}, truth, SOURCE, slow=SLOW)  # fmt: skip
 

@@ -47,7 +47,12 @@ def _breaks(share):
 def _stiff(share):
     a, part = np.linspace(0.0, 7.0, few(share, 20)), np.linspace(-0.9, 1.1, few(share, 14))
     rate = 10.0 ** a[None]
-    given = {name: 0.0 for name in own.LONG_NAMES} | {"T": 1.0, "a": rate, "c1": rate * part[:, None], "c2": 0.3 * rate}
+    given = {name: 0.0 for name in own.LONG_NAMES} | {
+        "T": 1.0,
+        "a": rate,
+        "c1": rate * part[:, None],
+        "c2": 0.3 * rate,
+    }
     return Plane(
         "stiff z", logarithmic("size of $z$", a), plain("its first harmonic, over its mean", part),
         _scene("harmonics"), given, own.true("harmonics"),

@@ -13,9 +13,13 @@ def planes(path, share):
     found, truth = digits.of_file(path)
     values = [found.values(name, few(share, 16)) for name in found.axes]
     names = list(found.axes)
-    given = dict(found.fixed) | {names[0]: values[0][:, None] if len(names) > 1 else values[0][None]}
+    given = dict(found.fixed) | {
+        names[0]: values[0][:, None] if len(names) > 1 else values[0][None]
+    }
     if len(names) > 1:
         given[names[1]] = values[1][None]
     y = plain(names[0], values[0]) if len(names) > 1 else plain("", [0.0])
-    title = f"{found.name}" + "".join(f", {name} = {value:g}" for name, value in found.fixed.items())
+    title = f"{found.name}" + "".join(
+        f", {name} = {value:g}" for name, value in found.fixed.items()
+    )
     return [Plane(title, plain(names[-1], values[-1]), y, found.scene, given, truth, SOURCE)]

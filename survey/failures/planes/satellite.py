@@ -1,4 +1,6 @@
-"""The satellite: modulus to 1, rho to 1e4, narrow tongues, rotations ever faster and ever nearer the separatrix."""
+"""The satellite: modulus to 1, rho to 1e4, narrow tongues, rotations ever faster and ever nearer
+the separatrix.
+"""
 
 import numpy as np
 
@@ -45,7 +47,10 @@ def _tongues(share, body):
     k = 10.0 ** np.linspace(-4.0, -0.7, few(share, 18))
     place = np.linspace(-1.5, 1.5, few(share, 25))
     centre = np.sqrt(1.25) if body == "prolate" else 1.5
-    ends = [edge("satellite", along="rho", rho=(centre - 4 * m * m, centre), k=m, body=body).edge.values for m in k]
+    ends = [
+        edge("satellite", along="rho", rho=(centre - 4 * m * m, centre), k=m, body=body).edge.values
+        for m in k
+    ]
     low, high = np.array([[x[0], x[-1]] for x in ends]).T
     rho = 0.5 * (low + high)[:, None] + place[None] * (high - low)[:, None]
     return Plane(

@@ -1,1 +1,3 @@
-"""Kernels of whole gyrostats: their motions, and deviations from the invariant set of rotation about axis 1."""
+"""Kernels of whole gyrostats: their motions, and deviations from the invariant set of rotation
+about axis 1.
+"""

@@ -1,7 +1,9 @@
-"""Motions of a gyrostat in its own axes, (w, nu) at given times with error bars: the steps of any method.
+"""Motions of a gyrostat in its own axes, (w, nu) at given times with error bars: the steps of any
+method.
 
-The equations, their series and how errors are carried along are those of `kernels.cylinder.gyrostat`, in whose tables
-T and V a step lies; a method brings `begin` (expand at a state; the step) and `at` (the state within the step).
+The equations, their series and how errors are carried along are those of
+`kernels.cylinder.gyrostat`, in whose tables T and V a step lies; a method brings `begin` (expand at
+a state; the step) and `at` (the state within the step).
 """
 
 import math
@@ -10,20 +12,33 @@ import numpy as np
 
 from survey.kernels.cylinder.flow import LOW
 from survey.kernels.cylinder.gyrostat import FIRST_ORDER, LAST, carry, series, variation
-from survey.kernels.cylinder.steps import NO_CONVERGENCE, OK, OVERFLOW, STEP_LIMIT, TRUST, bar, finite
+from survey.kernels.cylinder.steps import (
+    NO_CONVERGENCE,
+    OK,
+    OVERFLOW,
+    STEP_LIMIT,
+    TRUST,
+    bar,
+    finite,
+)
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 STATE, FLOATS = 6, 12  # w and nu; and then their bars
-_PAIRS = 3  # of components, in each of which a step and the initial state err; `bar` counts two for each step
+# of components, in each of which a step and the initial state err; `bar` counts two for each step
+_PAIRS = 3
 _FIRST = 4.0 * ROUNDOFF_UP  # rounding of nu, of length 1
-STAGE = LOW + 1  # the first line of T that a Runge-Kutta method, whose series are short, may use for its stages
-ERROR, STEP = 0, 5  # columns of T[LAST]: truncation error of the step, relative to `size_of`; what a method notes
+# the first line of T that a Runge-Kutta method, whose series are short, may use for its stages
+STAGE = LOW + 1
+# columns of T[LAST]: truncation error of the step, relative to `size_of`; what a method notes
+ERROR, STEP = 0, 5
 
 
 @kernel
 def expanded(G, state, T, V):
-    """Fill T and V as far as error bars need them; returns the step that keeps the variational equation accurate."""
+    """Fill T and V as far as error bars need them; returns the step that keeps the variational
+    equation accurate.
+    """
     series(G, state, T, LOW)
     variation(G, T, V)
     size, tangent = 1.0, 1e-300
@@ -31,7 +46,10 @@ def expanded(G, state, T, V):
         size = max(size, abs(state[i]))
     for i in range(STATE):
         for c in range(STATE):
-            tangent = max(tangent, abs(V[LOW, c, i]) * (1.0 / size if i < 3 else 1.0) * (size if c < 3 else 1.0))
+            tangent = max(
+                tangent,
+                abs(V[LOW, c, i]) * (1.0 / size if i < 3 else 1.0) * (size if c < 3 else 1.0),
+            )
     return (FIRST_ORDER / tangent) ** (1.0 / LOW)
 
 
@@ -42,9 +60,27 @@ def slope(G, t, y):
     k0 = G[12, 0] + G[0, 0] * p + G[0, 1] * q + G[0, 2] * r
     k1 = G[12, 1] + G[1, 0] * p + G[1, 1] * q + G[1, 2] * r
     k2 = G[12, 2] + G[2, 0] * p + G[2, 1] * q + G[2, 2] * r
-    f0 = G[13, 0] + G[6, 0] * p + G[6, 1] * q + G[6, 2] * r - (G[9, 0] * x + G[9, 1] * u + G[9, 2] * v)
-    f1 = G[13, 1] + G[7, 0] * p + G[7, 1] * q + G[7, 2] * r - (G[10, 0] * x + G[10, 1] * u + G[10, 2] * v)
-    f2 = G[13, 2] + G[8, 0] * p + G[8, 1] * q + G[8, 2] * r - (G[11, 0] * x + G[11, 1] * u + G[11, 2] * v)
+    f0 = (
+        G[13, 0]
+        + G[6, 0] * p
+        + G[6, 1] * q
+        + G[6, 2] * r
+        - (G[9, 0] * x + G[9, 1] * u + G[9, 2] * v)
+    )
+    f1 = (
+        G[13, 1]
+        + G[7, 0] * p
+        + G[7, 1] * q
+        + G[7, 2] * r
+        - (G[10, 0] * x + G[10, 1] * u + G[10, 2] * v)
+    )
+    f2 = (
+        G[13, 2]
+        + G[8, 0] * p
+        + G[8, 1] * q
+        + G[8, 2] * r
+        - (G[11, 0] * x + G[11, 1] * u + G[11, 2] * v)
+    )
     a = k1 * r - k2 * q + f1 * v - f2 * u
     b = k2 * p - k0 * r + f2 * x - f0 * v
     c = k0 * q - k1 * p + f0 * u - f1 * x
@@ -89,16 +125,31 @@ def _written(state, squares, n, row):
 
 @inline
 def trajectories(begin, at, G, starts, times, tolerance, limit, floats, status):
-    """Fill floats (rows, n, FLOATS) and status (rows) at ascending times (rows, n) >= 0 of systems G (rows, 14, 3)."""
+    """Fill floats (rows, n, FLOATS) and status (rows) at ascending times (rows, n) >= 0 of systems
+    G (rows, 14, 3).
+    """
     for i in range(len(G)):
         size = finite(times[i])
-        status[i] = _trajectory(begin, at, G[i], starts[i], times[i, :size], tolerance, limit, floats[i])
+        status[i] = _trajectory(
+            begin, at, G[i], starts[i], times[i, :size], tolerance, limit, floats[i]
+        )
 
 
 @inline
 def _trajectory(begin, at, G, start, times, tolerance, limit, floats):
-    T, V, squares, there = np.zeros((LAST + 1, 12)), np.zeros((LOW + 1, 6, 12)), np.zeros((6, 6)), np.empty((6, 6))
-    state, new, J, work, row = start.copy(), np.empty(6), np.empty((6, 6)), np.empty((6, 6)), np.empty(FLOATS)
+    T, V, squares, there = (
+        np.zeros((LAST + 1, 12)),
+        np.zeros((LOW + 1, 6, 12)),
+        np.zeros((6, 6)),
+        np.empty((6, 6)),
+    )
+    state, new, J, work, row = (
+        start.copy(),
+        np.empty(6),
+        np.empty((6, 6)),
+        np.empty((6, 6)),
+        np.empty(FLOATS),
+    )
     for i in range(3):
         squares[3 + i, 3 + i] = _FIRST * _FIRST
     t, t_low, j, size = 0.0, 0.0, 0, len(times)

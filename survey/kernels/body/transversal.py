@@ -1,9 +1,11 @@
-"""Deviations z from the set w2 = w3 = 0, nu1 = cos theta of a gyrostat, to first order, over one period of its motion.
+"""Deviations z from the set w2 = w3 = 0, nu1 = cos theta of a gyrostat, to first order, over one
+period of its motion.
 
     z' = (M0 + w Mw + sin phi Ms + cos phi Mc) z,   phi' = w,  w' = f w + g
 
-Taylor series in t of order 20 for both. Errors travel as in `measures.linear_motion`: beside each column of the
-fundamental matrix goes its error ellipse; what the motion is off, within the bars of `steps`, errs in the matrix.
+Taylor series in t of order 20 for both. Errors travel as in `measures.linear_motion`: beside each
+column of the fundamental matrix goes its error ellipse; what the motion is off, within the bars of
+`steps`, errs in the matrix.
 """
 
 import math
@@ -61,7 +63,11 @@ def _begin(p, M, phi, w, T, Z):
         for k in range(n + 1):
             for i in range(SIZE):
                 for j in range(SIZE):
-                    m = M[BY_W, i, j] * T[k, W] + M[BY_SIN, i, j] * T[k, SIN] + M[BY_COS, i, j] * T[k, COS]
+                    m = (
+                        M[BY_W, i, j] * T[k, W]
+                        + M[BY_SIN, i, j] * T[k, SIN]
+                        + M[BY_COS, i, j] * T[k, COS]
+                    )
                     if k == 0:
                         m += M[BY_NOTHING, i, j]
                     for c in range(SIZE):
@@ -88,7 +94,12 @@ def _integral(M, T, dt):
             m = M[BY_W, i, i] * T[n, W] + M[BY_SIN, i, i] * T[n, SIN] + M[BY_COS, i, i] * T[n, COS]
             s = s * dt + (m + (M[BY_NOTHING, i, i] if n == 0 else 0.0)) / (n + 1)
         total += s * dt
-        size += abs(M[BY_NOTHING, i, i]) + abs(M[BY_W, i, i] * T[0, W]) + abs(M[BY_SIN, i, i]) + abs(M[BY_COS, i, i])
+        size += (
+            abs(M[BY_NOTHING, i, i])
+            + abs(M[BY_W, i, i] * T[0, W])
+            + abs(M[BY_SIN, i, i])
+            + abs(M[BY_COS, i, i])
+        )
     return total, size * dt
 
 
@@ -106,7 +117,9 @@ def _norm(matrix):
 
 @kernel
 def _advance(Z, dt, local, P, fundamental, ellipses, work):
-    """Carry the fundamental matrix and its columns' error ellipses over dt; `local` is the error of a step over |P|."""
+    """Carry the fundamental matrix and its columns' error ellipses over dt; `local` is the error of
+    a step over |P|.
+    """
     for i in range(SIZE):
         for c in range(SIZE):
             value = Z[ORDER, i, c]
@@ -141,16 +154,27 @@ def _advance(Z, dt, local, P, fundamental, ellipses, work):
 
 @kernel
 def monodromy(p, M, slip, start, rotates, fundamental, notes):
-    """Fill the fundamental matrix over one period from `start` (phi, w), and `notes`; True if it closed.
+    """Fill the fundamental matrix over one period from `start` (phi, w), and `notes`; True if it
+    closed.
 
-    `rotates`: the period ends a turn later, else (a libration) where the start is passed again after two turning
-    points. `slip` bounds what the matrices M (4, SIZE, SIZE) are off, in norm over that of M.
+    `rotates`: the period ends a turn later, else (a libration) where the start is passed again
+    after two turning points. `slip` bounds what the matrices M (4, SIZE, SIZE) are off, in norm
+    over that of M.
     """
-    T, Z, P, work = table(), np.empty((ORDER + 1, SIZE, SIZE)), np.empty((SIZE, SIZE)), np.empty((SIZE, SIZE))
+    T, Z, P, work = (
+        table(),
+        np.empty((ORDER + 1, SIZE, SIZE)),
+        np.empty((SIZE, SIZE)),
+        np.empty((SIZE, SIZE)),
+    )
     ellipses, turnings = np.zeros((SIZE, SIZE, SIZE)), 0
     phi, w, t, log_det, log_bar = start[0], start[1], 0.0, 0.0, 0.0
     saa, sab, sbb = 0.0, 0.0, 0.0
-    constant, by_w, by_angle = _norm(M[BY_NOTHING]), _norm(M[BY_W]), _norm(M[BY_SIN]) + _norm(M[BY_COS])
+    constant, by_w, by_angle = (
+        _norm(M[BY_NOTHING]),
+        _norm(M[BY_W]),
+        _norm(M[BY_SIN]) + _norm(M[BY_COS]),
+    )
     for i in range(SIZE):
         for c in range(SIZE):
             fundamental[i, c] = 1.0 if i == c else 0.0
@@ -199,7 +223,10 @@ def monodromy(p, M, slip, start, rotates, fundamental, notes):
             worst = largest = 0.0
             for c in range(SIZE):
                 for i in range(SIZE):
-                    worst, largest = max(worst, ellipses[c, i, i]), max(largest, abs(fundamental[i, c]))
+                    worst, largest = (
+                        max(worst, ellipses[c, i, i]),
+                        max(largest, abs(fundamental[i, c])),
+                    )
             notes[PERIOD], notes[PERIOD_BAR] = t, late
             notes[LOG_DET], notes[LOG_DET_BAR] = log_det, log_bar + SIZE * rate * late
             notes[MATRIX_BAR] = 1.01 * math.sqrt(SIZE * n * worst) + rate * SIZE * largest * late

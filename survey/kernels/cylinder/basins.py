@@ -1,4 +1,5 @@
-"""Basins: the cylinder cut into cells along phi, and in each the pieces of the curves that part fates, in order.
+"""Basins: the cylinder cut into cells along phi, and in each the pieces of the curves that part
+fates, in order.
 
 The curves are the stable branches of saddles, the strong stable ones of attracting nodes, and unstable cycles. They are
 followed in the flow that S1, (b, w, t) -> -(b, w, t), makes of the system, so that neighbours come nearer to them. All
@@ -6,8 +7,9 @@ equilibria are edges of cells: so g has one sign in a cell, a curve turns (w = 0
 where it does not arrive from, and on one side of w = 0 the pieces in a cell are ordered by |w| at the edge that all of
 them touch, the `reference` edge. u = |w|.
 
-A piece is a cubic of Hermite, of u over phi, or of phi over u where u changes by much. Its bar is what its error
-ellipse leaves across it, and three times what the cubic misses at points between its ends.
+A piece is a cubic of Hermite, of u over phi, or of phi over u where u changes by much. Its bar is
+what its error ellipse leaves across it, and three times what the cubic misses at points between its
+ends.
 """
 
 import math
@@ -20,14 +22,17 @@ from survey.kernels.cylinder.steps import bar, carried, expand, to_target, until
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.newton import bracketed
 
-# A piece: its cell, side (0: w > 0), u at the reference edge and at the other (NaN: it turns), how its s-end is, and
-# its cubic: over phi or over u, from X0 to X1, values and slopes there, is u greater to the left; bars of Y and of u.
+# A piece: its cell, side (0: w > 0), u at the reference edge and at the other (NaN: it turns), how
+# its s-end is, and its cubic: over phi or over u, from X0 to X1, values and slopes there, is u
+# greater to the left; bars of Y and of u.
 CELL, SIDE, REFERENCE, OTHER, ENDING, OVER_U, X0, X1, Y0, Y1, D0, D1, FALLS, BAR, BAR_U = range(15)
 PIECE = 15
-GOES_ON, CUT, ARRIVES, CLOSES = range(4)  # into the next piece; cut off; at an equilibrium; into the first piece
+# into the next piece; cut off; at an equilibrium; into the first piece
+GOES_ON, CUT, ARRIVES, CLOSES = range(4)
 BRANCH, ROTATION, LIBRATION = range(3)  # what is followed
 LIMIT = 40_000  # steps
-CLOSE = 2e-6  # windings nearer to one another are not told apart, relative to 1 rad and to the velocities
+# windings nearer to one another are not told apart, relative to 1 rad and to the velocities
+CLOSE = 2e-6
 ARRIVED = 1e-6  # rad from a node
 RATIO = 0.6  # of u at the ends of a piece: below it is written over u
 WORST = 1e-5  # bar at which a curve is cut
@@ -41,7 +46,10 @@ def _hermite(piece, x):
     size = piece[X1] - piece[X0]
     t = (x - piece[X0]) / size
     r = 1.0 - t
-    a, b = piece[Y0] * (1.0 + 2.0 * t) + size * piece[D0] * t, piece[Y1] * (1.0 + 2.0 * r) - size * piece[D1] * r
+    a, b = (
+        piece[Y0] * (1.0 + 2.0 * t) + size * piece[D0] * t,
+        piece[Y1] * (1.0 + 2.0 * r) - size * piece[D1] * r,
+    )
     return a * r * r + b * t * t
 
 
@@ -63,7 +71,9 @@ def side_of(piece, phi, u):
 
 @inline
 def _end_of(p, phi, w, sign, n, saa, sab, sbb, end):
-    """Note a point of the curve: phi, u, du/dphi, dphi/du, and the error of u at this phi, and of phi at this u."""
+    """Note a point of the curve: phi, u, du/dphi, dphi/du, and the error of u at this phi, and of
+    phi at this u.
+    """
     f, g, _dg = values(p, phi)
     accel = f * w + g
     across = bar(n, max(accel * accel * saa - 2.0 * accel * w * sab + w * w * sbb, 0.0))
@@ -73,9 +83,11 @@ def _end_of(p, phi, w, sign, n, saa, sab, sbb, end):
 
 @kernel
 def _write(cell, sign, falling, one, two, turns, samples, count, scale, piece):
-    """Fill `piece` between two points of `_end_of`, the first and the last in the cell; returns its relative error.
+    """Fill `piece` between two points of `_end_of`, the first and the last in the cell; returns its
+    relative error.
 
-    `turns`: does it turn in this cell? `falling`: g < 0 there, so that the reference edge is the left one.
+    `turns`: does it turn in this cell? `falling`: g < 0 there, so that the reference edge is the
+    left one.
     """
     left, right = (one, two) if one[0] < two[0] else (two, one)
     low, high = (one, two) if one[1] < two[1] else (two, one)
@@ -91,7 +103,9 @@ def _write(cell, sign, falling, one, two, turns, samples, count, scale, piece):
         if not error < best and best < math.inf:  # back to the first
             _cubic(left, right, low, high, 0, samples, count, unit, piece)
         best = min(best, error)
-    return (low[5] if piece[OVER_U] else low[4] / unit) + (high[5] if piece[OVER_U] else high[4] / unit)
+    return (low[5] if piece[OVER_U] else low[4] / unit) + (
+        high[5] if piece[OVER_U] else high[4] / unit
+    )
 
 
 @kernel
@@ -109,29 +123,56 @@ def _cubic(left, right, low, high, over, samples, count, unit, piece):
         highest = max(highest, samples[i, 1])
         x, y = (samples[i, 1], samples[i, 0]) if over else (samples[i, 0], samples[i, 1])
         if x < piece[X0] or x > piece[X1]:  # u is not monotone, or a sample is the end itself
-            missed = max(missed, 0.0 if abs(y - piece[Y0]) < 1e-13 or abs(y - piece[Y1]) < 1e-13 else HIDDEN)
+            missed = max(
+                missed, 0.0 if abs(y - piece[Y0]) < 1e-13 or abs(y - piece[Y1]) < 1e-13 else HIDDEN
+            )
         else:
             missed = max(missed, abs(y - _hermite(piece, x)))
     size = 1.0 if over else unit
     piece[BAR] = 2.0 * across + 3.0 * missed + 1e-12 * size
     # u, whose samples stand at thirds of times, exceeds them by half at most where it is concave
-    piece[BAR_U] = min(2.0 * piece[BAR] / max(abs(high[3]), 1e-300), 2.0 * highest) + 1e-12 * unit if over else 0.0
+    piece[BAR_U] = (
+        min(2.0 * piece[BAR] / max(abs(high[3]), 1e-300), 2.0 * highest) + 1e-12 * unit
+        if over
+        else 0.0
+    )
     return piece[BAR] / size
 
 
 @inline
 def _crossing(at, p, T, target, up, guess, low, high):
     """dt in [low, high] where phi = target."""
-    return bracketed(to_target, at, (p, T, target, up), guess, (low, high), (1e-16 * high, 0.0), 60)[1]
+    return bracketed(
+        to_target, at, (p, T, target, up), guess, (low, high), (1e-16 * high, 0.0), 60
+    )[1]
 
 
 @inline
-def pieces(setting, begin, at, p, start, edges, falls, eqs, count, kind, cell, top, scale, tolerance, most, out):
-    """Fill `out` (rows, PIECE) with the pieces of a curve of the flow p, which S1 has made of the system; their number.
+def pieces(
+    setting,
+    begin,
+    at,
+    p,
+    start,
+    edges,
+    falls,
+    eqs,
+    count,
+    kind,
+    cell,
+    top,
+    scale,
+    tolerance,
+    most,
+    out,
+):
+    """Fill `out` (rows, PIECE) with the pieces of a curve of the flow p, which S1 has made of the
+    system; their number.
 
-    start: phi, w, their bars, and of a BRANCH the angle and the bar of its equilibrium and its slope dw/dphi there;
-    phi is in the cell number `cell` of those between the edges. falls: is g < 0 in the cell? eqs: equilibria of p. A
-    branch is cut off a turn after u has passed `top`, or where its windings come too near to one another.
+    start: phi, w, their bars, and of a BRANCH the angle and the bar of its equilibrium and its
+    slope dw/dphi there; phi is in the cell number `cell` of those between the edges. falls: is g <
+    0 in the cell? eqs: equilibria of p. A branch is cut off a turn after u has passed `top`, or
+    where its windings come too near to one another.
     """
     T, samples, one, two = table(), np.zeros((SAMPLES, 2)), np.zeros(6), np.zeros(6)
     how = setting(p, start[1], tolerance)
@@ -166,19 +207,29 @@ def pieces(setting, begin, at, p, start, edges, falls, eqs, count, kind, cell, t
             reached = (x1 - target) * sign >= 0.0
             to = h
             if reached:
-                guess = min(dt + (target - at(p, T, dt)[0]) / (w if w != 0.0 else w1), h) if w * w1 != 0.0 else h
+                guess = (
+                    min(dt + (target - at(p, T, dt)[0]) / (w if w != 0.0 else w1), h)
+                    if w * w1 != 0.0
+                    else h
+                )
                 to = _crossing(at, p, T, target, sign > 0, max(guess, dt), dt, h)
             for k in range(1, 3):
                 x, v, _e, _y = at(p, T, dt + (to - dt) * (k / 3.0))
                 if sampled < SAMPLES:
-                    samples[sampled, 0], samples[sampled, 1], sampled = x - shift, abs(v), sampled + 1
+                    samples[sampled, 0], samples[sampled, 1], sampled = (
+                        x - shift,
+                        abs(v),
+                        sampled + 1,
+                    )
             if not reached:
                 break
             _x, v, _e, _y = at(p, T, to)
             a, b, c = carried(p, T, to, v, saa, sab, sbb)
             edge = edges[cell + 1] if sign > 0 else edges[cell]
             _end_of(p, edge, v, sign, n + 1, a, b, c, two)
-            wide = _write(cell, sign, falls[cell], one, two, from_axis, samples, sampled, scale, out[size])
+            wide = _write(
+                cell, sign, falls[cell], one, two, from_axis, samples, sampled, scale, out[size]
+            )
             size, sampled, from_axis, dt = size + 1, 0, False, to
             kept = size
             fast = 0 if abs(v) < top else fast + 1
@@ -207,7 +258,9 @@ def pieces(setting, begin, at, p, start, edges, falls, eqs, count, kind, cell, t
             phi -= (1.0 if shift > 0.0 else -1.0) * TWO_PI_LOW
         if turned:
             _end_of(p, phi, 0.0, sign, n + 1, saa, sab, sbb, two)
-            wide = _write(cell, sign, falls[cell], one, two, True, samples, sampled, scale, out[size])
+            wide = _write(
+                cell, sign, falls[cell], one, two, True, samples, sampled, scale, out[size]
+            )
             size, sampled, from_axis, before = size + 1, 0, True, math.nan
             turnings += 1
             for i in range(6):
@@ -230,10 +283,23 @@ def pieces(setting, begin, at, p, start, edges, falls, eqs, count, kind, cell, t
                 x, _turns = offset(phi, eqs[held, ANGLE])
                 if abs(x) < ARRIVED and settled(p, eqs[held, F], eqs[held, DG], x, w):
                     where = edges[cell + 1] if sign > 0 else edges[cell]
-                    slope = 0.5 * (eqs[held, F] + math.sqrt(eqs[held, F] ** 2 + 4.0 * eqs[held, DG]))
+                    slope = 0.5 * (
+                        eqs[held, F] + math.sqrt(eqs[held, F] ** 2 + 4.0 * eqs[held, DG])
+                    )
                     two[0], two[1], two[2], two[3] = where, 0.0, sign * slope, sign / slope
                     two[4], two[5] = 4.0 * ARRIVED * abs(slope), 4.0 * ARRIVED
-                    _write(cell, sign, falls[cell], one, two, from_axis, samples, sampled, scale, out[size])
+                    _write(
+                        cell,
+                        sign,
+                        falls[cell],
+                        one,
+                        two,
+                        from_axis,
+                        samples,
+                        sampled,
+                        scale,
+                        out[size],
+                    )
                     if from_axis:
                         break
                     size, ending = size + 1, ARRIVES
@@ -247,8 +313,9 @@ def pieces(setting, begin, at, p, start, edges, falls, eqs, count, kind, cell, t
 
 @kernel
 def numbers(found, falls, first, turning, resting):
-    """Where the pieces, sorted by cell, side and u, of each cell and side begin, how many of them turn there, and how
-    many begin or end at an equilibrium that is their reference edge; False if their order contradicts itself.
+    """Where the pieces, sorted by cell, side and u, of each cell and side begin, how many of them
+    turn there, and how many begin or end at an equilibrium that is their reference edge; False if
+    their order contradicts itself.
     """
     for i in range(len(found)):
         first[int(2 * found[i, CELL] + found[i, SIDE]) + 1] += 1
@@ -285,7 +352,9 @@ def _root(parent, turns, counts, i):
 
 @kernel
 def _join(parent, turns, counts, loops, a, b, turn, count):
-    """Limits of a lie `turn` turns further than those of b, and from a there are `count` more turning points."""
+    """Limits of a lie `turn` turns further than those of b, and from a there are `count` more
+    turning points.
+    """
     one, t1, c1 = _root(parent, turns, counts, a)
     two, t2, c2 = _root(parent, turns, counts, b)
     if one == two:
@@ -301,31 +370,46 @@ def _join(parent, turns, counts, loops, a, b, turn, count):
 
 @kernel
 def neighbours(found, serial, curve, falls, first, turning, links, seeds):
-    """Fill `links` (rows of gap, gap that comes before it in time, turns by which limits of starts there lie further,
-    turning points more) and `seeds`, gaps into which, against time, a curve goes on that was cut off; returns their
-    numbers, or (-1, -1) if the order of pieces contradicts itself.
+    """Fill `links` (rows of gap, gap that comes before it in time, turns by which limits of starts
+    there lie further, turning points more) and `seeds`, gaps into which, against time, a curve goes
+    on that was cut off; returns their numbers, or (-1, -1) if the order of pieces contradicts
+    itself.
 
-    A gap lies below a piece, or above the last: gap number first[key] + key + j, key = 2 cell + side. serial: the
-    number of a piece on its curve; curve: the first serial of its curve, and of the next one.
+    A gap lies below a piece, or above the last: gap number first[key] + key + j, key = 2 cell +
+    side. serial: the number of a piece on its curve; curve: the first serial of its curve, and of
+    the next one.
     """
     cells, size, cuts = len(falls), 0, 0
     for edge in range(cells):  # between the cells edge - 1 and edge
         left = edge - 1 if edge > 0 else cells - 1
         for side in range(2):
             one, two = 2 * left + side, 2 * edge + side
-            i = first[one] if falls[left] == 0 else first[one] + turning[one]  # g > 0: it is the reference edge
+            # g > 0: it is the reference edge
+            i = first[one] if falls[left] == 0 else first[one] + turning[one]
             j = first[two] if falls[edge] != 0 else first[two] + turning[two]
             while True:
                 more_left, more_right = i < first[one + 1], j < first[two + 1]
                 same, rest_left, rest_right = False, False, False
                 if more_left:
-                    rest_left = (found[i, REFERENCE] if falls[left] == 0 else found[i, OTHER]) == 0.0
+                    rest_left = (
+                        found[i, REFERENCE] if falls[left] == 0 else found[i, OTHER]
+                    ) == 0.0
                 if more_right:
-                    rest_right = (found[j, REFERENCE] if falls[edge] != 0 else found[j, OTHER]) == 0.0
-                if more_left and more_right and not rest_left and not rest_right and curve[i, 0] == curve[j, 0]:
+                    rest_right = (
+                        found[j, REFERENCE] if falls[edge] != 0 else found[j, OTHER]
+                    ) == 0.0
+                if (
+                    more_left
+                    and more_right
+                    and not rest_left
+                    and not rest_right
+                    and curve[i, 0] == curve[j, 0]
+                ):
                     before, after = (serial[i], serial[j]) if side == 1 else (serial[j], serial[i])
                     # the curve goes on to the left where w > 0, against time
-                    same = after == before + 1 or (before == curve[i, 1] - 1 and after == curve[i, 0])
+                    same = after == before + 1 or (
+                        before == curve[i, 1] - 1 and after == curve[i, 0]
+                    )
                 if not rest_left and not rest_right:
                     # L(left) = L(right) + 1 beyond the first edge
                     a, b = i + one, j + two
@@ -363,11 +447,16 @@ def neighbours(found, serial, curve, falls, first, turning, links, seeds):
 
 @kernel
 def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_):
-    """Join the gaps that no curve parts; open_[gap]: a curve that was cut off may part it, as all that came from there.
+    """Join the gaps that no curve parts; open_[gap]: a curve that was cut off may part it, as all
+    that came from there.
 
     loops[root] = (do turns, do turning points depend on how one goes there?).
     """
-    head, after, queue = np.full(gaps, -1), np.empty(size, dtype=np.int64), np.empty(gaps, dtype=np.int64)
+    head, after, queue = (
+        np.full(gaps, -1),
+        np.empty(size, dtype=np.int64),
+        np.empty(gaps, dtype=np.int64),
+    )
     for k in range(size):
         after[k], head[links[k, 0]] = head[links[k, 0]], k
     top = 0
@@ -397,8 +486,8 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
 
 @kernel
 def located(p, starts, breaks, numbers_of, edges, found, first, limits, gaps, turned):
-    """Fill gaps (N) with the gap of each start (phi, w), -1 where it is nearer to a piece than that one's bar, and
-    turned (N) with the whole turns from the cells to it.
+    """Fill gaps (N) with the gap of each start (phi, w), -1 where it is nearer to a piece than that
+    one's bar, and turned (N) with the whole turns from the cells to it.
 
     breaks: equilibria, ascending over a turn; numbers_of: the number of the first cell after each. limits: the |w| up
     to which the curves are complete, for w > 0 and w < 0.
@@ -415,7 +504,9 @@ def located(p, starts, breaks, numbers_of, edges, found, first, limits, gaps, tu
         while k < most - 1 and x >= breaks[k + 1]:
             k += 1
         cells = numbers_of[k + 1] - numbers_of[k]
-        cell = numbers_of[k] + min(int((x - breaks[k]) / (breaks[k + 1] - breaks[k]) * cells), cells - 1)
+        cell = numbers_of[k] + min(
+            int((x - breaks[k]) / (breaks[k + 1] - breaks[k]) * cells), cells - 1
+        )
         if x < edges[cell]:
             cell -= 1
         elif x > edges[cell + 1]:

@@ -1,8 +1,10 @@
-"""Branches of the saddles in double-double arithmetic, for any b: a power series at the saddle, then the flow.
+"""Branches of the saddles in double-double arithmetic, for any b: a power series at the saddle,
+then the flow.
 
-w(x) = a1 x + a2 x^2 + ..., x = phi - phi_s, solves w w' = f w + g (57), a1 = (f + sqrt(f^2 + 4 g'))/2 for the unstable
-branches. It is taken to x1, where its last terms are below 1e-32, and from there on `flow_double` follows the branch.
-Nearer to the saddle the time is that of x' = w(x): a1 t = ln x + r1 x + r2 x^2/2 + ..., 1/w = (1 + r1 x + ...)/(a1 x).
+w(x) = a1 x + a2 x^2 + ..., x = phi - phi_s, solves w w' = f w + g (57), a1 = (f + sqrt(f^2 + 4
+g'))/2 for the unstable branches. It is taken to x1, where its last terms are below 1e-32, and from
+there on `flow_double` follows the branch. Nearer to the saddle the time is that of x' = w(x): a1 t
+= ln x + r1 x + r2 x^2/2 + ..., 1/w = (1 + r1 x + ...)/(a1 x).
 
 All here is the branch that leaves the saddle to the right, w > 0; the caller mirrors.
 """
@@ -13,12 +15,36 @@ import numpy as np
 
 from survey.kernels.cylinder import flow_double
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, TWO_PI, D, values
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DDG,
+    BOUND_DG,
+    BOUND_F,
+    C23,
+    S2,
+    S3,
+    TWO_PI,
+    D,
+    values,
+)
 from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, SLIP, ahead
 from survey.kernels.cylinder.steps import EQUILIBRIUM, OK
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.angles_double import centred, sine_cosine
-from survey.kernels.math.double import add, div, mul, neg, over, scaled, shifted, sqrt, square, sub, times
+from survey.kernels.math.double import (
+    add,
+    div,
+    mul,
+    neg,
+    over,
+    scaled,
+    shifted,
+    sqrt,
+    square,
+    sub,
+    times,
+)
 from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 30
@@ -45,7 +71,10 @@ def expand(p, place, a):
     factorial, power = 1.0, 1.0
     for n in range(ORDER + 1):
         f[0, n], f[1, n] = over(add(times(c, p[B12]), times(s, -p[B31])), factorial)
-        one, two = add(times(c, p[S2]), times(s, -p[S3])), add(times(s2, 0.5 * p[D]), times(c2, p[C23]))
+        one, two = (
+            add(times(c, p[S2]), times(s, -p[S3])),
+            add(times(s2, 0.5 * p[D]), times(c2, p[C23])),
+        )
         g[0, n], g[1, n] = over(sub(one, scaled(two, power)), factorial)
         s, c, s2, c2 = c, neg(s), c2, neg(s2)
         factorial, power = factorial * (n + 1.0), 2.0 * power
@@ -63,7 +92,9 @@ def expand(p, place, a):
             known = sub(known, times(mul((a[_HI, j], a[_LO, j]), (a[_HI, k], a[_LO, k])), float(k)))
         a[_HI, n], a[_LO, n] = div(known, sub(times(first, n + 1.0), f0))
         if n > ORDER - 4:
-            reach = min(reach, (TRUNCATION * first[0] / (abs(a[_HI, n]) + 1e-300)) ** (1.0 / (n - 1)))
+            reach = min(
+                reach, (TRUNCATION * first[0] / (abs(a[_HI, n]) + 1e-300)) ** (1.0 / (n - 1))
+            )
     law = np.zeros(ORDER)
     law[0] = 1.0
     for n in range(1, ORDER):
@@ -119,10 +150,14 @@ def enter(p, place, phi0, a, branch, out):
     reach = expand(p, place, a)
     f0, _g, _dg = values(p, place[ANGLE])
     slip, first = place[SLIP] + PAIR_SUM_ROUNDOFF, a[_HI, 1]
-    slope = slip * (p[BOUND_F] * first + p[BOUND_DDG]) + PAIR_SUM_ROUNDOFF * (p[BOUND_F] * first + p[BOUND_DG])
+    slope = slip * (p[BOUND_F] * first + p[BOUND_DDG]) + PAIR_SUM_ROUNDOFF * (
+        p[BOUND_F] * first + p[BOUND_DG]
+    )
     spread = 2.0 * first - f0
     branch[_REACH], branch[_SLIP] = reach, 3.0 * slip
-    branch[_W_SLIP] = 3.0 * (PAIR_SUM_ROUNDOFF * first * reach + 2.0 * reach * slope / spread + 2.0 * first * slip)
+    branch[_W_SLIP] = 3.0 * (
+        PAIR_SUM_ROUNDOFF * first * reach + 2.0 * reach * slope / spread + 2.0 * first * slip
+    )
     start = centred(shifted((place[ANGLE], place[ANGLE_LOW]), reach))[0]
     branch[_TURNS] = math.floor((sub(shifted(neg(x0), phi0), start)[0] + reach) / TWO_PI + 0.5)
     branch[_X0] = x0[0]
@@ -136,7 +171,9 @@ def enter(p, place, phi0, a, branch, out):
         return OK
     floats, status, targets = np.zeros((1, rc.STATE)), np.zeros(1, np.int64), np.empty(1)
     targets[0] = phi0
-    flow_double.passed(p, _begin(p, place, branch, a), branch[_TURNS], 0.0, 0, targets, floats, status)
+    flow_double.passed(
+        p, _begin(p, place, branch, a), branch[_TURNS], 0.0, 0, targets, floats, status
+    )
     if status[0] == OK:
         branch[_TIME], branch[_LATE] = -floats[0, rc.TIME], floats[0, rc.TIME_BAR]
         out[0], out[1] = floats[0, rc.VALUE], floats[0, rc.VALUE_BAR]
@@ -163,8 +200,14 @@ def trajectory(p, place, a, branch, phi0, asked, floats, turnings):
         steep = abs(_steepness(a, x))
         phi = phi0 + (x - branch[_X0])
         floats[j, rc.PHI], floats[j, rc.W], turnings[j] = phi, w, 0
-        floats[j, rc.PHI_BAR] = _SAFE * (share * x + 2.0 * ROUNDOFF_UP * (abs(phi) + branch[_X0])) + branch[_SLIP]
-        floats[j, rc.W_BAR] = _SAFE * (share * x * steep + 2.0 * ROUNDOFF_UP * w) + branch[_W_SLIP] * x / reach + 1e-300
+        floats[j, rc.PHI_BAR] = (
+            _SAFE * (share * x + 2.0 * ROUNDOFF_UP * (abs(phi) + branch[_X0])) + branch[_SLIP]
+        )
+        floats[j, rc.W_BAR] = (
+            _SAFE * (share * x * steep + 2.0 * ROUNDOFF_UP * w)
+            + branch[_W_SLIP] * x / reach
+            + 1e-300
+        )
         j += 1
     if j == len(asked):
         return OK
@@ -195,8 +238,12 @@ def abel(p, place, a, branch, phi0, targets, floats, status):
             w = velocity(a, x)[0]
             t, bar = _between(a, x[0], branch[_REACH])
             floats[j, rc.VALUE], floats[j, rc.TIME], status[j] = w, branch[_TIME] - t, OK
-            floats[j, rc.VALUE_BAR] = 2.0 * ROUNDOFF_UP * w + branch[_W_SLIP] * x[0] / branch[_REACH]
-            floats[j, rc.TIME_BAR] = _SAFE * (bar + ROUNDOFF_UP * abs(branch[_TIME])) + branch[_SLIP] / w
+            floats[j, rc.VALUE_BAR] = (
+                2.0 * ROUNDOFF_UP * w + branch[_W_SLIP] * x[0] / branch[_REACH]
+            )
+            floats[j, rc.TIME_BAR] = (
+                _SAFE * (bar + ROUNDOFF_UP * abs(branch[_TIME])) + branch[_SLIP] / w
+            )
         j += 1
     if j < len(targets):
         start = _begin(p, place, branch, a)

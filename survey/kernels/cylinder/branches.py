@@ -1,11 +1,24 @@
-"""Unstable branches of the saddles: w(x) = a1 x + a2 x^2 + ..., x = phi - phi_s, solves w w' = f w + g (57)."""
+"""Unstable branches of the saddles: w(x) = a1 x + a2 x^2 + ..., x = phi - phi_s, solves w w' = f w
++ g (57).
+"""
 
 import math
 
 import numpy as np
 
 from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, SADDLE, F
-from survey.kernels.cylinder.flow import B12, B31, BOUND_DDG, BOUND_DG, BOUND_F, C23, S2, S3, D, values
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DDG,
+    BOUND_DG,
+    BOUND_F,
+    C23,
+    S2,
+    S3,
+    D,
+    values,
+)
 from survey.kernels.cylinder.program import COLUMNS, in_angle
 from survey.kernels.cylinder.records import START_PHI, START_PHI_BAR, START_W, START_W_BAR
 from survey.kernels.jit import for_constants, inline, kernel
@@ -41,10 +54,11 @@ def forces(p, phi, f, g):
 
 @kernel
 def unstable(p, eqs, count, starts, furthest=FURTHEST, kind=SADDLE):
-    """Fill `starts` (START_PHI to START_W_BAR) with a point of each unstable branch, two per saddle; their number.
+    """Fill `starts` (START_PHI to START_W_BAR) with a point of each unstable branch, two per
+    saddle; their number.
 
-    They are at most `furthest` (rad) from the saddle. Of repelling nodes (`kind`) they are the branches that leave
-    fastest.
+    They are at most `furthest` (rad) from the saddle. Of repelling nodes (`kind`) they are the
+    branches that leave fastest.
     """
     f, g, a = np.zeros(ORDER + 1), np.zeros(ORDER + 1), np.zeros(ORDER + 1)
     size = 0
@@ -66,13 +80,17 @@ def unstable(p, eqs, count, starts, furthest=FURTHEST, kind=SADDLE):
         reach = furthest
         for n in (ORDER - 1, ORDER):
             reach = min(reach, (TRUNCATION * a[1] / (abs(a[n]) + 1e-300)) ** (1.0 / (n - 1)))
-        slope = slip * (p[BOUND_F] * a[1] + p[BOUND_DDG]) + 4.0 * ROUNDOFF_UP * (p[BOUND_F] * a[1] + p[BOUND_DG])
+        slope = slip * (p[BOUND_F] * a[1] + p[BOUND_DDG]) + 4.0 * ROUNDOFF_UP * (
+            p[BOUND_F] * a[1] + p[BOUND_DG]
+        )
         for side in (-1.0, 1.0):
             x, w = side * reach, 0.0
             for n in range(ORDER, 0, -1):
                 w = (w + a[n]) * x
             starts[size, START_PHI], starts[size, START_W] = phi + x, w
             starts[size, START_PHI_BAR] = slip + 4.0 * ROUNDOFF_UP
-            starts[size, START_W_BAR] = 20.0 * ROUNDOFF_UP * abs(w) + 2.0 * reach * slope / spread + 2.0 * a[1] * slip
+            starts[size, START_W_BAR] = (
+                20.0 * ROUNDOFF_UP * abs(w) + 2.0 * reach * slope / spread + 2.0 * a[1] * slip
+            )
             size += 1
     return size

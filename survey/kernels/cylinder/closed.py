@@ -1,14 +1,18 @@
-"""Solutions in closed form of the flow on the cylinder where g = 0 or w = mu F + n; where b = 0, the time at an angle.
+"""Solutions in closed form of the flow on the cylinder where g = 0 or w = mu F + n; where b = 0,
+the time at an angle.
 
-Trigonometric, kind 1: w = mu F(phi) + n is an invariant curve, g = (mu - 1) f (mu F + n); mu = 1 is g = 0 (50), other
-mu are (61). With u = tan(x/2), x = phi - phi0, du/dt is quadratic in u: one formula in Delta^2 = n^2 - (mu b)^2.
-Elliptic, b = 0: w^2 = w0^2 + 2 (V(phi0) - V(phi)), a trigonometric polynomial of degree 2, and chi = am(theta),
-theta = Omega t + theta0, after a real projective map of tan(phi/2) that is centred on the turning points (libration,
-kind 2) or on the complex roots (rotation, kind 3). Nothing lies at infinity, so no variant of (66) needs its own case.
+Trigonometric, kind 1: w = mu F(phi) + n is an invariant curve, g = (mu - 1) f (mu F + n); mu = 1 is
+g = 0 (50), other mu are (61). With u = tan(x/2), x = phi - phi0, du/dt is quadratic in u: one
+formula in Delta^2 = n^2 - (mu b)^2. Elliptic, b = 0: w^2 = w0^2 + 2 (V(phi0) - V(phi)), a
+trigonometric polynomial of degree 2, and chi = am(theta), theta = Omega t + theta0, after a real
+projective map of tan(phi/2) that is centred on the turning points (libration, kind 2) or on the
+complex roots (rotation, kind 3). Nothing lies at infinity, so no variant of (66) needs its own
+case.
 
 For phi and w at a time see `trigonometric` and `weierstrass`.
 
-All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` has found; `*_reach` take it.
+All start with w0 >= 0 (the caller mirrors). `data` holds what `start_*` has found; `*_reach` take
+it.
 """
 
 import cmath
@@ -26,7 +30,8 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 NONE, TRIGONOMETRIC, LIBRATION, ROTATION, LOST = 0, 1, 2, 3, 4
 SIZE = 32
-SAME = 64.0 * ROUNDOFF_UP  # how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
+# how far, relative, parameters may miss the conditions of (61); the miss goes into the bars
+SAME = 64.0 * ROUNDOFF_UP
 
 # indices into data
 W0, A1, B1, A2, B2, ROUGH = range(6)  # g(phi0 + x) = A1 cos x + B1 sin x + A2 cos 2x + B2 sin 2x
@@ -44,7 +49,8 @@ def local(p, phi0, side, data):
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
     a2, b2 = -p[C23], -0.5 * p[D]
     data[A1], data[B1] = side * (p[S2] * c - p[S3] * s), -p[S2] * s - p[S3] * c
-    data[ROUGH] = abs(p[S2] * c) + abs(p[S3] * s) + abs(a2 * c2) + abs(b2 * s2)  # what A1 and A2 are rounded against
+    # what A1 and A2 are rounded against
+    data[ROUGH] = abs(p[S2] * c) + abs(p[S3] * s) + abs(a2 * c2) + abs(b2 * s2)
     data[A2], data[B2] = side * (a2 * c2 + b2 * s2), b2 * c2 - a2 * s2
 
 
@@ -55,16 +61,24 @@ def square_of_w(data, x):
     sx, cx = 2.0 * s * c, (c - s) * (c + s)
     inner = 2.0 * c * (data[A1] + data[A2] * cx) + s * (2.0 * data[B1] + 4.0 * data[B2] * c * c)
     first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
-    slope = data[A1] * cx + data[B1] * sx + data[A2] * (cx - sx) * (cx + sx) + 2.0 * data[B2] * sx * cx
-    noise = 4.0 * ROUNDOFF_UP * (data[W0] ** 2 + 6.0 * abs(s) * (data[ROUGH] + abs(s) * (first + 2.0 * second)))
+    slope = (
+        data[A1] * cx + data[B1] * sx + data[A2] * (cx - sx) * (cx + sx) + 2.0 * data[B2] * sx * cx
+    )
+    noise = (
+        4.0
+        * ROUNDOFF_UP
+        * (data[W0] ** 2 + 6.0 * abs(s) * (data[ROUGH] + abs(s) * (first + 2.0 * second)))
+    )
     return data[W0] ** 2 + 2.0 * s * inner, 2.0 * slope, noise
 
 
 @inline
 def reach(data, side):
-    """(distance to the first zero of w^2 on that side, its bar); (inf, 0) if none within a turn, NaN if unsure.
+    """(distance to the first zero of w^2 on that side, its bar); (inf, 0) if none within a turn,
+    NaN if unsure.
 
-    Each step ends where a parabola of the greatest curvature, which lies below w^2, has its zero: none is jumped over.
+    Each step ends where a parabola of the greatest curvature, which lies below w^2, has its zero:
+    none is jumped over.
     """
     first, second = math.hypot(data[A1], data[B1]), math.hypot(data[A2], data[B2])
     bend = 2.02 * (first + 2.0 * second)
@@ -105,7 +119,9 @@ def first_kind(chi, kc2, quarter):
 
 @inline
 def applies(p, phi0, w0):
-    """(kind, mu, 1 - mu): NONE, LIBRATION if b = 0, TRIGONOMETRIC where g = (mu - 1) f (mu F + n) but for roundings."""
+    """(kind, mu, 1 - mu): NONE, LIBRATION if b = 0, TRIGONOMETRIC where g = (mu - 1) f (mu F + n)
+    but for roundings.
+    """
     b12, b31 = p[B12], p[B31]
     if p[D] == 0.0 and p[C23] == 0.0 and p[S2] == 0.0 and p[S3] == 0.0:
         return TRIGONOMETRIC, 1.0, 0.0
@@ -171,13 +187,21 @@ def start(p, phi0, w0, data):
 @inline
 def start_trigonometric(p, phi0, w0, side, mu, other, data):
     s, c = math.sin(phi0), math.cos(phi0)
-    F, f, b = mu * (p[B12] * s + p[B31] * c), mu * (p[B12] * c - p[B31] * s), math.hypot(p[B12], p[B31])
+    F, f, b = (
+        mu * (p[B12] * s + p[B31] * c),
+        mu * (p[B12] * c - p[B31] * s),
+        math.hypot(p[B12], p[B31]),
+    )
     data[W0], data[F0], data[SLOPE], data[MU], data[OTHER] = abs(w0), side * F, f, mu, other
     data[SQUARE] = (abs(w0) - 2.0 * side * F) * abs(w0) - f * f  # n^2 - (mu b)^2
     offset, miss, blur = misfit(p[B12], p[B31], p[D], p[C23], p[S2], p[S3], mu, other, w0, F)
     slack = 6.0 * ROUNDOFF_UP * abs(mu) * b
     data[NOISE] = slack + (4.0 * ROUNDOFF_UP * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
-    data[OFFSET], data[MISS], data[GAIN] = offset + (0.0 if other == 0.0 else slack), miss, b * abs(other)
+    data[OFFSET], data[MISS], data[GAIN] = (
+        offset + (0.0 if other == 0.0 else slack),
+        miss,
+        b * abs(other),
+    )
 
 
 @inline
@@ -189,7 +213,9 @@ def deviating(data, t, w):
 
 @inline
 def trigonometric_reach(data, x):
-    """(t, bar t) at which phi0 + x, x >= 0, is reached; inf beyond an equilibrium, NaN if rounding leaves it open."""
+    """(t, bar t) at which phi0 + x, x >= 0, is reached; inf beyond an equilibrium, NaN if rounding
+    leaves it open.
+    """
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     if data[F0] == 0.0 and f == 0.0:
         t = x / w0
@@ -235,7 +261,11 @@ def start_libration(data):
     middle, half = 0.5 * (right - left), 0.5 * (right + left)
     s, c = math.sin(middle), math.cos(middle)
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
-    b1, a2, b2 = data[B1] * c - data[A1] * s, data[A2] * c2 + data[B2] * s2, data[B2] * c2 - data[A2] * s2
+    b1, a2, b2 = (
+        data[B1] * c - data[A1] * s,
+        data[A2] * c2 + data[B2] * s2,
+        data[B2] * c2 - data[A2] * s2,
+    )
     ch, sh = math.cos(half), math.sin(half)
     # w^2 = sin((x - a)/2) sin((b - x)/2) Q, Q = q0 + q1 cos xi + p1 sin xi, xi = x - middle
     q0, q1, p1 = -4.0 * b1 - 4.0 * b2 * ch, -4.0 * b2, 4.0 * a2
@@ -264,7 +294,9 @@ def start_libration(data):
         data[SLACK] = 0.0
         return True
     edge = data[BAR_LEFT] / left + data[BAR_RIGHT] / right + rho + 8.0 * ROUNDOFF_UP
-    data[SLACK] = 0.5 * math.sin(chi) * edge / math.sqrt(math.cos(chi) ** 2 + kc2 * math.sin(chi) ** 2)
+    data[SLACK] = (
+        0.5 * math.sin(chi) * edge / math.sqrt(math.cos(chi) ** 2 + kc2 * math.sin(chi) ** 2)
+    )
     return True
 
 
@@ -272,7 +304,9 @@ def start_libration(data):
 def phase_bar(data, theta):
     """Bound of the error of theta - theta0, as time."""
     angle = theta + data[THETA0]
-    relative = 0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * angle + 12.0 * ROUNDOFF_UP * (angle + 1.0)
+    relative = (
+        0.25 * data[RHO] * theta + 0.5 * data[RHO_M] * angle + 12.0 * ROUNDOFF_UP * (angle + 1.0)
+    )
     return (relative + data[SLACK]) / data[OMEGA]
 
 
@@ -282,14 +316,18 @@ def flight(data, chi, slack):
     theta = first_kind(chi, data[KC2], data[QUARTER])
     slack += 8.0 * ROUNDOFF_UP * (1.0 + abs(chi))
     slack /= math.sqrt(math.cos(chi) ** 2 + data[KC2] * math.sin(chi) ** 2)
-    return (theta - data[THETA0]) / data[OMEGA], MARGIN * (phase_bar(data, theta) + slack / data[OMEGA])
+    return (theta - data[THETA0]) / data[OMEGA], MARGIN * (
+        phase_bar(data, theta) + slack / data[OMEGA]
+    )
 
 
 @inline
 def libration_reach(data, x):
     """(t, bar t) at which phi0 + x, x in [0, RIGHT], is first reached."""
     ahead, behind = data[RIGHT] - x, data[LEFT] + x
-    chi = 2.0 * math.atan2(math.sqrt(math.sin(0.5 * behind)), math.sqrt(data[RATIO] * math.sin(0.5 * ahead)))
+    chi = 2.0 * math.atan2(
+        math.sqrt(math.sin(0.5 * behind)), math.sqrt(data[RATIO] * math.sin(0.5 * ahead))
+    )
     blur = 2.0 * ROUNDOFF_UP * (data[LEFT] + data[RIGHT])
     edge = (data[BAR_LEFT] + blur) / behind if behind > 0.0 else 0.0
     edge += (data[BAR_RIGHT] + blur) / ahead if ahead > 0.0 else 0.0
@@ -299,14 +337,16 @@ def libration_reach(data, x):
 
 @inline
 def start_rotation(data):
-    """The complex roots of w^2 (z = e^{ix}) within the unit circle and the map; False where the digits are lost.
+    """The complex roots of w^2 (z = e^{ix}) within the unit circle and the map; False where the
+    digits are lost.
 
     w^2 = kappa |z^2 - sigma z + pi|^2: pi and sigma follow from y = 2 kappa, the greatest root of one equation, that
     Newton's method reaches from above. What the roots r, s miss of the coefficients is carried as an error of w^2.
     """
     a1, b1, a2, b2 = data[A1], data[B1], data[A2], data[B2]
     mean = data[W0] ** 2 + 2.0 * b1 + b2
-    first, second = complex(-2.0 * b1, -2.0 * a1), complex(-b2, -a2)  # w^2 = mean + Re(first z + second z^2)
+    # w^2 = mean + Re(first z + second z^2)
+    first, second = complex(-2.0 * b1, -2.0 * a1), complex(-b2, -a2)
     top, cross, tail = abs2(first), (second.conjugate() * first * first).real, abs2(second)
     y = 2.0 * mean
     for _ in range(100):
@@ -330,7 +370,11 @@ def start_rotation(data):
     kappa = mean / ((1.0 + abs2(r)) * (1.0 + abs2(s)) + 2.0 * (r * s.conjugate()).real)
     c1 = -2.0 * kappa * (r.conjugate() * (1.0 + abs2(s)) + s.conjugate() * (1.0 + abs2(r)))
     c2 = 2.0 * kappa * r.conjugate() * s.conjugate()
-    gaps = abs(c1 - first) + abs(c2 - second) + 12.0 * ROUNDOFF_UP * (abs(mean) + abs(first) + abs(second))
+    gaps = (
+        abs(c1 - first)
+        + abs(c2 - second)
+        + 12.0 * ROUNDOFF_UP * (abs(mean) + abs(first) + abs(second))
+    )
     least = kappa * ((1.0 - abs(r)) * (1.0 - abs(s))) ** 2
     if not least > 30.0 * gaps:
         return False
@@ -342,7 +386,11 @@ def start_rotation(data):
     scale = abs(1.0 - centre.conjugate() * r) * abs(1.0 - centre.conjugate() * s)
     data[OMEGA] = (1.0 + abs2(image)) * math.sqrt(kappa) * scale / (1.0 - abs2(centre))
     data[KC2], data[KC] = kc2, math.sqrt(kc2)
-    data[RE], data[IM], data[TILT] = centre.real, centre.imag, math.atan2(image.imag, image.real) + 0.5 * math.pi
+    data[RE], data[IM], data[TILT] = (
+        centre.real,
+        centre.imag,
+        math.atan2(image.imag, image.real) + 0.5 * math.pi,
+    )
     data[QUARTER], _second = complete(0.0, data[KC])
     data[LEAST], data[MISFIT] = least, gaps
     data[RHO], data[RHO_M] = 0.0, 0.0
@@ -378,7 +426,9 @@ def rotation_reach(data, x):
     chi = mapped(data, x)
     t, bar = flight(data, chi, 8.0 * ROUNDOFF_UP * (1.0 + abs(x)))
     return t, bar + MARGIN * (
-        rotation_bar(data, 0.0, t) + data[SLACK] / data[OMEGA] + 8.0 * ROUNDOFF_UP * abs(x) / math.sqrt(data[LEAST])
+        rotation_bar(data, 0.0, t)
+        + data[SLACK] / data[OMEGA]
+        + 8.0 * ROUNDOFF_UP * abs(x) / math.sqrt(data[LEAST])
     )
 
 

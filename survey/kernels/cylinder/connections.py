@@ -1,8 +1,9 @@
-"""Branches of the saddles up to their first turning points: what shows whether one saddle is connected with another.
+"""Branches of the saddles up to their first turning points: what shows whether one saddle is
+connected with another.
 
-Each branch is followed as an unstable one that leaves to the right, w > 0, in one of four systems: the system itself;
-that of S1, (b, w, t) -> -(b, w, t), where branches are stable; that of S2, (phi, w, b31, c23, s2) -> -(...), where they
-leave to the left; that of both.
+Each branch is followed as an unstable one that leaves to the right, w > 0, in one of four systems:
+the system itself; that of S1, (b, w, t) -> -(b, w, t), where branches are stable; that of S2, (phi,
+w, b31, c23, s2) -> -(...), where they leave to the left; that of both.
 """
 
 import math
@@ -12,19 +13,32 @@ import numpy as np
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.branches import unstable
 from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria_inside
-from survey.kernels.cylinder.flow import B12, B31, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, potential, table, values
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DG,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    S2,
+    TWO_PI,
+    potential,
+    table,
+    values,
+)
 from survey.kernels.cylinder.program import COLUMNS as GYROSTAT
 from survey.kernels.cylinder.steps import bar, carried, expand, passage, time_of_turning
 from survey.kernels.jit import constant, for_constants, inline, kernel
 
 ITSELF, REVERSED, MIRRORED, BOTH = range(4)
-# w and its error bound at the next equilibria to the right, the last of them the saddle itself, a turn further; then
-# the turning point, its bound, the number of those equilibria before it, the angle of the saddle, its bound,
-# their number, and how far to the right of the saddle they are.
+# w and its error bound at the next equilibria to the right, the last of them the saddle itself, a
+# turn further; then the turning point, its bound, the number of those equilibria before it, the
+# angle of the saddle, its bound, their number, and how far to the right of the saddle they are.
 TURN, TURN_BAR, PASSED, FROM, FROM_BAR, COLUMNS, OFFSETS = range(2 * MOST, 2 * MOST + 7)
 ROW = OFFSETS + MOST
 LIMIT = 600  # steps
-SAME = 1e-12  # difference of V, in units of its own, up to which the first of two saddles counts as the higher
+# difference of V, in units of its own, up to which the first of two saddles counts as the higher
+SAME = 1e-12
 SAMPLES = 256  # of the circle, for the V of a program
 NEAR = 1e-10  # velocities, in those of the system, at which a branch counts as stopped
 
@@ -54,7 +68,9 @@ def first_turn(setting, begin, at, p, start, tolerance, row):
             f, g, _dg = values(p, x)
             slope = (f * v + g) / v
             row[2 * k] = v
-            row[2 * k + 1] = bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0)) + 4e-16 * abs(slope)
+            row[2 * k + 1] = bar(
+                n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0)
+            ) + 4e-16 * abs(slope)
             k += 1
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = x1, w1
@@ -104,8 +120,8 @@ def like(p, q):
 def connections(setting, begin, at, P, wanted, tolerance, out):
     """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V.
 
-    Only branches that are `wanted` (4, 2) are followed. Rows are NaN where there are none, or an equilibrium is
-    degenerate.
+    Only branches that are `wanted` (4, 2) are followed. Rows are NaN where there are none, or an
+    equilibrium is degenerate.
     """
     eqs, turned, starts = np.zeros((MOST, 10)), np.zeros((MOST, 10)), np.zeros((2 * MOST, 4))
     q = np.zeros(P.shape[1])
@@ -146,5 +162,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     away = away if away > 0.0 else away + TWO_PI
                     row[OFFSETS + j] = away if j < count - 1 else TWO_PI
                 if wanted[system, label] > 0.0:
-                    first_turn(setting, begin, at, like(P[i], q), starts[2 * branch + 1], tolerance, row)
+                    first_turn(
+                        setting, begin, at, like(P[i], q), starts[2 * branch + 1], tolerance, row
+                    )
                 branch += 1

@@ -1,10 +1,21 @@
-"""Equilibria of the flow: all roots of g on the circle, their type, and regions that they are proven to attract."""
+"""Equilibria of the flow: all roots of g on the circle, their type, and regions that they are
+proven to attract.
+"""
 
 import math
 
 import numpy as np
 
-from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, BOUND_F, BOUND_G, C23, S2, TWO_PI, values
+from survey.kernels.cylinder.flow import (
+    BOUND_DDG,
+    BOUND_DG,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    S2,
+    TWO_PI,
+    values,
+)
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.cylinder.roots import CENTRE, MOST_DISCS, NO_REAL, RADIUS, ROOTS, SLOPE, discs
 from survey.kernels.jit import inline, kernel
@@ -22,8 +33,9 @@ SADDLE, NODE, FOCUS, DEGENERATE = range(4)
 def equilibria(p, table):
     """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending.
 
-    Returns their number, and whether the roundings of float64 hide one, or that there is none: g' beside it, or g where
-    it comes near 0 without reaching it. Then the rows are those of `clustered`, which is compiled when one needs it.
+    Returns their number, and whether the roundings of float64 hide one, or that there is none: g'
+    beside it, or g where it comes near 0 without reaching it. Then the rows are those of
+    `clustered`, which is compiled when one needs it.
     """
     count = bisected(p, table)
     if count >= 0:
@@ -88,7 +100,9 @@ def blurred(p, x, dg):
 
 @kernel
 def clustered(p, table):
-    """As `equilibria`, by `discs` in double-double: a cluster that these cannot take apart is one degenerate row."""
+    """As `equilibria`, by `discs` in double-double: a cluster that these cannot take apart is one
+    degenerate row.
+    """
     found, order, at = np.empty((MOST_DISCS, 5)), np.empty(MOST, dtype=np.int64), np.empty(MOST)
     size, count, hidden = discs(p, found), 0, False
     for i in range(size):
@@ -128,7 +142,9 @@ def insert(sorted_, size, x):
 def root(p, low, high):
     """The root of g between low and high, where g is monotone and changes sign."""
     given = p, values(p, high)[1] >= 0.0
-    return bracketed(_acceleration, values, given, 0.5 * (low + high), (low, high), (2e-16, 2e-16), 80)[1]
+    return bracketed(
+        _acceleration, values, given, 0.5 * (low + high), (low, high), (2e-16, 2e-16), 80
+    )[1]
 
 
 @inline
@@ -143,7 +159,11 @@ def describe(p, x, f, dg, bar, row):
     """Type and region of attraction of the equilibrium at x, known within `bar`."""
     row[ANGLE], row[F], row[DG], row[BAR] = x, f, dg, bar
     row[VAA], row[VAB], row[VBB], row[LEVEL] = 0.0, 0.0, 0.0, 0.0
-    row[STABLE] = 0.0 if abs(f) <= 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * bar else math.copysign(1.0, f)
+    row[STABLE] = (
+        0.0
+        if abs(f) <= 16.0 * ROUNDOFF_UP * p[BOUND_F] + p[BOUND_F] * bar
+        else math.copysign(1.0, f)
+    )
     if dg > 0.0:
         row[KIND] = SADDLE
     else:
@@ -180,8 +200,8 @@ def offset(phi, angle):
 def resting(p, table, count, phi0):
     """The row of the equilibrium that phi0 is exactly, or -1.
 
-    Of binary64 angles only 0 can be one: at any other exp(i phi0) is transcendental (Lindemann), so it is no root of a
-    polynomial with rational coefficients, as which g can be written.
+    Of binary64 angles only 0 can be one: at any other exp(i phi0) is transcendental (Lindemann), so
+    it is no root of a polynomial with rational coefficients, as which g can be written.
     """
     best, least = -1, math.inf
     if phi0 != 0.0 or p[S2] != p[C23]:
@@ -211,8 +231,9 @@ def captured(table, count, phi, w, bar):
 def settled(p, f, dg, x, w):
     """Is it certain that w keeps its sign from here to the stable node at distance x?
 
-    For m = w/x, m' = -(m - fast)(m - slow) + O(r): m in a band between fast and slow/2 stays there and tends to slow,
-    when the quadratic terms c r (1 + m^2) are small against the speed at the edges of the band.
+    For m = w/x, m' = -(m - fast)(m - slow) + O(r): m in a band between fast and slow/2 stays there
+    and tends to slow, when the quadratic terms c r (1 + m^2) are small against the speed at the
+    edges of the band.
     """
     square = f * f + 4.0 * dg
     if x == 0.0 or square <= 0.0:

@@ -1,7 +1,8 @@
 """The fate of an initial state: followed event by event until the monotone return maps decide it.
 
-Every step ends at the next turning point (w = 0) or passage of the section; there the error ellipse is projected
-along the flow, since an error along an orbit does not change its fate. Nothing is decided by a limit of steps.
+Every step ends at the next turning point (w = 0) or passage of the section; there the error ellipse
+is projected along the flow, since an error along an orbit does not change its fate. Nothing is
+decided by a limit of steps.
 """
 
 import math
@@ -22,7 +23,15 @@ from survey.kernels.cylinder.equilibria import (
     settled,
 )
 from survey.kernels.cylinder.flow import PHI, TWO_PI, reduced, table, values
-from survey.kernels.cylinder.returns import ABOVE, BELOW, CYCLE_BAR, CYCLE_CLASS, CYCLE_X, INTERVAL, between
+from survey.kernels.cylinder.returns import (
+    ABOVE,
+    BELOW,
+    CYCLE_BAR,
+    CYCLE_CLASS,
+    CYCLE_X,
+    INTERVAL,
+    between,
+)
 from survey.kernels.cylinder.steps import (
     NO_CONVERGENCE,
     OK,
@@ -41,12 +50,19 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
-SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = 5, 6, 7, 8, 9
+SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_START = (
+    5,
+    6,
+    7,
+    8,
+    9,
+)
 INFINITE, UNDETERMINED, NO_TURNS = -1, -2, -(2**31)
 # LIMIT of an undecided fate whose cycles are not known: the table that would decide it.
 NEEDS_PLUS, NEEDS_MINUS, NEEDS_LIBRATIONS = -2, -3, -4
 NOT_KNOWN = -1  # instead of the number of rows of a table of cycles
-PATIENT = 500  # steps that a motion without its cycles is followed, in case an equilibrium captures it
+# steps that a motion without its cycles is followed, in case an equilibrium captures it
+PATIENT = 500
 TRUST = 1e-4
 GENERIC, REVERSIBLE = 0, 3  # strata that are followed; REVERSIBLE is I2, K = L = 0
 
@@ -91,17 +107,24 @@ def rotation_decides(cycles, size, end, w, error, before, before_error):
     if not up and below == 0:
         return 0, -1
     reached = below if up else below - 1
-    if cycles[reached, CYCLE_CLASS] < 0.0 or (cycles[reached, BELOW] < 0.0 if up else cycles[reached, ABOVE] > 0.0):
+    if cycles[reached, CYCLE_CLASS] < 0.0 or (
+        cycles[reached, BELOW] < 0.0 if up else cycles[reached, ABOVE] > 0.0
+    ):
         return -1, -1
     return 1, reached
 
 
 @kernel
 def libration_decides(cycles, size, interval, inside, x, error, before, before_error):
-    """(decided, index of the cycle, or -1 for what lies inside) from two right turning points x and `before`."""
+    """(decided, index of the cycle, or -1 for what lies inside) from two right turning points x and
+    `before`.
+    """
     if abs(x - before) <= error + before_error:
         for i in range(size):
-            if cycles[i, INTERVAL] == interval and abs(x - cycles[i, CYCLE_X]) <= error + cycles[i, CYCLE_BAR]:
+            if (
+                cycles[i, INTERVAL] == interval
+                and abs(x - cycles[i, CYCLE_X]) <= error + cycles[i, CYCLE_BAR]
+            ):
                 return (1, i) if attracts(cycles[i]) else (-1, -1)
         return 0, -1
     inward = x < before
@@ -114,7 +137,11 @@ def libration_decides(cycles, size, interval, inside, x, error, before, before_e
             return (1, i) if attracts(row) else (-1, -1)
         if inward and row[CYCLE_X] < before and (best < 0 or row[CYCLE_X] > cycles[best, CYCLE_X]):
             best = i
-        if not inward and row[CYCLE_X] > before and (best < 0 or row[CYCLE_X] < cycles[best, CYCLE_X]):
+        if (
+            not inward
+            and row[CYCLE_X] > before
+            and (best < 0 or row[CYCLE_X] < cycles[best, CYCLE_X])
+        ):
             best = i
     if best < 0:
         return (1, -1) if inward else (0, -1)
@@ -150,14 +177,23 @@ def section_ahead(phi, w, section, spacing):
 
 
 @inline
-def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out):
+def fate(
+    setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, start, tolerance, limit, out
+):
     """Fill out (VERDICT to STATUS of `records`) for `start` (START_PHI to START_W_BAR).
 
     LIMIT is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
     sizes = numbers of rows of these, then the stratum and whether weak foci attract. Where a table of cycles is
     NOT_KNOWN, equilibria alone decide.
     """
-    count, n_plus, n_minus, n_lib, stratum, weak = sizes[0], sizes[1], sizes[2], sizes[3], sizes[4], sizes[5] > 0
+    count, n_plus, n_minus, n_lib, stratum, weak = (
+        sizes[0],
+        sizes[1],
+        sizes[2],
+        sizes[3],
+        sizes[4],
+        sizes[5] > 0,
+    )
     out[rc.VERDICT], out[rc.LIMIT] = UNDECIDED, -1
     out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNDETERMINED, NO_TURNS, OK
     phi0, w0 = start[rc.START_PHI], start[rc.START_W]
@@ -181,9 +217,16 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
             return
     T = table()
     how = setting(p, w0, tolerance)
-    saa, sab, sbb, n, turnings = slip * slip, 0.0, start[rc.START_W_BAR] * start[rc.START_W_BAR], 0, 0
+    saa, sab, sbb, n, turnings = (
+        slip * slip,
+        0.0,
+        start[rc.START_W_BAR] * start[rc.START_W_BAR],
+        0,
+        0,
+    )
     before, before_bar = -1.0, 0.0  # last passage of the section without a turning since
-    right, right_bar, left = math.nan, 0.0, math.nan  # last turning points, unwrapped from `turns` = base
+    # last turning points, unwrapped from `turns` = base
+    right, right_bar, left = math.nan, 0.0, math.nan
     spacing = TWO_PI if stratum == GENERIC else math.pi
     axis = math.nan
     held, target = -1, section_ahead(phi, float(sign), section, spacing)
@@ -226,7 +269,9 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                 row, at_home = interval_of(eqs, count, phi)
                 shift = at_home - phi
                 same = not math.isnan(right) and not math.isnan(left) and stratum == GENERIC
-                same = same and between(eqs, count, min(right, unwrapped), max(right, unwrapped)) == 0
+                same = (
+                    same and between(eqs, count, min(right, unwrapped), max(right, unwrapped)) == 0
+                )
                 if same and n_lib == NOT_KNOWN:
                     out[rc.LIMIT] = NEEDS_LIBRATIONS
                     if n > PATIENT:
@@ -239,12 +284,20 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                         out[rc.STATUS] = SEPARATRIX
                         return
                     if decided > 0 and which >= 0:
-                        out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = LIBRATION, which, INFINITE
+                        out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = (
+                            LIBRATION,
+                            which,
+                            INFINITE,
+                        )
                         out[rc.NET_TURNS] = turns - round(shift / TWO_PI)
                         return
                     focus = eqs[row, KIND] == FOCUS and (eqs[row, STABLE] < 0.0 or weak)
                     if decided > 0 and inside == 1 and focus:
-                        out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = EQUILIBRIUM, row, INFINITE
+                        out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = (
+                            EQUILIBRIUM,
+                            row,
+                            INFINITE,
+                        )
                         out[rc.NET_TURNS] = turns - round(shift / TWO_PI)
                         return
                 right, right_bar, left = unwrapped, bar_phi, math.nan
@@ -262,11 +315,15 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                     away = round((here - axis) / math.pi)
                     rotating = away % 2 != 0
                     out[rc.VERDICT] = PERIODIC_ROTATION if rotating else PERIODIC_LIBRATION
-                    out[rc.TURNINGS], out[rc.NET_TURNS] = (0, NO_TURNS) if rotating else (INFINITE, 0)
+                    out[rc.TURNINGS], out[rc.NET_TURNS] = (
+                        (0, NO_TURNS) if rotating else (INFINITE, 0)
+                    )
                     return
                 axis = here
             else:
-                cycles, size, end = (plus, n_plus, ends[0]) if sign > 0 else (minus, n_minus, ends[1])
+                cycles, size, end = (
+                    (plus, n_plus, ends[0]) if sign > 0 else (minus, n_minus, ends[1])
+                )
                 decided, which = 0, -1
                 if size == NOT_KNOWN:
                     out[rc.LIMIT] = NEEDS_PLUS if sign > 0 else NEEDS_MINUS
@@ -276,13 +333,23 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
                     if rising or n > PATIENT:
                         return
                 else:
-                    decided, which = rotation_decides(cycles, size, end, abs(w), own, before, before_bar)
+                    decided, which = rotation_decides(
+                        cycles, size, end, abs(w), own, before, before_bar
+                    )
                 if decided < 0:
                     out[rc.STATUS] = SEPARATRIX
                     return
                 if decided > 0:
-                    cycle, spin = (ROTATION_PLUS, SPIN_UP_PLUS) if sign > 0 else (ROTATION_MINUS, SPIN_UP_MINUS)
-                    out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = (cycle if which >= 0 else spin), which, turnings
+                    cycle, spin = (
+                        (ROTATION_PLUS, SPIN_UP_PLUS)
+                        if sign > 0
+                        else (ROTATION_MINUS, SPIN_UP_MINUS)
+                    )
+                    out[rc.VERDICT], out[rc.LIMIT], out[rc.TURNINGS] = (
+                        (cycle if which >= 0 else spin),
+                        which,
+                        turnings,
+                    )
                     return
                 before, before_bar = abs(w), own
         elif abs(w) <= 2.0 * bar_w and n > 1 and held < 0:
@@ -308,9 +375,41 @@ def fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, sta
 
 
 @inline
-def fates(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance, limit, out):
+def fates(
+    setting,
+    begin,
+    at,
+    p,
+    section,
+    ends,
+    sizes,
+    eqs,
+    plus,
+    minus,
+    lib,
+    starts,
+    tolerance,
+    limit,
+    out,
+):
     """`fate` for each row of starts."""
     for i in range(len(starts)):
-        fate(setting, begin, at, p, section, ends, sizes, eqs, plus, minus, lib, starts[i], tolerance, limit, out[i])
+        fate(
+            setting,
+            begin,
+            at,
+            p,
+            section,
+            ends,
+            sizes,
+            eqs,
+            plus,
+            minus,
+            lib,
+            starts[i],
+            tolerance,
+            limit,
+            out[i],
+        )
         if out[i, rc.VERDICT] != UNDECIDED:
             out[i, rc.STATUS] = OK

@@ -1,14 +1,17 @@
-"""The flow on the cylinder phi' = w, w' = f(phi) w + g(phi): coefficients, Taylor series, variational equation.
+"""The flow on the cylinder phi' = w, w' = f(phi) w + g(phi): coefficients, Taylor series,
+variational equation.
 
 f = b12 cos phi - b31 sin phi = F',  F = b12 sin phi + b31 cos phi,
 g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi = -V'            (57), corrected reading.
 
-A step keeps its work in one table T[n, row]: the coefficient of (t - t_n)^n of each quantity (rows below), and in
-the last line T[LAST] what a method notes about the step (its truncation error, its step size).
+A step keeps its work in one table T[n, row]: the coefficient of (t - t_n)^n of each quantity (rows
+below), and in the last line T[LAST] what a method notes about the step (its truncation error, its
+step size).
 
-A row p with more than COLUMNS columns holds any other f and g, as a `program`; on a line, where `on_circle` is False,
-phi is not taken mod 2 pi, and the bounds in p are those near the angle of the last `series`. Rows of the gyrostat are
-read-only arrays: by that kernels for them are compiled without the program (see `for_constants`).
+A row p with more than COLUMNS columns holds any other f and g, as a `program`; on a line, where
+`on_circle` is False, phi is not taken mod 2 pi, and the bounds in p are those near the angle of the
+last `series`. Rows of the gyrostat are read-only arrays: by that kernels for them are compiled
+without the program (see `for_constants`).
 """
 
 import math
@@ -21,13 +24,15 @@ from survey.kernels.cylinder.records import GIVEN, PHI0, START_PHI, START_W, W0
 from survey.kernels.jit import for_constants, inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
-ORDER = 20  # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba & Zou)
+# of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba &
+# Zou)
+ORDER = 20
 LOW = 8  # order of the series of the variational equation, which only carries error bounds
 LAST = ORDER + 1
 ROWS = 14
 PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)
-# E = integral of f (exp E is the area factor), Y = integral of g (the change of w - F), U, Z the variations of phi
-# and of y = w - F for unit changes of phi (1) and w (2), F_ = f, DG = g'.
+# E = integral of f (exp E is the area factor), Y = integral of g (the change of w - F), U, Z the
+# variations of phi and of y = w - F for unit changes of phi (1) and w (2), F_ = f, DG = g'.
 
 # Columns of T[LAST]. WEIGHT: sum of |b_i| over the stages of a Runge-Kutta step, which all round phi; 0 for series.
 TRUNC_PHI, TRUNC_W, STEP, WEIGHT = range(4)
@@ -38,7 +43,9 @@ TWO_PI_LOW = 2.4492935982947064e-16  # 2 pi - TWO_PI
 
 
 def coefficients(b12, b31, d, c23, s2, s3):
-    """Rows of the six parameters (arrays of one shape) and bounds of |f|, |g|, |g'|, |g''| over the circle."""
+    """Rows of the six parameters (arrays of one shape) and bounds of |f|, |g|, |g'|, |g''| over the
+    circle.
+    """
     b, c, s = np.hypot(b12, b31), np.hypot(0.5 * np.asarray(d), c23), np.hypot(s2, s3)
     P = np.stack([b12, b31, d, c23, s2, s3, b, c + s, 2.0 * c + s, 4.0 * c + s], axis=-1)
     P.flags.writeable = False
@@ -58,13 +65,24 @@ def on_circle(p):
 
 @kernel
 def spread(rows, P, starts):
-    """Fill P with the `coefficients` of rows of GIVEN numbers (see `records`), and starts with their phi0, w0."""
+    """Fill P with the `coefficients` of rows of GIVEN numbers (see `records`), and starts with
+    their phi0, w0.
+    """
     for i in range(len(rows)):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(6):
             P[i, k] = rows[i, k]
-        b, c, s = math.hypot(P[i, 0], P[i, 1]), math.hypot(0.5 * P[i, 2], P[i, 3]), math.hypot(P[i, 4], P[i, 5])
-        P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = b, c + s, 2.0 * c + s, 4.0 * c + s
+        b, c, s = (
+            math.hypot(P[i, 0], P[i, 1]),
+            math.hypot(0.5 * P[i, 2], P[i, 3]),
+            math.hypot(P[i, 4], P[i, 5]),
+        )
+        P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = (
+            b,
+            c + s,
+            2.0 * c + s,
+            4.0 * c + s,
+        )
 
 
 @kernel
@@ -122,7 +140,12 @@ def _series_of_gyrostat(p, phi, w, T, order):
         y = (-0.5 * p[D] * T[n, SIN2] - p[C23] * T[n, COS2] + p[S2] * cn - p[S3] * sn) * r
         s, c = a1 * r, -a0 * r
         T[n + 1, PHI], T[n + 1, Y] = T[n, W] * r, y
-        T[n + 1, SIN], T[n + 1, COS], T[n + 1, SIN2], T[n + 1, COS2] = s, c, 2.0 * a3 * r, -2.0 * a2 * r
+        T[n + 1, SIN], T[n + 1, COS], T[n + 1, SIN2], T[n + 1, COS2] = (
+            s,
+            c,
+            2.0 * a3 * r,
+            -2.0 * a2 * r,
+        )
         T[n + 1, W] = p[B12] * s + p[B31] * c + y  # w = F + y
 
 
@@ -141,7 +164,9 @@ def series(p, phi, w, T, order):
 def _rates_of_gyrostat(p, T):
     for n in range(LOW):
         T[n, F_] = p[B12] * T[n, COS] - p[B31] * T[n, SIN]
-        T[n, DG] = -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
+        T[n, DG] = (
+            -p[D] * T[n, COS2] + 2.0 * p[C23] * T[n, SIN2] - p[S2] * T[n, SIN] - p[S3] * T[n, COS]
+        )
     T[LOW, F_] = p[B12] * T[LOW, COS] - p[B31] * T[LOW, SIN]
 
 
@@ -174,7 +199,9 @@ def variation(p, T):
 
 @inline
 def inside(T, dt):
-    """(phi, w, integral of f, integral of g) at dt after the start of the step in T, of which `series` has ORDER."""
+    """(phi, w, integral of f, integral of g) at dt after the start of the step in T, of which
+    `series` has ORDER.
+    """
     phi, w, e, y = T[ORDER, PHI], T[ORDER, W], T[ORDER, E], T[ORDER, Y]
     for n in range(ORDER - 1, -1, -1):
         phi, w, e, y = phi * dt + T[n, PHI], w * dt + T[n, W], e * dt + T[n, E], y * dt + T[n, Y]
@@ -227,8 +254,8 @@ def _longest_step_of_gyrostat(p, w):
 def longest_step(p, w):
     """A step within which w has at most one zero.
 
-    w'' - f w' - (f' w + g') w = 0; without its damping the restoring force is Q = -g' - f^2/4 - f' w/2, so by Sturm
-    zeros of w are pi / sqrt(max Q) apart at least. Here a third of that.
+    w'' - f w' - (f' w + g') w = 0; without its damping the restoring force is Q = -g' - f^2/4 - f'
+    w/2, so by Sturm zeros of w are pi / sqrt(max Q) apart at least. Here a third of that.
     """
     step = _longest_step_of_gyrostat(p, w)
     return step if on_circle(p) else min(step, program.longest_step(p, w))

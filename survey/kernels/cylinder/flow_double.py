@@ -1,12 +1,14 @@
-"""The flow on the cylinder in double-double arithmetic: Taylor series of order 30, for what float64 leaves open.
+"""The flow on the cylinder in double-double arithmetic: Taylor series of order 30, for what float64
+leaves open.
 
-As `flow` and `steps`, whose error ellipse is carried here too, by the variational equation in float64, which serves
-the bars only. A step expands S = sin phi, C = cos phi and w in A[quantity, hi or lo, order]; each step computes S and C
-afresh.
+As `flow` and `steps`, whose error ellipse is carried here too, by the variational equation in
+float64, which serves the bars only. A step expands S = sin phi, C = cos phi and w in A[quantity, hi
+or lo, order]; each step computes S and C afresh.
 
     phi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S - c23 (1 - 2 S S) + s2 C - s3 S      (57)
 
-Sources: those of `kernels.math.double`; A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99-117 (steps).
+Sources: those of `kernels.math.double`; A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99-117
+(steps).
 """
 
 import math
@@ -58,17 +60,29 @@ from survey.kernels.cylinder.steps import (
 from survey.kernels.cylinder.winding import ends, zeros
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.angles_double import centred, radians, sine_cosine
-from survey.kernels.math.double import add, convolved, mul, neg, over, shifted, square, times, two_prod
+from survey.kernels.math.double import (
+    add,
+    convolved,
+    mul,
+    neg,
+    over,
+    shifted,
+    square,
+    times,
+    two_prod,
+)
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 
 ORDER = 30
 TOLERANCE = 1e-30  # truncation of one step, relative to 1 + |w|
-FLAT = 1e-22  # nearer to an equilibrium than this, relative, the direction of the flow has no digits
+# nearer to an equilibrium than this, relative, the direction of the flow has no digits
+FLAT = 1e-22
 ROUGH = 16.0 * PAIR_ROUNDOFF  # rounding of a sum or a product of the series, relative
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 LIMIT = 20_000  # steps; about 0.4 s
-SLOWER = 3.0  # steps may grow by this factor: what needs more than LIMIT even then is given up at once
+# steps may grow by this factor: what needs more than LIMIT even then is given up at once
+SLOWER = 3.0
 _S, _C, _W = range(3)
 
 
@@ -96,12 +110,17 @@ def acceleration(p, phi):
 
 @kernel
 def energy(p, phi, w, rest):
-    """H(phi, w) - H(rest, 0), H = w^2/2 + V, rounded; and a bound of its error for an equilibrium next to `rest`."""
+    """H(phi, w) - H(rest, 0), H = w^2/2 + V, rounded; and a bound of its error for an equilibrium
+    next to `rest`.
+    """
     s, c = sine_cosine(centred((phi, 0.0))[0])
     s0, c0 = sine_cosine(centred((rest, 0.0))[0])
     kinetic = times(two_prod(w, w), 0.5)
     first = add(times(add(s, neg(s0)), -p[S2]), times(add(c, neg(c0)), -p[S3]))
-    second = add(times(add(square(s), neg(square(s0))), 0.5 * p[D]), times(add(mul(s, c), neg(mul(s0, c0))), p[C23]))
+    second = add(
+        times(add(square(s), neg(square(s0))), 0.5 * p[D]),
+        times(add(mul(s, c), neg(mul(s0, c0))), p[C23]),
+    )
     return add(kinetic, add(first, second))[0], ROUGH * (w * w + p[BOUND_G])
 
 
@@ -114,7 +133,11 @@ def begin(p, phi, w, A, T):
     A[_W, 0, 0], A[_W, 1, 0] = w
     for n in range(ORDER):
         s, c = (A[_S, 0, n], A[_S, 1, n]), (A[_C, 0, n], A[_C, 1, n])
-        cw, sw, cs = convolved(A[_C], A[_W], n), convolved(A[_S], A[_W], n), convolved(A[_C], A[_S], n)
+        cw, sw, cs = (
+            convolved(A[_C], A[_W], n),
+            convolved(A[_S], A[_W], n),
+            convolved(A[_C], A[_S], n),
+        )
         double = shifted(times(convolved(A[_S], A[_S], n), -2.0), 1.0 if n == 0 else 0.0)
         if n <= LOW:
             T[n, SIN], T[n, COS], T[n, SIN2], T[n, COS2] = s[0], c[0], 2.0 * cs[0], double[0]
@@ -159,11 +182,12 @@ def spread(ellipse):
 
 @kernel
 def carried(p, A, T, dt, w, ellipse):
-    """The error ellipse after dt of the current step: as `steps.carried`, along (x, y) and across it.
+    """The error ellipse after dt of the current step: as `steps.carried`, along (x, y) and across
+    it.
 
-    (x, y) is the direction of the flow, of (w, w'), once `on` it. The flow carries its own direction with it: what errs
-    along it, in time, never comes across it, and only that grows where solutions part, at saddles. In other axes
-    rounding would mix the two.
+    (x, y) is the direction of the flow, of (w, w'), once `on` it. The flow carries its own
+    direction with it: what errs along it, in time, never comes across it, and only that grows where
+    solutions part, at saddles. In other axes rounding would mix the two.
     """
     pp, pq, qq, x, y, on = ellipse
     a, b, c, d = jacobian(T, dt)
@@ -176,7 +200,11 @@ def carried(p, A, T, dt, w, ellipse):
         size = math.hypot(along_w, along_v)
     u, v = (w / size, rate / size) if known else (along_w / size, along_v / size)
     across_w, across_v = b * x - a * y, d * x - c * y
-    one, shear, two = u * along_w + v * along_v, u * across_w + v * across_v, u * across_v - v * across_w
+    one, shear, two = (
+        u * along_w + v * along_v,
+        u * across_w + v * across_v,
+        u * across_v - v * across_w,
+    )
     leak = 0.0 if on or not known else u * along_v - v * along_w
     bound = p[BOUND_F] * abs(w) + p[BOUND_G]
     e = TOLERANCE + ROUGH * (4.0 + 3.0 * dt * (abs(w) + dt * bound))
@@ -205,7 +233,10 @@ def side(p, phi, w):
 def clean(p, phi, w, bar_phi, bar_w):
     """Is a zero of w certain near phi: does g keep its sign over the error bounds?"""
     g = abs(acceleration(p, phi)[0])
-    return 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * (abs(w) + bar_w)) + 4.0 * ROUGH * p[BOUND_G] < g
+    return (
+        10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * (abs(w) + bar_w)) + 4.0 * ROUGH * p[BOUND_G]
+        < g
+    )
 
 
 @kernel
@@ -220,7 +251,8 @@ def trajectory(p, phi0, w0, asked, floats, turnings):
 def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
     """`trajectory` from `start`: phi and w (double-doubles) and their error ellipse.
 
-    `origin` is the time there, and its error; `sign` that of w just after it, and `still` whether it is an equilibrium.
+    `origin` is the time there, and its error; `sign` that of w just after it, and `still` whether
+    it is an equilibrium.
     """
     A, T, eqs, end = scratch(), table(), np.zeros((MOST, 10)), np.zeros(5)
     size, _hidden = equilibria_inside(p, eqs)
@@ -241,7 +273,10 @@ def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
             x, v = at(phi, A, dt)
             a, _b, c, _d = spread(carried(p, A, T, dt[0], v[0], ellipse))
             delay = n * ROUGH * (asked[j] - min(origin[0], 0.0)) + late  # error of the time
-            wide, high = bar(n, a) + abs(v[0]) * delay, bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay
+            wide, high = (
+                bar(n, a) + abs(v[0]) * delay,
+                bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay,
+            )
             if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
                 return NO_CONVERGENCE
             floats[j, rc.PHI], floats[j, rc.W] = add(x, radians(turns))[0], v[0]
@@ -281,7 +316,14 @@ def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
         sign, unsure = (1 if w[0] > 0.0 else -1), 0
         # its angle is that of float64
         known = ends(
-            p, eqs, size, phi[0], w[0], bar_phi + ROUNDOFF_UP * abs(phi[0]), bar_w + ROUNDOFF_UP * abs(w[0]), end
+            p,
+            eqs,
+            size,
+            phi[0],
+            w[0],
+            bar_phi + ROUNDOFF_UP * abs(phi[0]),
+            bar_w + ROUNDOFF_UP * abs(w[0]),
+            end,
         )
         since = t
     return STEP_LIMIT
@@ -365,7 +407,9 @@ def abel(p, phi0, w0, targets, floats, status):
 
 @kernel
 def passed(p, start, turns, origin, first, targets, floats, status):
-    """`abel` from `start`, as that of `followed`, at the time `origin`, for the targets from number `first` on."""
+    """`abel` from `start`, as that of `followed`, at the time `origin`, for the targets from number
+    `first` on.
+    """
     A, T = scratch(), table()
     phi, w, ellipse = start[0], start[1], round_about(start[2])
     t, n, started = (origin, 0.0), 0, w[0] > 0.0
@@ -405,7 +449,10 @@ def passed(p, start, turns, origin, first, targets, floats, status):
         bar_phi, bar_w = bar(n, saa), bar(n, sbb)
         edge = 1.1 * bar_phi + ROUGH * (1.0 + abs(x[0] + turns * TWO_PI))
         # from here on a turning point lies beyond x
-        while 0 <= doubt < j and add(x, neg(add((targets[doubt], 0.0), neg(radians(turns)))))[0] > edge:
+        while (
+            0 <= doubt < j
+            and add(x, neg(add((targets[doubt], 0.0), neg(radians(turns)))))[0] > edge
+        ):
             doubt += 1
         if doubt == j:
             doubt = -1
@@ -441,7 +488,9 @@ def passed(p, start, turns, origin, first, targets, floats, status):
 
 @inline
 def fill(p, row, n, phi, w, t, a, c, d, more):
-    """w, t and their bars where phi, off by the root of `more`, is passed, as `steps.fill_crossing`; d: w w there."""
+    """w, t and their bars where phi, off by the root of `more`, is passed, as
+    `steps.fill_crossing`; d: w w there.
+    """
     n += 1  # the target errs too
     row[rc.VALUE], row[rc.TIME] = max(w, 0.0), t
     f, g = values(p, phi[0])[0], acceleration(p, phi)[0]

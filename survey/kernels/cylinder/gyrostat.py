@@ -1,10 +1,11 @@
-"""The gyrostat with Barnett-London effect in full: six equations, Taylor series, variational equation.
+"""The gyrostat with Barnett-London effect in full: six equations, Taylor series, variational
+equation.
 
     A w' = (A w + lambda) x w + u x nu,   u = B w - C nu + s,   nu' = nu x w                     (1)-(6)
 
-A system is an array G of 14 rows of three: A (0-2), its inverse (3-5), B (6-8), C (9-11), lambda (12), s (13).
-A step keeps its series in T[n, column], columns w, nu, A w + lambda, u of three each, and the products of the
-variational equation in V[n, column of the start, row]; a state is (w, nu).
+A system is an array G of 14 rows of three: A (0-2), its inverse (3-5), B (6-8), C (9-11), lambda
+(12), s (13). A step keeps its series in T[n, column], columns w, nu, A w + lambda, u of three each,
+and the products of the variational equation in V[n, column of the start, row]; a state is (w, nu).
 
 Source: M. E. Lesina, Ya. V. Zinovyeva (2004), whose components (1)-(6) are this vector form.
 """
@@ -37,16 +38,20 @@ def _rotation(a, b, c, d):
     return np.array(rows) / n
 
 
-FRAME = _rotation(1.0, 2.0, 3.0, 4.0)  # of the body's axes: no component of any tensor is zero in it
-A22, A23, A33, B22, B23, B33, C11, LAMBDA1 = range(8)  # what the reduced motion does not depend on, over A11
+# of the body's axes: no component of any tensor is zero in it
+FRAME = _rotation(1.0, 2.0, 3.0, 4.0)
+# what the reduced motion does not depend on, over A11
+A22, A23, A33, B22, B23, B33, C11, LAMBDA1 = range(8)
 
 
 @kernel
 def generic(p, w, free):
-    """Fill `free` for the reduced flow p and velocities about w, in its own units of time: of slow growth off the set.
+    """Fill `free` for the reduced flow p and velocities about w, in its own units of time: of slow
+    growth off the set.
 
-    On the set div(w2', w3') = -(B12 cos phi / A22 - B31 sin phi / A33): it repels where the reduced flow contracts,
-    the less, the larger A22 and A33 are; the gyrostatic moment along axis 1 holds the rest.
+    On the set div(w2', w3') = -(B12 cos phi / A22 - B31 sin phi / A33): it repels where the reduced
+    flow contracts, the less, the larger A22 and A33 are; the gyrostatic moment along axis 1 holds
+    the rest.
     """
     rate = p[BOUND_F] + math.sqrt(p[BOUND_G]) + abs(w)
     free[A22], free[A23], free[A33] = 8.0, 0.1, 8.5
@@ -56,9 +61,11 @@ def generic(p, w, free):
 
 @kernel
 def embed(p, free, G):
-    """Fill G with the gyrostat, in the rotated frame, whose set w2 = w3 = nu1 = 0 carries the reduced flow p.
+    """Fill G with the gyrostat, in the rotated frame, whose set w2 = w3 = nu1 = 0 carries the
+    reduced flow p.
 
-    The set's conditions (case B): A12 = A31 = B11 = 0, lambda2 = lambda3 = 0 (53), C12 = C31 = 0 (54), s1 = 0.
+    The set's conditions (case B): A12 = A31 = B11 = 0, lambda2 = lambda3 = 0 (53), C12 = C31 = 0
+    (54), s1 = 0.
     """
     _turned(G, 0, 1.0, 0.0, 0.0, free[A22], free[A23], free[A33])
     _turned(G, _B, 0.0, p[B12], p[B31], free[B22], free[B23], free[B33])
@@ -133,21 +140,27 @@ def series(G, state, T, order):
 
 @kernel
 def begin(G, state, tolerance, T, V):
-    """Expand at `state`; returns the step: the last two terms below `tolerance`, relative; of V below FIRST_ORDER."""
+    """Expand at `state`; returns the step: the last two terms below `tolerance`, relative; of V
+    below FIRST_ORDER.
+    """
     series(G, state, T, ORDER)
     variation(G, T, V)
     size, tangent, h = 1.0, 1e-300, math.inf
     for i in range(3):
         size = max(size, abs(state[i]))
     for n in range(ORDER - 3, ORDER + 1):
-        # where the last terms happen to vanish, as from rest, the two before them count too, less strictly
+        # where the last terms happen to vanish, as from rest, the two before them count too, less
+        # strictly
         term = 1e-300
         for i in range(6):
             term = max(term, abs(T[n, i]) * (1.0 / size if i < 3 else 1.0))
         h = min(h, (tolerance / (term if n > ORDER - 2 else FALL * term)) ** (1.0 / n))
     for i in range(6):
         for c in range(6):
-            tangent = max(tangent, abs(V[LOW, c, i]) * (1.0 / size if i < 3 else 1.0) * (size if c < 3 else 1.0))
+            tangent = max(
+                tangent,
+                abs(V[LOW, c, i]) * (1.0 / size if i < 3 else 1.0) * (size if c < 3 else 1.0),
+            )
     T[LAST, 0] = tolerance
     return shortened(T, h, (FIRST_ORDER / tangent) ** (1.0 / LOW))
 
@@ -181,7 +194,9 @@ def angle(T, dt, axis):
 
 @kernel
 def variation(G, T, V):
-    """Fill V up to t^LOW: A dw' = (A dw) x w + (A w + lambda) x dw + (B dw - C dnu) x nu + u x dnu, dnu' = ..."""
+    """Fill V up to t^LOW: A dw' = (A dw) x w + (A w + lambda) x dw + (B dw - C dnu) x nu + u x dnu,
+    dnu' = ...
+    """
     h = np.empty(3)
     for c in range(6):
         for i in range(6):
@@ -249,7 +264,9 @@ def local_error(G, T, dt):
 
 @kernel
 def carry(G, T, V, dt, squares, J, work):
-    """squares <- J squares J^T + diag(d^2) over dt of the current step, as in `steps`; J and `work` are scratch."""
+    """squares <- J squares J^T + diag(d^2) over dt of the current step, as in `steps`; J and `work`
+    are scratch.
+    """
     jacobian(V, dt, J)
     for i in range(6):
         for j in range(6):
@@ -268,7 +285,9 @@ def carry(G, T, V, dt, squares, J, work):
 
 @kernel
 def states(G, first, times, tolerance, limit, out, tangent):
-    """States at the ascending times >= 0 in out[j], and in tangent[j] their derivatives by the first; steps or -1."""
+    """States at the ascending times >= 0 in out[j], and in tangent[j] their derivatives by the
+    first; steps or -1.
+    """
     T, V, J = np.zeros((LAST + 1, 12)), np.zeros((LOW + 1, 6, 12)), np.zeros((6, 6))
     state, propagator = first.copy(), np.eye(6)
     t, j = 0.0, 0

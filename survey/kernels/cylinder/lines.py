@@ -1,7 +1,8 @@
 """Lines on the cylinder as points in a window of (phi, w): branches of the saddles, and cycles.
 
-A line is followed forward in time, with the error ellipse of `steps`, and cut where it crosses the window's borders.
-Of the ellipse only what lies across the line counts: an error along it leaves a point on the line.
+A line is followed forward in time, with the error ellipse of `steps`, and cut where it crosses the
+window's borders. Of the ellipse only what lies across the line counts: an error along it leaves a
+point on the line.
 
 A branch ends where it reaches an attracting equilibrium, or its windings come closer to one another than GAP of the
 window, or it has left the window for good: an orbit that has once made a full turn beyond the window, and gains |w|
@@ -13,11 +14,21 @@ import math
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import ANGLE, KIND, SADDLE, offset
 from survey.kernels.cylinder.flow import TWO_PI, table, values
-from survey.kernels.cylinder.steps import bar, carried, expand, passage, start_sign, until_turning, wrapped
+from survey.kernels.cylinder.steps import (
+    bar,
+    carried,
+    expand,
+    passage,
+    start_sign,
+    until_turning,
+    wrapped,
+)
 from survey.kernels.jit import inline, kernel
 
-PHI_LOW, PHI_HIGH, W_LOW, W_HIGH, PHI_SIZE, W_SIZE, PHI_LOG, W_LOG = range(8)  # a window; sizes of logarithms if LOG
-ANGLE_AT, VELOCITY, TURNS, BORDER, ERROR = range(5)  # a point: phi in [-pi, pi], w, turns taken out of phi
+# a window; sizes of logarithms if LOG
+PHI_LOW, PHI_HIGH, W_LOW, W_HIGH, PHI_SIZE, W_SIZE, PHI_LOG, W_LOG = range(8)
+# a point: phi in [-pi, pi], w, turns taken out of phi
+ANGLE_AT, VELOCITY, TURNS, BORDER, ERROR = range(5)
 POINT = 5
 INSIDE, AT_PHI_LOW, AT_PHI_HIGH, AT_W_LOW, AT_W_HIGH = range(5)
 BRANCH, ROTATION, LIBRATION = range(3)  # what is followed: cycles once round
@@ -25,7 +36,8 @@ MOST_POINTS = 30_000
 LIMIT = 50_000  # steps
 
 GAP = 3e-3  # of the window
-LONG, SHORT, BEND = 0.01, 2e-4, 0.04  # chords, in units of the window, and the angle (rad) between two of them
+# chords, in units of the window, and the angle (rad) between two of them
+LONG, SHORT, BEND = 0.01, 2e-4, 0.04
 FINEST, COARSEST = 32, 4096  # samples of a step
 WORST = 1e-6  # position error, in units of the window, at which a line ends
 
@@ -44,7 +56,9 @@ def scales(window, phi, w):
 @kernel
 def copies(window, phi):
     """The least and the greatest k with phi + 2 pi k in the window."""
-    return math.ceil((window[PHI_LOW] - phi) / TWO_PI), math.floor((window[PHI_HIGH] - phi) / TWO_PI)
+    return math.ceil((window[PHI_LOW] - phi) / TWO_PI), math.floor(
+        (window[PHI_HIGH] - phi) / TWO_PI
+    )
 
 
 @kernel
@@ -94,7 +108,8 @@ def crossing(at, p, T, window, border, low, high):
 
 @inline
 def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolerance, out):
-    """Fill `out` (m, POINT) with the points of a line from `start` (START_PHI to START_W_BAR); returns their number.
+    """Fill `out` (m, POINT) with the points of a line from `start` (START_PHI to START_W_BAR);
+    returns their number.
 
     Rows of NaN part what lies in the window. `section`: an angle that rotations pass.
     """
@@ -107,8 +122,10 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
     target = phi + sign * TWO_PI
     first, last = copies(window, phi)
     inside, drawn = first <= last and window[W_LOW] <= w <= window[W_HIGH], False
-    old_x, old_y, old_turn = 0.0, 0.0, 0.0  # the last point that is kept, in units of the window, and its direction
-    before, far, right = math.nan, True, math.nan  # |w| on the section; is all beyond the window since; turning point
+    # the last point that is kept, in units of the window, and its direction
+    old_x, old_y, old_turn = 0.0, 0.0, 0.0
+    # |w| on the section; is all beyond the window since; turning point
+    before, far, right = math.nan, True, math.nan
     done = False
     if inside:
         write(p, window, 1, phi, w, turns, INSIDE, (saa, sab, sbb), out[0])
@@ -134,17 +151,25 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
             far = far and (w2 > window[W_HIGH] if sign > 0 else w2 < window[W_LOW])
             crossed = False
             for border in range(AT_PHI_LOW, AT_W_HIGH + 1):
-                if beyond(window, border, x, v) != beyond(window, border, x2, w2) and size + 3 < len(out):
+                if beyond(window, border, x, v) != beyond(
+                    window, border, x2, w2
+                ) and size + 3 < len(out):
                     when = crossing(at, p, T, window, border, dt, to)
                     xb, wb, _e, _y = at(p, T, when)
                     loose = 1e-12 * (1.0 + abs(xb))
                     first, last = copies(window, xb)
-                    wide_first, wide_last = copies(window, xb - loose)[0], copies(window, xb + loose)[1]
+                    wide_first, wide_last = (
+                        copies(window, xb - loose)[0],
+                        copies(window, xb + loose)[1],
+                    )
                     first, last = min(first, wide_first), max(last, wide_last)
                     level = border == AT_W_LOW or border == AT_W_HIGH
                     if first <= last and (level or window[W_LOW] <= wb <= window[W_HIGH]):
                         ellipse = carried(p, T, when, wb, saa, sab, sbb)
-                        if not write(p, window, n, xb, wb, turns, border, ellipse, out[size]) < WORST:
+                        if (
+                            not write(p, window, n, xb, wb, turns, border, ellipse, out[size])
+                            < WORST
+                        ):
                             done = True
                             break
                         size, crossed, drawn = size + 1, True, True
@@ -173,7 +198,9 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
             break
         ahead = math.floor((phi - section) / TWO_PI) != math.floor((x1 - section) / TWO_PI)
         if ahead and kind == BRANCH:
-            level = section + TWO_PI * max(math.floor((phi - section) / TWO_PI), math.floor((x1 - section) / TWO_PI))
+            level = section + TWO_PI * max(
+                math.floor((phi - section) / TWO_PI), math.floor((x1 - section) / TWO_PI)
+            )
             _x, here, _e, _y = at(p, T, passage(at, p, T, level, sign > 0, h))
             here = abs(here)
             c = scales(window, phi, w)[1]

@@ -1,15 +1,18 @@
-"""Many trajectories of a flow on the cylinder in lock step: Taylor series in t, one lane a solution, its own steps.
+"""Many trajectories of a flow on the cylinder in lock step: Taylor series in t, one lane a
+solution, its own steps.
 
-Order 16: its 16th root is four square roots, so no lane calls libm, and the loops over lanes are vector code. In axes
-turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys, with S = sin psi, C = cos psi,
+Order 16: its 16th root is four square roots, so no lane calls libm, and the loops over lanes are
+vector code. In axes turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys,
+with S = sin psi, C = cos psi,
 
     psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
 
 three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-Steps never depend on the requested times: those within a step are evaluated from its series, BLOCK at a time. Nor does
-any solution depend on its neighbours. A lane that has finished takes the next row.
+Steps never depend on the requested times: those within a step are evaluated from its series, BLOCK
+at a time. Nor does any solution depend on its neighbours. A lane that has finished takes the next
+row.
 """
 
 import math
@@ -63,17 +66,20 @@ STATE = 13
 FIXED = 10
 ROWS = TABLE + 2 * STATE + FIXED + 1
 
-_PASSED, _LOST = 1.0, 2.0  # what a step has made of a lane, or the sum of both: it has passed its next time
+# what a step has made of a lane, or the sum of both: it has passed its next time
+_PASSED, _LOST = 1.0, 2.0
 BLOCK = 8
 # Where the columns of a block begin; one flat array: LLVM sees that they do not overlap.
 _DT, _PSI, _V, _SAA, _SBB, _SIZE = range(0, 6 * BLOCK, BLOCK)
-# Shorter steps have only a share of the tolerance, so that many short ones add up to what a few long ones do.
+# Shorter steps have only a share of the tolerance, so that many short ones add up to what a few
+# long ones do.
 _SHORT = 1.0 / 8.0
 COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 _MANY = -1e9  # a count that stays below zero
 
-# Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4, pi/4].
+# Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4,
+# pi/4].
 NEAREST = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to an integer
 _HALF_PI, _HALF_PI_LOW = 0.5 * math.pi, 6.123233995736766e-17
 _S1, _S2, _S3 = -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04
@@ -171,7 +177,9 @@ def _vary(T, fixed, i):
 
 @inline
 def series(T, state, fixed):
-    """All coefficients of all lanes; in several loops, since one has more numbers than there are registers."""
+    """All coefficients of all lanes; in several loops, since one has more numbers than there are
+    registers.
+    """
     _begin(T, state)
     for i in range(LANES):
         _low_orders(T, fixed, i)
@@ -185,9 +193,17 @@ def series(T, state, fixed):
 
 @inline
 def split(work):
-    """The parts of the work array: series, state, state before the step, what stays fixed, what became of lanes."""
+    """The parts of the work array: series, state, state before the step, what stays fixed, what
+    became of lanes.
+    """
     first, second = TABLE + STATE, TABLE + 2 * STATE
-    return work[:TABLE], work[TABLE:first], work[first:second], work[second : second + FIXED], work[second + FIXED]
+    return (
+        work[:TABLE],
+        work[TABLE:first],
+        work[first:second],
+        work[second : second + FIXED],
+        work[second + FIXED],
+    )
 
 
 @inline
@@ -206,7 +222,8 @@ def advance(T, state, before, fixed, fate, tolerance):
             before[k, i] = state[k, i]
     for i in range(LANES):
         w, last, previous = state[V, i], abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
-        # a term that vanishes, as every second does where the motion starts at rest, proves nothing: two more count
+        # a term that vanishes, as every second does where the motion starts at rest, proves
+        # nothing: two more count
         fall = FALL * state[RATE, i] * state[RATE, i]
         size = max(last, fall * abs(T[W + ORDER - 2, i]))
         size = max(size, max(previous, fall * abs(T[W + ORDER - 3, i])) * state[RATE, i])
@@ -221,14 +238,22 @@ def advance(T, state, before, fixed, fate, tolerance):
         for k in range(ORDER - 1, 0, -1):
             x, v = x * dt + T[W + k, i] * (1.0 / (k + 1)), v * dt + T[W + k, i]
         x, v = state[PSI, i] + (x * dt + w) * dt, w + v * dt
-        u1, z1, u2, z2, f = T[U1 + LOW, i], T[Z1 + LOW, i], T[U2 + LOW, i], T[Z2 + LOW, i], T[F_ + LOW, i]
+        u1, z1, u2, z2, f = (
+            T[U1 + LOW, i],
+            T[Z1 + LOW, i],
+            T[U2 + LOW, i],
+            T[Z2 + LOW, i],
+            T[F_ + LOW, i],
+        )
         for k in range(LOW - 1, -1, -1):
             u1, z1 = u1 * dt + T[U1 + k, i], z1 * dt + T[Z1 + k, i]
             u2, z2, f = u2 * dt + T[U2 + k, i], z2 * dt + T[Z2 + k, i], f * dt + T[F_ + k, i]
         z1, z2 = z1 + f * u1, z2 + f * u2
         ends = last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
         carried, jacobian = (state[SAA, i], state[SAB, i], state[SBB, i]), (u1, u2, z1, z2)
-        state[SAA, i], state[SAB, i], sbb = ellipse(carried, jacobian, dt, v, ends, fixed[PF, i], fixed[PG, i])
+        state[SAA, i], state[SAB, i], sbb = ellipse(
+            carried, jacobian, dt, v, ends, fixed[PF, i], fixed[PG, i]
+        )
         n = state[STEPS, i] + 1.0
         state[SBB, i], state[STEPS, i] = sbb, n
         high = state[TIME, i] + dt
@@ -251,7 +276,9 @@ def variations(T, i):
 @unroll
 def varied(series_of, dt):
     """The Jacobian (psi_psi, psi_w, w_psi, w_w) at dt, as in `flow.jacobian`."""
-    u1, z1, u2, z2, f = (polynomial(series_of[row * (LOW + 1) : (row + 1) * (LOW + 1)], dt) for row in range(5))
+    u1, z1, u2, z2, f = (
+        polynomial(series_of[row * (LOW + 1) : (row + 1) * (LOW + 1)], dt) for row in range(5)
+    )
     return u1, u2, z1 + f * u1, z2 + f * u2
 
 
@@ -273,8 +300,8 @@ def last_terms(T, i):
 def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
     """The error ellipse at dt in a step, where w = v, from the one at its start.
 
-    `ends`: the sizes of the last term of w, of the one before, and those of the two before these, times FALL: what
-    follows the last two is bounded with the help of the others.
+    `ends`: the sizes of the last term of w, of the one before, and those of the two before these,
+    times FALL: what follows the last two is bounded with the help of the others.
     """
     saa, sab, sbb = carried
     u1, u2, z1, z2 = jacobian
@@ -317,7 +344,12 @@ def enter(p, phi0, w0, state, fixed, i):
     rest, turns = reduced(phi0)
     fixed[P12, i], fixed[P31, i] = p[B12] * c - p[B31] * s, p[B12] * s + p[B31] * c
     fixed[P2, i], fixed[P3, i], fixed[PD, i] = p[S2] * c - p[S3] * s, p[S2] * s + p[S3] * c, wide
-    fixed[PF, i], fixed[PG, i], fixed[PDG, i], fixed[TURN, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG], angle
+    fixed[PF, i], fixed[PG, i], fixed[PDG, i], fixed[TURN, i] = (
+        p[BOUND_F],
+        p[BOUND_G],
+        p[BOUND_DG],
+        angle,
+    )
     for k in range(STATE):
         state[k, i] = 0.0
     state[PSI, i], state[TURNS, i], state[V, i] = rest - angle, turns, w0
@@ -351,10 +383,13 @@ def _evaluate(T, before, fixed, i, block):
 
 @kernel
 def _record(T, state, before, fixed, i, block, times, first, floats, turnings):
-    """Record lane i at its times, from the `first` on, within the step; returns the next, or -1: a bar is too wide."""
+    """Record lane i at its times, from the `first` on, within the step; returns the next, or -1: a
+    bar is too wide.
+    """
     h, t, t_low, size = 1.0 / state[RATE, i], before[TIME, i], before[TIME_LOW, i], len(times)
     n, turns, angle = state[STEPS, i], state[TURNS, i], fixed[TURN, i]
-    from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0  # then w is 0 at the start and nowhere else
+    # then w is 0 at the start and nowhere else
+    from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0
     known = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0
     while first < size and (times[first] - t) - t_low < h:
         count = 0
@@ -393,7 +428,9 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
 
 
 @kernel
-def _collect(T, times, limit, state, before, fixed, fate, block, row, column, floats, turnings, status):
+def _collect(
+    T, times, limit, state, before, fixed, fate, block, row, column, floats, turnings, status
+):
     """Record what the lanes have passed and free those that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
@@ -401,7 +438,9 @@ def _collect(T, times, limit, state, before, fixed, fate, block, row, column, fl
             continue
         r, ending = row[i], -1
         if fate[i] == _PASSED or fate[i] == _PASSED + _LOST:
-            j = _record(T, state, before, fixed, i, block, times[r], column[i], floats[r], turnings[r])
+            j = _record(
+                T, state, before, fixed, i, block, times[r], column[i], floats[r], turnings[r]
+            )
             if j < 0:
                 ending = NO_CONVERGENCE
             elif j == times.shape[1] or not math.isfinite(times[r, j]):
@@ -428,9 +467,11 @@ def busy(row):
 
 @inline
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its first infinity.
+    """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its
+    first infinity.
 
-    P (rows, 10) from `flow.coefficients`; as `steps.trajectories`. Returns the number of steps of lanes, free ones too.
+    P (rows, 10) from `flow.coefficients`; as `steps.trajectories`. Returns the number of steps of
+    lanes, free ones too.
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
     T, state, before, fixed, fate = split(work)
@@ -441,6 +482,20 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     while busy(row):
         step(T, state, before, fixed, fate, tolerance)
         steps += LANES
-        if _collect(T, times, limit, state, before, fixed, fate, block, row, column, floats, turnings, status):
+        if _collect(
+            T,
+            times,
+            limit,
+            state,
+            before,
+            fixed,
+            fate,
+            block,
+            row,
+            column,
+            floats,
+            turnings,
+            status,
+        ):
             waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
     return steps

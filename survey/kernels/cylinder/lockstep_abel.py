@@ -1,9 +1,9 @@
 """Solutions w(phi) of Abel's equation (57) for many systems in lock step: w and t at given angles.
 
-Far from turning points phi is the variable (`lockstep_phi`); from there on the steps are those of `lockstep`, in time,
-and errors are bounded as there. A step's series serves all the angles that it passes, BLOCK of them at once:
-Newton's method gives the times, then come w, t and their error bars. Turning points, targets in doubt and the
-ends of solutions are treated as in `steps.abel`.
+Far from turning points phi is the variable (`lockstep_phi`); from there on the steps are those of
+`lockstep`, in time, and errors are bounded as there. A step's series serves all the angles that it
+passes, BLOCK of them at once: Newton's method gives the times, then come w, t and their error bars.
+Turning points, targets in doubt and the ends of solutions are treated as in `steps.abel`.
 """
 
 import math
@@ -95,8 +95,9 @@ from survey.kernels.unroll import unroll
 
 BLOCK = 8
 NEWTON = 1  # further steps; one more, by the derivatives, and most are at rounding
-# Where the columns of a block begin: psi, the time in the step, the square of psi's error; what `steps.crossing` makes
-# of them; what Newton's method has left. One flat array: LLVM sees that they do not overlap.
+# Where the columns of a block begin: psi, the time in the step, the square of psi's error; what
+# `steps.crossing` makes of them; what Newton's method has left. One flat array: LLVM sees that they
+# do not overlap.
 _SIZE = 8 * BLOCK
 GOAL, DT, SQUARE, VALUE, TIMES, VALUE_BAR, TIME_BAR, MISS = range(0, _SIZE, BLOCK)
 _GOING = -1
@@ -129,9 +130,17 @@ def _at(_p, given, dt):
 
 @kernel
 def _cross(T, state, before, fixed, i, reach, end, block, size):
-    """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step; there w = `end`."""
+    """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step;
+    there w = `end`.
+    """
     c, vary = coefficients(T, i), variations(T, i)
-    psi, w, n, t, t_low = before[PSI, i], before[V, i], state[STEPS, i], before[TIME, i], before[TIME_LOW, i]
+    psi, w, n, t, t_low = (
+        before[PSI, i],
+        before[V, i],
+        state[STEPS, i],
+        before[TIME, i],
+        before[TIME_LOW, i],
+    )
     carried = before[SAA, i], before[SAB, i], before[SBB, i]
     p12, p31, p2, p3, pd, most_f, most_g = (
         fixed[P12, i], fixed[P31, i], fixed[P2, i], fixed[P3, i], fixed[PD, i], fixed[PF, i], fixed[PG, i]
@@ -172,7 +181,9 @@ def _cross(T, state, before, fixed, i, reach, end, block, size):
 
 @kernel
 def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floats, status):
-    """Note what the step of lane i passes; returns (next target, first in doubt, has it left w = 0?, how it ends)."""
+    """Note what the step of lane i passes; returns (next target, first in doubt, has it left w =
+    0?, how it ends).
+    """
     size, turns, angle, n = len(targets), before[TURNS, i], fixed[TURN, i], state[STEPS, i]
     x1, v1, reach = state[PSI, i], state[V, i], 1.0 / state[RATE, i]
     if not (math.isfinite(x1) and math.isfinite(v1)):
@@ -182,15 +193,21 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     if turned:
         c = coefficients(T, i)
         given = (constant(q), (before[PSI, i], c), True)
-        reach = bracketed(to_rest, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0), 60)[1]
+        reach = bracketed(
+            to_rest, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0), 60
+        )[1]
         x, v1 = _moved(c, reach)
         x1 = before[PSI, i] + x
         carried = before[SAA, i], before[SAB, i], before[SBB, i]
         jacobian = varied(variations(T, i), reach)
-        saa, _sab, sbb = ellipse(carried, jacobian, reach, v1, last_terms(T, i), fixed[PF, i], fixed[PG, i])
+        saa, _sab, sbb = ellipse(
+            carried, jacobian, reach, v1, last_terms(T, i), fixed[PF, i], fixed[PG, i]
+        )
     while j < size and unturned(targets[j], turns) - angle <= x1:
         count = 0
-        while count < BLOCK and j + count < size and unturned(targets[j + count], turns) - angle <= x1:
+        while (
+            count < BLOCK and j + count < size and unturned(targets[j + count], turns) - angle <= x1
+        ):
             target = targets[j + count]
             block[GOAL + count] = unturned(target, turns) - angle
             block[SQUARE + count] = (3e-16 * target) ** 2 + (5e-16 * (angle != 0.0)) ** 2
@@ -202,7 +219,9 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
             row = floats[j]
             row[rc.VALUE], row[rc.TIME] = block[VALUE + k], block[TIMES + k]
             row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[VALUE_BAR + k], block[TIME_BAR + k]
-            usable = bar(n, block[SQUARE + k]) < TRUST and row[rc.VALUE_BAR] < TRUST * (1.0 + abs(row[rc.VALUE]))
+            usable = bar(n, block[SQUARE + k]) < TRUST and row[rc.VALUE_BAR] < TRUST * (
+                1.0 + abs(row[rc.VALUE])
+            )
             usable = usable and row[rc.TIME_BAR] < TRUST * (1.0 + row[rc.TIME])
             status[j] = OK if usable else NO_CONVERGENCE
             if doubt < 0 and not certain(row):
@@ -238,21 +257,52 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
 
 
 @kernel
-def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, goal, started, column, ahead, floats, status):
+def _refill(
+    P,
+    starts,
+    targets,
+    waiting,
+    state,
+    fixed,
+    axes,
+    row,
+    sizes,
+    goal,
+    started,
+    column,
+    ahead,
+    floats,
+    status,
+):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            p, phi0, w0, size = P[waiting], starts[waiting, 0], starts[waiting, 1], finite(targets[waiting])
-            at, rows, codes = targets[waiting, :size], floats[waiting, :size], status[waiting, :size]
+            p, phi0, w0, size = (
+                P[waiting],
+                starts[waiting, 0],
+                starts[waiting, 1],
+                finite(targets[waiting]),
+            )
+            at, rows, codes = (
+                targets[waiting, :size],
+                floats[waiting, :size],
+                status[waiting, :size],
+            )
             begun = ahead[waiting, far.W] > 0.0
             first = int(ahead[waiting, far.COLUMN]) if begun else 0
-            if first < size and (begun or not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes)):
+            if first < size and (
+                begun or not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes)
+            ):
                 enter(p, phi0, w0, state, fixed, i)
                 fixed[NEXT, i], row[i], sizes[i] = math.inf, waiting, size
                 # number by number: an assignment to a slice would take a second to compile
                 axes[i, B12], axes[i, B31], axes[i, D] = fixed[P12, i], fixed[P31, i], fixed[PD, i]
                 axes[i, C23], axes[i, S2], axes[i, S3] = 0.0, fixed[P2, i], fixed[P3, i]
-                axes[i, BOUND_F], axes[i, BOUND_G], axes[i, BOUND_DG] = fixed[PF, i], fixed[PG, i], fixed[PDG, i]
+                axes[i, BOUND_F], axes[i, BOUND_G], axes[i, BOUND_DG] = (
+                    fixed[PF, i],
+                    fixed[PG, i],
+                    fixed[PDG, i],
+                )
                 axes[i, BOUND_DDG] = p[BOUND_DDG]
                 if begun:
                     _go_on(ahead[waiting], state, fixed, i)
@@ -264,9 +314,15 @@ def _refill(P, starts, targets, waiting, state, fixed, axes, row, sizes, goal, s
 
 @inline
 def _go_on(reached, state, fixed, i):
-    """Set lane i, after `enter`, to what `lockstep_phi` reached; error bounds at an angle become those at a time."""
+    """Set lane i, after `enter`, to what `lockstep_phi` reached; error bounds at an angle become
+    those at a time.
+    """
     w, late = reached[far.W], reached[far.T_BOUND]
-    state[PSI, i], state[TURNS, i], state[V, i] = reached[far.AT] - fixed[TURN, i], reached[far.TURNED], w
+    state[PSI, i], state[TURNS, i], state[V, i] = (
+        reached[far.AT] - fixed[TURN, i],
+        reached[far.TURNED],
+        w,
+    )
     state[TIME, i], state[TIME_LOW, i] = reached[far.TIME], reached[far.TIME_LOW]
     wide, tall = w * late, reached[far.W_BOUND] + (fixed[PF, i] * w + fixed[PG, i]) * late
     state[SAA, i] += wide * wide
@@ -275,21 +331,32 @@ def _go_on(reached, state, fixed, i):
 
 @inline
 def _calm(state, fixed, goal, doubt, started, calm):
-    """Where a step has passed no target and is far from any ending: `_pass` would note nothing but that w has risen."""
+    """Where a step has passed no target and is far from any ending: `_pass` would note nothing but
+    that w has risen.
+    """
     for i in range(LANES):
         v, square = state[V, i], state[SBB, i]
         x = state[PSI, i] + state[TURNS, i] * TWO_PI
         quiet = x + 1e-9 * (1.0 + abs(x)) < goal[i]
-        quiet = quiet & (v * fixed[PF, i] > 0.3 * fixed[PG, i]) & (v * v > 9.0 * state[STEPS, i] * square) & (v > 0.0)
-        calm[i] = quiet & (doubt[i] < 0) & (state[SAA, i] < TRUST) & (square < (1.0 + v) * (1.0 + v))
+        quiet = (
+            quiet
+            & (v * fixed[PF, i] > 0.3 * fixed[PG, i])
+            & (v * v > 9.0 * state[STEPS, i] * square)
+            & (v > 0.0)
+        )
+        calm[i] = (
+            quiet & (doubt[i] < 0) & (state[SAA, i] < TRUST) & (square < (1.0 + v) * (1.0 + v))
+        )
         started[i] = started[i] | calm[i]
 
 
 @inline
 def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
-    """w and t at the ascending targets >= phi0 of each row, which end at its first infinity; as `steps.abels`.
+    """w and t at the ascending targets >= phi0 of each row, which end at its first infinity; as
+    `steps.abels`.
 
-    P (rows, 10) from `flow.coefficients`; `ahead` as `lockstep_phi.abels` left it, which comes first.
+    P (rows, 10) from `flow.coefficients`; `ahead` as `lockstep_phi.abels` left it, which comes
+    first.
     """
     work, block = np.zeros((ROWS, LANES)), np.zeros(_SIZE)
     T, state, before, fixed, fate = split(work)
@@ -297,7 +364,11 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     column, doubt = np.zeros(LANES, dtype=np.int64), np.full(LANES, -1)
-    goal, started, calm = np.zeros(LANES), np.zeros(LANES, dtype=np.bool_), np.zeros(LANES, dtype=np.bool_)
+    goal, started, calm = (
+        np.zeros(LANES),
+        np.zeros(LANES, dtype=np.bool_),
+        np.zeros(LANES, dtype=np.bool_),
+    )
     waiting, free = np.int64(0), True  # a literal 0 would have `_refill` compiled twice
     while True:
         if free:

@@ -1,16 +1,19 @@
-"""Solutions w(phi) of Abel's equation (57) for many systems in lock step, while they are far from turning points.
+"""Solutions w(phi) of Abel's equation (57) for many systems in lock step, while they are far from
+turning points.
 
-There phi is the better variable. In units of w = w0 at the start of a step, from which s = psi - psi0 counts,
+There phi is the better variable. In units of w = w0 at the start of a step, from which s = psi -
+psi0 counts,
 
     w = w0 omega,  omega q = g / w0^2,  omega' = f / w0 + q,  omega r = 1,  t' = r / w0          (57),
 
-with f and g in closed form: two Cauchy products, where the motion in time has three (see `lockstep`); psi is phi less
-whole turns. A value at an angle is a polynomial, without Newton's method. The variational equation has one component:
+with f and g in closed form: two Cauchy products, where the motion in time has three (see
+`lockstep`); psi is phi less whole turns. A value at an angle is a polynomial, without Newton's
+method. The variational equation has one component:
 
     (dw)' = -(g / w^2) dw,  (dt)' = -dw / w^2,
 
-and bounds of both errors are carried on by sums of positive terms. A solution leaves where w^2 is small or its bound is
-not; `lockstep_abel` goes on with it from there.
+and bounds of both errors are carried on by sums of positive terms. A solution leaves where w^2 is
+small or its bound is not; `lockstep_abel` goes on with it from there.
 """
 
 import math
@@ -18,8 +21,28 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.flow import B12, B31, BOUND_F, BOUND_G, C23, S2, S3, TWO_PI, TWO_PI_LOW, D, reduced
-from survey.kernels.cylinder.lockstep import COARSEST, FALL, LANES, NEAREST, busy, polynomial, sine_cosine
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    S2,
+    S3,
+    TWO_PI,
+    TWO_PI_LOW,
+    D,
+    reduced,
+)
+from survey.kernels.cylinder.lockstep import (
+    COARSEST,
+    FALL,
+    LANES,
+    NEAREST,
+    busy,
+    polynomial,
+    sine_cosine,
+)
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, conclude, finite, unturned
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -31,7 +54,8 @@ VARIED = 4  # order of the integral of g / w^2
 F_, G_, OMEGA = 0, ORDER, 2 * ORDER
 Q, R = OMEGA + ORDER + 1, OMEGA + 2 * ORDER + 1
 TABLE = R + ORDER + 1
-# Rows of a state: where the solution stands, its error bounds, the next target, and 1 / the last step.
+# Rows of a state: where the solution stands, its error bounds, the next target, and 1 / the last
+# step.
 (AT, TURNED, W, TIME, TIME_LOW, W_BOUND, T_BOUND, COUNT, COLUMN, RATE) = range(10)
 STATE = 10
 FIXED = BOUND_G + 1  # rows of what stays fixed: as the columns of `flow.coefficients`
@@ -46,7 +70,9 @@ _SHORT = 1.0 / 8.0  # as in `lockstep`
 
 @unroll
 def _functions(T, fixed, i, s, c, inverse):
-    """Series of f / w0 and g / w0^2 from sin and cos of psi and 1 / w0; the first coefficients of the others."""
+    """Series of f / w0 and g / w0^2 from sin and cos of psi and 1 / w0; the first coefficients of
+    the others.
+    """
     b12, b31, d, c23, s2, s3 = (fixed[row, i] for row in (B12, B31, D, C23, S2, S3))
     f = [(b12 * c - b31 * s) * inverse, -(b12 * s + b31 * c) * inverse]
     square = inverse * inverse
@@ -64,14 +90,20 @@ def _functions(T, fixed, i, s, c, inverse):
 
 
 def _orders(first, last):
-    """What adds the coefficients `first` to `last` - 1 of q, and those one higher of omega and r, of a lane."""
+    """What adds the coefficients `first` to `last` - 1 of q, and those one higher of omega and r,
+    of a lane.
+    """
 
     @unroll
     def expand(T, i):
         omega, r = ([T[row + n, i] for n in range(first + 1)] for row in (OMEGA, R))
         q = [T[Q + n, i] for n in range(first)]
         for n in range(first, last):
-            q.append(T[G_ + n, i] - summed(omega[k] * q[n - k] for k in range(1, n + 1)) if n else T[G_, i])
+            q.append(
+                T[G_ + n, i] - summed(omega[k] * q[n - k] for k in range(1, n + 1))
+                if n
+                else T[G_, i]
+            )
             omega.append((T[F_ + n, i] + q[n]) * (1.0 / (n + 1)))
             r.append(-summed(omega[k] * r[n + 1 - k] for k in range(1, n + 2)))
             T[Q + n, i], T[OMEGA + n + 1, i], T[R + n + 1, i] = q[n], omega[n + 1], r[n + 1]
@@ -113,7 +145,11 @@ def _coefficients(row, size):
     return read
 
 
-_omega, _r, _low_q = _coefficients(OMEGA, ORDER + 1), _coefficients(R, ORDER + 1), _coefficients(Q, VARIED + 1)
+_omega, _r, _low_q = (
+    _coefficients(OMEGA, ORDER + 1),
+    _coefficients(R, ORDER + 1),
+    _coefficients(Q, VARIED + 1),
+)
 
 
 @unroll
@@ -134,7 +170,9 @@ def _elapsed(r, s):
 @unroll
 def _contracted(q, r, h):
     """What dw has been multiplied by at h: exp(-integral of g / w^2), to 1 %."""
-    rates = [summed(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)]
+    rates = [
+        summed(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)
+    ]
     half = 0.0625 * h * polynomial(rates, h)  # of an eighth of the exponent
     part = (1.0 - half) / (1.0 + half)
     part *= part
@@ -173,7 +211,13 @@ def _advance(T, state, before, step, fixed, tolerance):
         h4 = h2 * h2
         h13 = h4 * h4 * h4 * h
         cut = w * h13 * max(max(last * h2, third) * h, max(previous * h2, fourth))
-        cut_t = 2.0 * inverse * h13 * h * max(max(last_r * h2, third_r) * h, max(previous_r * h2, fourth_r))
+        cut_t = (
+            2.0
+            * inverse
+            * h13
+            * h
+            * max(max(last_r * h2, third_r) * h, max(previous_r * h2, fourth_r))
+        )
         local = cut + ROUNDOFF_UP * (1.5 * max(w, v) + 8.0 * h * slope)
         bound, most = state[W_BOUND, i], 1.0 / (lowest * lowest)
         grown = h * most_g * most
@@ -192,9 +236,20 @@ def _advance(T, state, before, step, fixed, tolerance):
 def _record(T, before, state, step, i, block, targets, first, floats, status):
     """Record lane i at its targets, from the `first` on, within the step; returns the next."""
     omega, r = _omega(T, i), _r(T, i)
-    psi, turns, w, t, t_low = before[AT, i], before[TURNED, i], before[W, i], before[TIME, i], before[TIME_LOW, i]
+    psi, turns, w, t, t_low = (
+        before[AT, i],
+        before[TURNED, i],
+        before[W, i],
+        before[TIME, i],
+        before[TIME_LOW, i],
+    )
     inverse, size, end = 1.0 / before[W, i], len(targets), state[AT, i]
-    high, slope, late, slowest = step[W_WITHIN, i], step[STEEPEST, i], state[T_BOUND, i], 1.0 / step[LOWEST, i]
+    high, slope, late, slowest = (
+        step[W_WITHIN, i],
+        step[STEEPEST, i],
+        state[T_BOUND, i],
+        1.0 / step[LOWEST, i],
+    )
     last = first
     while last < size and unturned(targets[last], turns) <= end:
         last += 1
@@ -240,9 +295,18 @@ def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
                         fixed[k, i] = p[k]
                     for k in range(STATE):
                         state[k, i] = 0.0
-                    state[AT, i], state[TURNED, i], state[W, i], state[RATE, i] = psi, turns, w0, 2.0 + bend / w0
+                    state[AT, i], state[TURNED, i], state[W, i], state[RATE, i] = (
+                        psi,
+                        turns,
+                        w0,
+                        2.0 + bend / w0,
+                    )
                     state[W_BOUND, i], state[T_BOUND, i] = bound, slip / w0
-                    row[i], sizes[i], goal[i] = waiting, finite(targets[waiting]), targets[waiting, 0]
+                    row[i], sizes[i], goal[i] = (
+                        waiting,
+                        finite(targets[waiting]),
+                        targets[waiting, 0],
+                    )
             waiting += 1
         if row[i] < 0:
             state[AT, i], state[W, i] = 0.0, 1.0  # a free lane moves too
@@ -253,8 +317,8 @@ def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
 def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`.
 
-    `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and COLUMN is the number of
-    its targets where all are known.
+    `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and
+    COLUMN is the number of its targets where all are known.
     """
     work = np.zeros((TABLE + 2 * STATE + STEP + FIXED, LANES))  # LLVM: rows do not overlap
     second = TABLE + STATE
@@ -277,7 +341,11 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
         for i in range(LANES):
             x = state[AT, i] + state[TURNED, i] * TWO_PI
             near = not (x + 1e-9 * (1.0 + abs(x)) < goal[i])
-            ended[i] = near | (not _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])) | (state[COUNT, i] >= limit)
+            ended[i] = (
+                near
+                | (not _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i]))
+                | (state[COUNT, i] >= limit)
+            )
         free = False
         for i in range(LANES):
             if row[i] < 0 or not ended[i]:
@@ -285,7 +353,9 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
             size, j = sizes[i], int(state[COLUMN, i])
             if sound:
-                j = _record(T, before, state, step, i, block, targets[k, :size], j, floats[k], status[k])
+                j = _record(
+                    T, before, state, step, i, block, targets[k, :size], j, floats[k], status[k]
+                )
             far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
             if j < size and sound and far and state[COUNT, i] < limit:
                 state[COLUMN, i], goal[i] = j, targets[k, j]

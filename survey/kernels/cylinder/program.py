@@ -1,16 +1,19 @@
-"""A user's flow, phi' = w, w' = f(phi) w + g(phi): f, g and g' as a program, run on power series and on balls.
+"""A user's flow, phi' = w, w' = f(phi) w + g(phi): f, g and g' as a program, run on power series
+and on balls.
 
-A program is a list of operations, each of which makes one value from earlier ones; the first value is phi itself. It
-stands in the row p of a flow after the columns of `flow`: SLOTS to RADIUS, then WIDTH numbers an operation: its code,
-the indices of its two operands, and a number. Where a number is an operand, the rest that binary64 does not hold stands
-in the column that is not used. The series of a function h(y) follows from h' y': its second operand is h'. p[REVERSED]
-is the sign of f, p[MIRRORED] that of phi and of g: -1 under the symmetries S1 and S2 of `solution`.
+A program is a list of operations, each of which makes one value from earlier ones; the first value
+is phi itself. It stands in the row p of a flow after the columns of `flow`: SLOTS to RADIUS, then
+WIDTH numbers an operation: its code, the indices of its two operands, and a number. Where a number
+is an operand, the rest that binary64 does not hold stands in the column that is not used. The
+series of a function h(y) follows from h' y': its second operand is h'. p[REVERSED] is the sign of
+f, p[MIRRORED] that of phi and of g: -1 under the symmetries S1 and S2 of `solution`.
 
-A ball is a middle and a radius that covers the range and every rounding: of radius 0 at phi, it bounds the roundings of
-f and g alone; over an interval, it bounds f, f', g, g', g'' there.
+A ball is a middle and a radius that covers the range and every rounding: of radius 0 at phi, it
+bounds the roundings of f and g alone; over an interval, it bounds f, f', g, g', g'' there.
 
-Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), chapter 13; F. Johansson, Arb: efficient
-arbitrary-precision midpoint-radius interval arithmetic, IEEE Trans. Computers 66 (2017) 1281-1292.
+Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), chapter 13; F. Johansson, Arb:
+efficient arbitrary-precision midpoint-radius interval arithmetic, IEEE Trans. Computers 66 (2017)
+1281-1292.
 """
 
 import math
@@ -21,14 +24,34 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math import functions
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
-# Columns of the six parameters: signs and marks, and the mean of f on the circle, 0 where it vanishes within rounding.
+# Columns of the six parameters: signs and marks, and the mean of f on the circle, 0 where it
+# vanishes within rounding.
 REVERSED, ON_CIRCLE, MIRRORED, AT_REST, MEAN = 0, 2, 3, 4, 5
 BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(6, 10)  # as in `flow`
 COLUMNS = 10  # of a row of `flow`; what has more is a program
 SLOTS, FORCES, F_AT, G_AT, DG_AT, RADIUS, OPERATIONS = range(10, 17)
 CODE, FIRST, SECOND, NUMBER, WIDTH = range(5)
-CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)  # the last four: x + c, c x, c - x, c / x
-SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, ASINH, ACOSH, ATANH, EXP, LOG, SQRT, ERF, POWER = range(9, 26)
+# the last four: x + c, c x, c - x, c / x
+CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
+(
+    SIN,
+    COS,
+    TAN,
+    ASIN,
+    ACOS,
+    ATAN,
+    SINH,
+    COSH,
+    TANH,
+    ASINH,
+    ACOSH,
+    ATANH,
+    EXP,
+    LOG,
+    SQRT,
+    ERF,
+    POWER,
+) = range(9, 26)
 LEAST_RADIUS = 1e-9
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
 
@@ -55,7 +78,9 @@ def _operation(p, i):
 
 @kernel
 def extend(p, S, n, count):
-    """Fill S[i, n], order n of the first `count` values, from the lower orders and order n of phi, S[0, n]."""
+    """Fill S[i, n], order n of the first `count` values, from the lower orders and order n of phi,
+    S[0, n].
+    """
     for i in range(1, count):
         code, a, b, number = _operation(p, i)
         value = 0.0
@@ -163,7 +188,9 @@ def _quotient(a, r, b, s):
 
 @kernel
 def _function_ball(code, x, r, number):
-    """The ball of the function over (x, r): all but sin, cos, cosh are monotone, and cosh dips less than it rises."""
+    """The ball of the function over (x, r): all but sin, cos, cosh are monotone, and cosh dips less
+    than it rises.
+    """
     value = function(code, x, number)
     if r == 0.0:
         spread = 0.0
@@ -171,11 +198,16 @@ def _function_ball(code, x, r, number):
         steep = math.cos(x) if code == SIN else math.sin(x)
         spread = min(r, abs(steep) * r + 0.5 * r * r, 1.0 + abs(value))
     else:
-        spread = max(abs(function(code, x - r, number) - value), abs(function(code, x + r, number) - value))
+        spread = max(
+            abs(function(code, x - r, number) - value), abs(function(code, x + r, number) - value)
+        )
         spread += 2.0 * EPS * abs(value)
-        if code == TAN and math.floor((x - r) / math.pi + 0.5) != math.floor((x + r) / math.pi + 0.5):
+        if code == TAN and math.floor((x - r) / math.pi + 0.5) != math.floor(
+            (x + r) / math.pi + 0.5
+        ):
             spread = math.inf
-    rounding = 0.0 if x == 0.0 and value == 0.0 else 2.0 * EPS * abs(value)  # what libm rounds, and more
+    # what libm rounds, and more
+    rounding = 0.0 if x == 0.0 and value == 0.0 else 2.0 * EPS * abs(value)
     return (value, spread + rounding) if math.isfinite(value + spread) else (0.0, math.inf)
 
 
@@ -233,7 +265,9 @@ def _largest(B, i, n):
 
 @kernel
 def ball(p, phi, radius, orders, B):
-    """Fill B (SLOTS, orders, 2) with the Taylor coefficients of every value over the angles within `radius` of phi."""
+    """Fill B (SLOTS, orders, 2) with the Taylor coefficients of every value over the angles within
+    `radius` of phi.
+    """
     for n in range(orders):
         B[0, n, 0] = p[MIRRORED] * phi if n == 0 else (p[MIRRORED] if n == 1 else 0.0)
         B[0, n, 1] = radius if n == 0 else 0.0
@@ -244,7 +278,8 @@ def ball(p, phi, radius, orders, B):
 def bounds(p, phi, radius, B, out):
     """Raise out (4) to bounds, over the angles within `radius` of phi, of |f| and |f'|, of |g|, of |g'|, of |g''|.
 
-    The first two also bound what rounds f and g there, in roundoffs: `steps` takes them for the sizes of their terms.
+    The first two also bound what rounds f and g there, in roundoffs: `steps` takes them for the
+    sizes of their terms.
     """
     f, g = int(p[F_AT]), int(p[G_AT])
     ball(p, phi, 0.0, 1, B)
@@ -258,7 +293,9 @@ def bounds(p, phi, radius, B, out):
 
 @kernel
 def bound_circle(p):
-    """Write bounds over the whole circle into p, within a factor of 2; infinite where no FINEST pieces bound them."""
+    """Write bounds over the whole circle into p, within a factor of 2; infinite where no FINEST
+    pieces bound them.
+    """
     B, out, pieces, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(4), COARSEST, False
     while not near and pieces <= FINEST:
         half = math.pi / pieces
@@ -275,7 +312,9 @@ def bound_circle(p):
 
 @kernel
 def bound_near(p, phi):
-    """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they are not finite."""
+    """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they
+    are not finite.
+    """
     B, out, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(4), False
     p[RADIUS] = min(4.0 * p[RADIUS], 0.5 * (1.0 + abs(phi)))
     while not near:
@@ -290,7 +329,9 @@ def bound_near(p, phi):
 
 @kernel
 def longest_step(p, w):
-    """A step on which phi stays within p[RADIUS], where the bounds hold: |w| stays below 2 |w| + sqrt(RADIUS g)."""
+    """A step on which phi stays within p[RADIUS], where the bounds hold: |w| stays below 2 |w| +
+    sqrt(RADIUS g).
+    """
     root = math.sqrt(p[RADIUS] * p[BOUND_G]) + 1e-300
     most = 2.0 * abs(w) + root
     return min(p[RADIUS] / most, (abs(w) + root) / (p[BOUND_F] * most + p[BOUND_G] + 1e-300))

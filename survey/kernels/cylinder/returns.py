@@ -1,9 +1,10 @@
 """Return maps of the flow and their fixed points, the cycles.
 
-Rotations (kind 0): w > 0 on the section phi = phi_s to w one turn later; an orbit that turns first has no image.
-Librations (kind 1): a right turning point x in an interval {w = 0, g < 0} to the next one; the class of an orbit is
-the number of equilibria between its turning points, and only orbits that stay in the interval have an image.
-Both maps increase. D = map - identity; map' = exp(int f dt) times w/w1, or g/g1.
+Rotations (kind 0): w > 0 on the section phi = phi_s to w one turn later; an orbit that turns first
+has no image. Librations (kind 1): a right turning point x in an interval {w = 0, g < 0} to the next
+one; the class of an orbit is the number of equilibria between its turning points, and only orbits
+that stay in the interval have an image. Both maps increase. D = map - identity; map' = exp(int f
+dt) times w/w1, or g/g1.
 """
 
 import math
@@ -13,14 +14,33 @@ import numpy as np
 from survey.kernels.cylinder.equilibria import ANGLE, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
 from survey.kernels.cylinder.program import COLUMNS, MEAN
-from survey.kernels.cylinder.steps import bar, carried, expand, local_error, passage, time_of_turning
+from survey.kernels.cylinder.steps import (
+    bar,
+    carried,
+    expand,
+    local_error,
+    passage,
+    time_of_turning,
+)
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ROTATION, LIBRATION = 0, 1
 NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
-X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)  # a node of a scan: x, class, D, map', bar of D, time, left
-CYCLE_X, MULTIPLIER, PERIOD, CYCLE_BAR, MULTIPLIER_BAR, CYCLE_LEFT, CYCLE_CLASS, INTERVAL, BELOW, ABOVE = range(10)
+# a node of a scan: x, class, D, map', bar of D, time, left
+X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)
+(
+    CYCLE_X,
+    MULTIPLIER,
+    PERIOD,
+    CYCLE_BAR,
+    MULTIPLIER_BAR,
+    CYCLE_LEFT,
+    CYCLE_CLASS,
+    INTERVAL,
+    BELOW,
+    ABOVE,
+) = range(10)
 MOST_CYCLES = 16
 MOST_NODES = 400
 LIMIT = 40_000
@@ -62,7 +82,12 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
                 own += 2.0 * ROUNDOFF_UP * (w + w0)
             fast = balanced and w0 / (p[BOUND_F] + math.sqrt(p[BOUND_DG]) + 1e-300) > 10.0
             other = y_error + 7.0 * (own * p[BOUND_G] / w0 + bar(n, saa) * p[BOUND_DG]) / w0
-            node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = 1.0, change, math.exp(e) * w0 / (w0 + change), t
+            node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = (
+                1.0,
+                change,
+                math.exp(e) * w0 / (w0 + change),
+                t,
+            )
             node[ERROR] = min(own, other) if fast else own
             return
         if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
@@ -99,7 +124,9 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             inside = between(eqs, count, node[LEFT], phi)
             node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa)
             node[SLOPE] = math.exp(e) * values(p, x0)[1] / values(p, phi)[1]
-            node[CLASS] = inside if between(eqs, count, min(phi, x0), max(phi, x0)) == 0 else NO_IMAGE
+            node[CLASS] = (
+                inside if between(eqs, count, min(phi, x0), max(phi, x0)) == 0 else NO_IMAGE
+            )
             return
         if turned:
             node[LEFT], right = phi, True
@@ -110,13 +137,17 @@ def between(eqs, count, low, high):
     """How many equilibria lie between the unwrapped angles low and high."""
     inside = 0
     for i in range(count):
-        inside += int(math.floor((high - eqs[i, ANGLE]) / TWO_PI) - math.floor((low - eqs[i, ANGLE]) / TWO_PI))
+        inside += int(
+            math.floor((high - eqs[i, ANGLE]) / TWO_PI) - math.floor((low - eqs[i, ANGLE]) / TWO_PI)
+        )
     return inside
 
 
 @inline
 def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
-    """The map of `kind` at x: anchor is the section (rotations) or the right end of the interval (librations)."""
+    """The map of `kind` at x: anchor is the section (rotations) or the right end of the interval
+    (librations).
+    """
     if kind == ROTATION:
         rotation(setting, begin, at, p, eqs, count, anchor, x, tolerance, node)
     else:
@@ -124,17 +155,29 @@ def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
 
 
 @splice
-def fixed_points(image_of, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
+def fixed_points(
+    image_of, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+):
     """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
 
-    Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no change of sign but
-    dips towards 0, the dip is followed down (a pair of cycles near its fold). edges = (w_c, w_d) of a rotation, D
-    and its bar at the last node and at the first, the number of nodes without an answer.
+    Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no
+    change of sign but dips towards 0, the dip is followed down (a pair of cycles near its fold).
+    edges = (w_c, w_d) of a rotation, D and its bar at the last node and at the first, the number of
+    nodes without an answer.
     """
     nodes = np.zeros((MOST_NODES, 7))
     size = scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes)
-    edges[0], edges[1], edges[2], edges[3] = math.nan, math.nan, nodes[size - 1, CHANGE], nodes[size - 1, ERROR]
-    edges[4], edges[5], edges[6] = nodes[0, CHANGE], nodes[0, ERROR], 1.0 * (nodes[0, CLASS] == UNKNOWN)
+    edges[0], edges[1], edges[2], edges[3] = (
+        math.nan,
+        math.nan,
+        nodes[size - 1, CHANGE],
+        nodes[size - 1, ERROR],
+    )
+    edges[4], edges[5], edges[6] = (
+        nodes[0, CHANGE],
+        nodes[0, ERROR],
+        1.0 * (nodes[0, CLASS] == UNKNOWN),
+    )
     m = np.zeros(7)
     for i in range(1, size):
         a, b = nodes[i - 1], nodes[i]
@@ -155,7 +198,19 @@ def fixed_points(image_of, kind, p, eqs, count, anchor, interval, xs, tolerance,
             for half in range(2):
                 low, high = (a, m) if half == 0 else (m, b)
                 if high[X] > low[X] and differ(low, high):
-                    solved(image_of, kind, p, eqs, count, anchor, interval, low, high, tolerance, cycles[found])
+                    solved(
+                        image_of,
+                        kind,
+                        p,
+                        eqs,
+                        count,
+                        anchor,
+                        interval,
+                        low,
+                        high,
+                        tolerance,
+                        cycles[found],
+                    )
                     found += 1
     return found
 
@@ -221,7 +276,9 @@ def followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
         if not (da < 0.0 < db):
             return False
         # tangents meet below a convex D: nothing to find while they meet above 0
-        low = (sign * left[CHANGE] * db - sign * right[CHANGE] * da + da * db * (right[X] - left[X])) / (db - da)
+        low = (
+            sign * left[CHANGE] * db - sign * right[CHANGE] * da + da * db * (right[X] - left[X])
+        ) / (db - da)
         if low > 0.0:
             return False
         image_of(kind, p, eqs, count, anchor, 0.5 * (left[X] + right[X]), tolerance, m)

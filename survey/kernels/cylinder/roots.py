@@ -1,4 +1,5 @@
-"""The real roots of g with their multiplicities, in disjoint discs that are proven to hold them, in double-double.
+"""The real roots of g with their multiplicities, in disjoint discs that are proven to hold them, in
+double-double.
 
 About a centre c, g(c + x) = a0 + a1 x + a2 x^2 + a3 x^3 + rest, |rest| <= B |x|^4. Where on a circle |x| = r one term k
 is larger than all others together, the disc holds k roots (Pellet's theorem), and with k = 0 none. The turn is cut into
@@ -18,7 +19,8 @@ from survey.kernels.math.angles_double import sine_cosine
 from survey.kernels.math.double import add, mul, neg, scaled, shifted, square, times
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF
 
-CENTRE, CENTRE_LOW, RADIUS, ROOTS, SLOPE = range(5)  # of a disc; ROOTS: their number with multiplicity, or NO_REAL
+# of a disc; ROOTS: their number with multiplicity, or NO_REAL
+CENTRE, CENTRE_LOW, RADIUS, ROOTS, SLOPE = range(5)
 NO_REAL = -2.0  # a pair of complex roots
 MOST_DISCS = 8
 BOUNDS = 4  # in the table of coefficients: the bounds of |a0| to |a3|, then B
@@ -34,7 +36,9 @@ _NOISY = 4.0  # a disc of so many times the radius that rounding alone gives is 
 
 @kernel
 def discs(p, found):
-    """Fill `found` (MOST_DISCS, 5) with disjoint discs that hold all real roots of g, and return their number."""
+    """Fill `found` (MOST_DISCS, 5) with disjoint discs that hold all real roots of g, and return
+    their number.
+    """
     q, a, stack = np.zeros(6), np.zeros(9), np.zeros((4096, 3))
     count = 0
     unit = normalised(p, q, a)
@@ -42,7 +46,11 @@ def discs(p, found):
         return 0
     for top in range(_PIECES):
         half = 0.5 * TWO_PI / _PIECES
-        stack[top, 0], stack[top, 1], stack[top, 2] = _START + (2 * top + 1) * half, 0.0, half * _WIDER
+        stack[top, 0], stack[top, 1], stack[top, 2] = (
+            _START + (2 * top + 1) * half,
+            0.0,
+            half * _WIDER,
+        )
     top, work = _PIECES, 0
     while top > 0:
         top -= 1
@@ -89,7 +97,9 @@ def discs(p, found):
 
 @inline
 def normalised(p, q, a):
-    """Fill q with the coefficients of g over a power of two, exactly, and a[BOUNDS:]; the power, or 0 where g = 0."""
+    """Fill q with the coefficients of g over a power of two, exactly, and a[BOUNDS:]; the power, or
+    0 where g = 0.
+    """
     largest = max(max(abs(p[D]), abs(p[C23])), max(abs(p[S2]), abs(p[S3])))
     if largest == 0.0:
         return 0.0
@@ -159,21 +169,34 @@ def shrunk(a, k):
 @inline
 def lifted(a, r):
     """Has g one sign for real |x| <= r, by g >= a0 - |a1| r + x^2 (a2 - |a3| r - B r^2)?"""
-    e0, e1, e2, e3 = (_ROUGH * a[BOUNDS], _ROUGH * a[BOUNDS + 1], _ROUGH * a[BOUNDS + 2], _ROUGH * a[BOUNDS + 3])
+    e0, e1, e2, e3 = (
+        _ROUGH * a[BOUNDS],
+        _ROUGH * a[BOUNDS + 1],
+        _ROUGH * a[BOUNDS + 2],
+        _ROUGH * a[BOUNDS + 3],
+    )
     level = abs(a[0]) - e0 > (abs(a[1]) + e1) * r * _MARGIN
-    return a[0] * a[2] > 0.0 and level and abs(a[2]) - e2 > ((abs(a[3]) + e3) * r + a[BOUNDS + 4] * r * r) * _MARGIN
+    return (
+        a[0] * a[2] > 0.0
+        and level
+        and abs(a[2]) - e2 > ((abs(a[3]) + e3) * r + a[BOUNDS + 4] * r * r) * _MARGIN
+    )
 
 
 @inline
 def gap(disc, x):
-    """The distance of x from the centre of a disc, on the circle, and the error that a turn taken out makes."""
+    """The distance of x from the centre of a disc, on the circle, and the error that a turn taken
+    out makes.
+    """
     away = abs((disc[CENTRE] - x[0]) + (disc[CENTRE_LOW] - x[1]))
     return (abs(away - TWO_PI), 4e-15) if away > 3.0 else (away, 0.0)
 
 
 @kernel
 def held(found, count, x, r, outside):
-    """How many roots are in the discs that lie inside that of radius r about x; or `outside`: that it lies inside."""
+    """How many roots are in the discs that lie inside that of radius r about x; or `outside`: that
+    it lies inside.
+    """
     roots = 0.0
     for i in range(count):
         away, error = gap(found[i], x)
@@ -187,7 +210,9 @@ def held(found, count, x, r, outside):
 
 @kernel
 def added(found, count, x, r, roots, slope):
-    """Append a disc, unless one with as many roots overlaps it: it is the same; one with fewer is taken into it."""
+    """Append a disc, unless one with as many roots overlaps it: it is the same; one with fewer is
+    taken into it.
+    """
     kept = 0
     for i in range(count):
         away, error = gap(found[i], x)

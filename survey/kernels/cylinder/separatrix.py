@@ -1,17 +1,21 @@
-"""Separatrices of the flow without Barnett-London effect, b = 0, in closed form: (66), and what it lacks.
+"""Separatrices of the flow without Barnett-London effect, b = 0, in closed form: (66), and what it
+lacks.
 
-At a saddle phi_s, where V is greatest, w^2 = 2 (V(phi_s) - V(phi_s + x)) = 4 sin^2(x/2) Q(x), and v = cot(x/2) obeys
+At a saddle phi_s, where V is greatest, w^2 = 2 (V(phi_s) - V(phi_s + x)) = 4 sin^2(x/2) Q(x), and v
+= cot(x/2) obeys
 
     v'^2 = P(v) = A v^2 + 2 a v + b,   v(t) = v0 cosh Lt + a (cosh Lt - 1)/A - r0 sinh(Lt)/L,
 
-A = L^2 = g'(phi_s), g(phi_s + x) = a (cos x - cos 2x) + b sin x + (A - b)/2 sin 2x, r0^2 = P(v0): one formula without
-cases. P has real roots (a loop that turns back), complex ones (a loop around the cylinder), or a double one (the
-solution runs into a second saddle of the same energy); A = 0 where g has a double root at phi_s (the quartic of (66) a
-triple one), A = a = 0 where it has a triple one (quadruple). The saddle lies at v = infinity, phi = pi is no exception.
-Between v0 and v, tanh(Lt/2) = L (v0 - v)/(r0 + r).
+A = L^2 = g'(phi_s), g(phi_s + x) = a (cos x - cos 2x) + b sin x + (A - b)/2 sin 2x, r0^2 = P(v0):
+one formula without cases. P has real roots (a loop that turns back), complex ones (a loop around
+the cylinder), or a double one (the solution runs into a second saddle of the same energy); A = 0
+where g has a double root at phi_s (the quartic of (66) a triple one), A = a = 0 where it has a
+triple one (quadruple). The saddle lies at v = infinity, phi = pi is no exception. Between v0 and v,
+tanh(Lt/2) = L (v0 - v)/(r0 + r).
 
-All here is the branch that leaves the saddle to the right, w > 0; the caller mirrors. What is lost where terms cancel
-is computed in double-double arithmetic: the discriminant a^2 - A b, and m = A v0 + a -+ L r0, their product.
+All here is the branch that leaves the saddle to the right, w > 0; the caller mirrors. What is lost
+where terms cancel is computed in double-double arithmetic: the discriminant a^2 - A b, and m = A v0
++ a -+ L r0, their product.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (66), as corrected in `scenes/gyrostat.md`.
 """
@@ -22,19 +26,36 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.flow import BOUND_DDG, BOUND_DG, C23, S2, S3, TWO_PI, D
-from survey.kernels.cylinder.roots import CENTRE, CENTRE_LOW, MOST_DISCS, RADIUS, ROOTS, SLOPE, discs
-from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
+from survey.kernels.cylinder.roots import (
+    CENTRE,
+    CENTRE_LOW,
+    MOST_DISCS,
+    RADIUS,
+    ROOTS,
+    SLOPE,
+    discs,
+)
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    TURNING,
+    UNDETERMINED,
+)
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.angles_double import centred, radians, sine_cosine
 from survey.kernels.math.double import add, div, mul, neg, scaled, shifted, sqrt, square, sub, times
 from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF_UP
 
-# A saddle: its angle in about [-pi, pi] as a double-double, the bar of that, and the roots of g that it stands for.
+# A saddle: its angle in about [-pi, pi] as a double-double, the bar of that, and the roots of g
+# that it stands for.
 ANGLE, ANGLE_LOW, SLIP, MULTIPLICITY = range(4)
 SADDLE = 4
 # A branch, in rows of pairs: a double-double, or a number and its error.
 _X0, _STEEP, _TILT, _LEVEL, _V0, _PRODUCT = range(6)  # x0, A, a, b, v0, a^2 - A b: double-doubles
-_RATE, _R0, _AWAY, _BACK, _START, _SHIFT = range(6, 12)  # L, r0 (errors relative), m, w0; time and noise of Q
+# L, r0 (errors relative), m, w0; time and noise of Q
+_RATE, _R0, _AWAY, _BACK, _START, _SHIFT = range(6, 12)
 _AHEAD, _BEHIND, _DOUBT = 12, 13, 14  # v0 -+ r0/L; the error of a^2 - A b
 SIZE = 15
 ONE, TWO = 1.0, 2.0  # roots
@@ -45,11 +66,17 @@ _SAFE = 1.5  # what the bars leave out: second order
 
 @kernel
 def saddle(p, index, out):
-    """Fill `out` with saddle number `index` (1, 2, ... by angle in [0, 2 pi)), or return False: there is no such one.
+    """Fill `out` with saddle number `index` (1, 2, ... by angle in [0, 2 pi)), or return False:
+    there is no such one.
 
-    Degenerate equilibria, multiple roots of g within what double-doubles can tell apart, are counted as saddles.
+    Degenerate equilibria, multiple roots of g within what double-doubles can tell apart, are
+    counted as saddles.
     """
-    found, order, keys = np.empty((MOST_DISCS, 5)), np.empty(MOST_DISCS, np.int64), np.empty(MOST_DISCS)
+    found, order, keys = (
+        np.empty((MOST_DISCS, 5)),
+        np.empty(MOST_DISCS, np.int64),
+        np.empty(MOST_DISCS),
+    )
     count = 0
     for i in range(discs(p, found)):
         if not (found[i, ROOTS] > ONE or (found[i, ROOTS] == ONE and found[i, SLOPE] > 0.0)):
@@ -91,9 +118,11 @@ def _pair(data, at):
 
 @kernel
 def enter(p, place, exact, phi0, data):
-    """Fill data (SIZE, 2) for the branch to the right of the saddle that passes phi0: OK; SEPARATRIX; or -1: none does.
+    """Fill data (SIZE, 2) for the branch to the right of the saddle that passes phi0: OK;
+    SEPARATRIX; or -1: none does.
 
-    `exact`: the parameters give two saddles of the same energy, or the degenerate one that the saddle is taken for.
+    `exact`: the parameters give two saddles of the same energy, or the degenerate one that the
+    saddle is taken for.
     """
     x0 = ahead(place, phi0)
     slip = PAIR_SUM_ROUNDOFF + (place[SLIP] if place[MULTIPLICITY] == ONE else 0.0)
@@ -123,7 +152,14 @@ def enter(p, place, exact, phi0, data):
         away, d_away = div(product, back), doubt / back[0]
     elif L[0] > 0.0:
         back, d_back = div(product, away), doubt / -away[0]
-    for row, pair in ((_X0, x0), (_STEEP, A), (_TILT, a), (_LEVEL, b), (_V0, v0), (_PRODUCT, product)):
+    for row, pair in (
+        (_X0, x0),
+        (_STEEP, A),
+        (_TILT, a),
+        (_LEVEL, b),
+        (_V0, v0),
+        (_PRODUCT, product),
+    ):
         _put(data, row, pair[0], pair[1])
     blur, w0 = noise / inner[0], 2.0 * mul(s, speed)[0]
     _put(data, _RATE, L[0], ROUNDOFF_UP + (noise / A[0] if A[0] > 0.0 else 0.0))
@@ -167,7 +203,9 @@ def at(p, data, phi0, t, floats):
         d_rise = 3.0 * ROUNDOFF_UP * abs(one) + (e_gone + e_r + 3.0 * ROUNDOFF_UP) * abs(two)
     else:
         one, two = data[_AHEAD if t > 0.0 else _BEHIND, 0], side * r0 / L * e
-        d_rise = data[_AHEAD if t > 0.0 else _BEHIND, 1] + (e_e + e_r + e_L + 4.0 * ROUNDOFF_UP) * abs(two)
+        d_rise = data[_AHEAD if t > 0.0 else _BEHIND, 1] + (
+            e_e + e_r + e_L + 4.0 * ROUNDOFF_UP
+        ) * abs(two)
     rise, bend = one + two, 0.5 * m * gone * gone
     d_rise += (e_scale + 2.0 * ROUNDOFF_UP) * abs(rise)
     y1, y2 = scale, scale * rise + bend
@@ -191,7 +229,12 @@ def at(p, data, phi0, t, floats):
     phi, moved = phi0 + (x - data[_X0, 0]), abs(x - data[_X0, 0])
     d_x += abs(w) * data[_SHIFT, 0] + ROUNDOFF_UP * (abs(phi) + moved + data[_X0, 0])
     d_w += 4.0 * p[BOUND_DG] * abs(math.sin(0.5 * x)) * data[_SHIFT, 0] + _LEAST
-    floats[rc.PHI], floats[rc.W], floats[rc.PHI_BAR], floats[rc.W_BAR] = phi, w, _SAFE * d_x, _SAFE * d_w
+    floats[rc.PHI], floats[rc.W], floats[rc.PHI_BAR], floats[rc.W_BAR] = (
+        phi,
+        w,
+        _SAFE * d_x,
+        _SAFE * d_w,
+    )
     if t < 0.0 or rate < -d_rate or (m == 0.0 and d_m == 0.0):
         return 0
     return 1 if rate > d_rate else UNDETERMINED
@@ -199,8 +242,16 @@ def at(p, data, phi0, t, floats):
 
 @kernel
 def passing(data, phi0, phi, out):
-    """w and t where phi is passed, or the turning point before it: fill out (VALUE to TIME_BAR), return the status."""
-    x0, A, a, b, v0 = _pair(data, _X0), _pair(data, _STEEP), _pair(data, _TILT), _pair(data, _LEVEL), _pair(data, _V0)
+    """w and t where phi is passed, or the turning point before it: fill out (VALUE to TIME_BAR),
+    return the status.
+    """
+    x0, A, a, b, v0 = (
+        _pair(data, _X0),
+        _pair(data, _STEEP),
+        _pair(data, _TILT),
+        _pair(data, _LEVEL),
+        _pair(data, _V0),
+    )
     product, doubt = _pair(data, _PRODUCT), data[_DOUBT, 0]
     L, r0, early, noise = data[_RATE, 0], data[_R0, 0], data[_SHIFT, 0], data[_SHIFT, 1]
     sharp = data[_RATE, 1] + data[_R0, 1] + 12.0 * ROUNDOFF_UP
@@ -239,7 +290,10 @@ def passing(data, phi0, phi, out):
     t, bar = _flight(L, div(gap, mul(s0, s))[0] / (r0 + r), top / foot, sharp + blur)
     w = 2.0 * s[0] * math.sqrt(inner)
     out[rc.VALUE], out[rc.TIME] = w, t
-    out[rc.VALUE_BAR], out[rc.TIME_BAR] = _SAFE * w * (8.0 * ROUNDOFF_UP + blur), _SAFE * (bar + early)
+    out[rc.VALUE_BAR], out[rc.TIME_BAR] = (
+        _SAFE * w * (8.0 * ROUNDOFF_UP + blur),
+        _SAFE * (bar + early),
+    )
     return OK
 
 
@@ -250,5 +304,9 @@ def _flight(L, q, ratio, sharp):
     if abs(z) >= 0.7:
         t = math.log(ratio) / L
         return t, (4.0 * sharp + 4.0 * ROUNDOFF_UP * abs(L * t)) / L
-    t = 2.0 * q * (1.0 + z * z * (1.0 / 3.0 + z * z * 0.2)) if abs(z) < 1e-4 else 2.0 * math.atanh(z) / L
+    t = (
+        2.0 * q * (1.0 + z * z * (1.0 / 3.0 + z * z * 0.2))
+        if abs(z) < 1e-4
+        else 2.0 * math.atanh(z) / L
+    )
     return t, 8.0 * sharp * abs(t)

@@ -1,7 +1,8 @@
-"""Steps along a solution, which carry their error: its values at given times, and at given angles (Abel equation (57)).
+"""Steps along a solution, which carry their error: its values at given times, and at given angles
+(Abel equation (57)).
 
-A method gives three functions: `setting` (what controls its steps), `begin` (start a step: its size, its truncation
-error noted in T) and `at` (the solution inside the step). The rest is common.
+A method gives three functions: `setting` (what controls its steps), `begin` (start a step: its
+size, its truncation error noted in T) and `at` (the solution inside the step). The rest is common.
 
 The error of (phi, w) after n steps is, to first order, the sum of J_nk delta_k over the steps, |delta_k| <= d_k
 componentwise. S <- J S J^T + diag(d^2) holds the sum of squares, and by Cauchy and Schwarz |error_i| <=
@@ -42,7 +43,8 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 OK, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT = 0, 2, 3, 4  # as in survey/status.py
 TURNING, EQUILIBRIUM, SEPARATRIX = 16, 17, 18  # as in the STATUS of scenes/gyrostat.py
-TRUST = 0.02  # error bounds above this share of the scale of the system no longer hold to first order
+# error bounds above this share of the scale of the system no longer hold to first order
+TRUST = 0.02
 UNDETERMINED = -2  # a count that the error bound leaves open
 
 
@@ -141,12 +143,17 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
             a, _b, c = carried(p, T, dt, v, saa, sab, sbb)
             bar_phi, bar_w = bar(n, a), bar(n, c)
             floats[j, rc.PHI], floats[j, rc.W] = x + turns * TWO_PI, v
-            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = bar_phi + 3e-16 * abs(turns) * TWO_PI, bar_w
+            floats[j, rc.PHI_BAR], floats[j, rc.W_BAR] = (
+                bar_phi + 3e-16 * abs(turns) * TWO_PI,
+                bar_w,
+            )
             from_rest = n == 1 and w0 == 0.0  # then w is 0 at the start and nowhere else
             sure = unsure < 3 and count >= 0 and (abs(v) > bar_w or from_rest)
             turnings[j] = count + (v * sign < 0.0 and not from_rest) if sure else UNDETERMINED
             if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(v))):
-                floats[j, rc.PHI] = floats[j, rc.W] = floats[j, rc.PHI_BAR] = floats[j, rc.W_BAR] = math.nan
+                floats[j, rc.PHI] = floats[j, rc.W] = floats[j, rc.PHI_BAR] = floats[
+                    j, rc.W_BAR
+                ] = math.nan
                 turnings[j] = UNDETERMINED
                 return NO_CONVERGENCE
             j += 1
@@ -212,14 +219,18 @@ def start_sign(p, phi, w):
 
 @inline
 def rests(p, phi, w):
-    """Is the state exactly an equilibrium? Of binary64 angles only 0 can be one (see `equilibria.resting`)."""
+    """Is the state exactly an equilibrium? Of binary64 angles only 0 can be one (see
+    `equilibria.resting`).
+    """
     return w == 0.0 and (p[BOUND_G] == 0.0 or (phi == 0.0 and p[S2] == p[C23]))
 
 
 @inline
 def passage(at, p, T, target, up, h):
     """dt in [0, h] where phi = target, w without a zero inside the step; `up`: phi increases there."""
-    return bracketed(to_target, at, (p, T, target, up), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60)[1]
+    return bracketed(
+        to_target, at, (p, T, target, up), 0.5 * h, (0.0, h), (1e-17 + 1e-16 * h, 0.0), 60
+    )[1]
 
 
 @inline
@@ -239,7 +250,9 @@ def time_of_turning(at, p, T, h):
 
 @inline
 def until_turning(at, p, T, h, sign):
-    """(time, phi, w, is it a turning point?) at the end of a step h with w of this sign, or where w becomes 0."""
+    """(time, phi, w, is it a turning point?) at the end of a step h with w of this sign, or where w
+    becomes 0.
+    """
     x, w, _e, _y = at(p, T, h)
     turned = w * sign <= 0.0
     if turned:
@@ -266,7 +279,9 @@ def clean_turning(p, phi, bar_phi, bar_w):
 
 @kernel
 def node_ahead(p, phi, w):
-    """Distance to a stable node ahead that the solution at (phi, w > 0) certainly runs into without turning, or -1."""
+    """Distance to a stable node ahead that the solution at (phi, w > 0) certainly runs into without
+    turning, or -1.
+    """
     x = phi
     for _ in range(40):
         _f, g, dg = values(p, x)
@@ -295,7 +310,9 @@ def runs_into_node(p, phi, w, target):
 
 @inline
 def conclude(ending, doubt, j, floats, status):
-    """Note how the solution ends: at the targets from the j-th on, and those in doubt, from `doubt` on (-1: none)."""
+    """Note how the solution ends: at the targets from the j-th on, and those in doubt, from `doubt`
+    on (-1: none).
+    """
     for i in range(doubt if doubt >= 0 else j, len(status)):
         if i >= j or not certain(floats[i]):
             status[i] = ending
@@ -307,7 +324,11 @@ def at_rest(p, phi, phi0, w0, targets, floats, status):
     if w0 != 0.0 or start_sign(p, phi, w0) > 0:
         return False
     # within rounding of an equilibrium the side on which the solution leaves it is open
-    ending = TURNING if start_sign(p, phi, w0) < 0 else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
+    ending = (
+        TURNING
+        if start_sign(p, phi, w0) < 0
+        else (EQUILIBRIUM if rests(p, phi0, w0) else SEPARATRIX)
+    )
     for i in range(len(targets)):
         here = targets[i] == phi0
         status[i] = OK if here else ending
@@ -320,10 +341,10 @@ def at_rest(p, phi, phi0, w0, targets, floats, status):
 def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, status):
     """The solution from (phi0, w0 >= 0) at ascending targets >= phi0, forward in time.
 
-    Fills floats[j] (VALUE to TIME_BAR) at targets[j] with status OK, or those of the turning point before it, or
-    within whose bar it lies, with TURNING; EQUILIBRIUM where the solution runs into one first, SEPARATRIX
-    where the error bound leaves open whether it turns. OK is certain: a target that is reached with no certain w is in
-    doubt until the solution has left it behind.
+    Fills floats[j] (VALUE to TIME_BAR) at targets[j] with status OK, or those of the turning point
+    before it, or within whose bar it lies, with TURNING; EQUILIBRIUM where the solution runs into
+    one first, SEPARATRIX where the error bound leaves open whether it turns. OK is certain: a
+    target that is reached with no certain w is in doubt until the solution has left it behind.
     """
     T = table()
     how = setting(p, w0, tolerance)
@@ -379,7 +400,10 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
             for i in range(doubt if doubt >= 0 else j, size):
                 if i >= j or not certain(floats[i]):
                     status[i] = ending
-                    floats[i, rc.VALUE], floats[i, rc.TIME] = x1 + turns * TWO_PI, t + (reach + t_low)
+                    floats[i, rc.VALUE], floats[i, rc.TIME] = (
+                        x1 + turns * TWO_PI,
+                        t + (reach + t_low),
+                    )
                     floats[i, rc.VALUE_BAR] = edge + 4e-16 * abs(floats[i, rc.VALUE])
                     floats[i, rc.TIME_BAR] = bar_t * 1.2
             return
@@ -410,18 +434,21 @@ def certain(row):
 @inline
 def fill_crossing(floats, j, n, v, t, a, b, c, f, g):
     """See `crossing`."""
-    floats[j, rc.VALUE], floats[j, rc.TIME], floats[j, rc.VALUE_BAR], floats[j, rc.TIME_BAR] = crossing(
-        n, v, t, a, b, c, f, g
+    floats[j, rc.VALUE], floats[j, rc.TIME], floats[j, rc.VALUE_BAR], floats[j, rc.TIME_BAR] = (
+        crossing(n, v, t, a, b, c, f, g)
     )
 
 
 @inline
 def crossing(n, v, t, a, b, c, f, g):
-    """w, t and their bars where phi passes a target: the error of phi along the flow goes into w and t.
+    """w, t and their bars where phi passes a target: the error of phi along the flow goes into w
+    and t.
 
     Near a turning point w^2 is smooth in phi while w is not; there the bar is that of w^2.
     """
-    n += 2  # the initial phi, the target and the time at which it is reached have errors too: at most four terms
+    # the initial phi, the target and the time at which it is reached have errors too: at most four
+    # terms
+    n += 2
     moving = v > 0.0
     safe = v if moving else 1.0
     slope = (f * v + g) / safe

@@ -1,7 +1,9 @@
-"""Taylor series of order 30 in double-double arithmetic, for flows on the cylinder: what float64 leaves open.
+"""Taylor series of order 30 in double-double arithmetic, for flows on the cylinder: what float64
+leaves open.
 
-About 30 digits, 20 to 40 microseconds a step. The measure uses it for points that miss the requested accuracy, whose
-turning points stay uncounted, or whose fate float64 leaves open, as next to separatrices. Compiled on first use.
+About 30 digits, 20 to 40 microseconds a step. The measure uses it for points that miss the
+requested accuracy, whose turning points stay uncounted, or whose fate float64 leaves open, as next
+to separatrices. Compiled on first use.
 
 Source: see `kernels.cylinder.flow_double`.
 """
@@ -23,7 +25,9 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     """
     for i in range(len(P)):
         asked = _asked(times[i])
-        status[i] = flow_double.trajectory(P[i], starts[i, 0], starts[i, 1], asked, floats[i], turnings[i])
+        status[i] = flow_double.trajectory(
+            P[i], starts[i, 0], starts[i, 1], asked, floats[i], turnings[i]
+        )
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
@@ -33,5 +37,7 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 
 
 def _asked(row):
-    """The numbers before the first infinity or NaN; not `steps.finite`, which would be compiled in each process."""
+    """The numbers before the first infinity or NaN; not `steps.finite`, which would be compiled in
+    each process.
+    """
     return row[: np.argmin(np.append(np.isfinite(row), False))]

@@ -1,13 +1,16 @@
-"""The flow on an invariant curve w = mu F + n, b != 0 or not: g = 0 (50), mu = 1, and (61), in vector lanes.
+"""The flow on an invariant curve w = mu F + n, b != 0 or not: g = 0 (50), mu = 1, and (61), in
+vector lanes.
 
-With u = tan(x/2), x = phi - phi0, phi' = w is quadratic: u = y1/y2, y1 = w0 s, y2 = c - f0 s, w = w0 l/(y1^2 + y2^2),
-f0 the derivative of mu F at phi0, Delta^2 = n^2 - (mu b)^2. For Delta^2 > 0, s = sin(Delta t/2)/Delta, c = cos(Delta
-t/2), l = 1; for Delta^2 < 0 all divided by cosh: s = tanh(D t/2)/D, c = 1, l = 1/cosh^2(D t/2), D^2 = -Delta^2.
+With u = tan(x/2), x = phi - phi0, phi' = w is quadratic: u = y1/y2, y1 = w0 s, y2 = c - f0 s, w =
+w0 l/(y1^2 + y2^2), f0 the derivative of mu F at phi0, Delta^2 = n^2 - (mu b)^2. For Delta^2 > 0, s
+= sin(Delta t/2)/Delta, c = cos(Delta t/2), l = 1; for Delta^2 < 0 all divided by cosh: s = tanh(D
+t/2)/D, c = 1, l = 1/cosh^2(D t/2), D^2 = -Delta^2.
 
 Numbers miss (61) by roundings at least: g = (mu - 1) f (mu F + n) + R, |R| <= `miss`, and the start is off the curve by
 `offset`. Then e = w - (mu F + n) obeys e' = (1 - mu) f e + R, and w' = mu f w bounds its growth.
 
-One lane is one solution at one time; no lane calls libm. The solutions start with w0 >= 0, others are mirrored.
+One lane is one solution at one time; no lane calls libm. The solutions start with w0 >= 0, others
+are mirrored.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva (2004), (50), (61), as corrected in `scenes/gyrostat.md`.
 """
@@ -32,7 +35,8 @@ ROWS = 27
 MARGIN = 1.5
 SPREAD = 0.125  # roots mu closer together move with their sum of squares rather than with delta
 
-_SMALLEST, _LARGEST = 1e-200, 1e200  # of squares of w and mu F: beyond, products leave the range of binary64
+# of squares of w and mu F: beyond, products leave the range of binary64
+_SMALLEST, _LARGEST = 1e-200, 1e200
 _EXACT = 4e-31  # of what two_prod makes exact
 _NEAREST = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds to an integer
 _PI_LOW = 0.5 * TWO_PI_LOW
@@ -73,10 +77,12 @@ def falling(y):
 
 @inline
 def misfit(b12, b31, d, c23, s2, s3, mu, other, w0, F):
-    """(offset, miss, error of mu): how far numbers miss (61), mu + other = 1; F = mu F(phi0) is off by no rounding.
+    """(offset, miss, error of mu): how far numbers miss (61), mu + other = 1; F = mu F(phi0) is off
+    by no rounding.
 
-    c = (d/2, c23) and (s2, s3) must be parallel to (u/2, v) and to b: miss is how far they are not. What they are along
-    those gives mu and n, so its rounding moves the curve; only where both roots mu are close that is part of miss.
+    c = (d/2, c23) and (s2, s3) must be parallel to (u/2, v) and to b: miss is how far they are not.
+    What they are along those gives mu and n, so its rounding moves the curve; only where both roots
+    mu are close that is part of miss.
     """
     square = b12 * b12 + b31 * b31
     p, p_low = two_prod(b12, b12)
@@ -91,7 +97,11 @@ def misfit(b12, b31, d, c23, s2, s3, mu, other, w0, F):
     left, left_low = two_prod(s2, b31)
     right, right_low = two_prod(s3, b12)
     beside = (left - right) + (left_low - right_low)
-    miss = abs(across) / square + abs(beside) / math.sqrt(square) + _EXACT * (abs(d) + abs(c23) + abs(s2) + abs(s3))
+    miss = (
+        abs(across) / square
+        + abs(beside) / math.sqrt(square)
+        + _EXACT * (abs(d) + abs(c23) + abs(s2) + abs(s3))
+    )
     delta = (d * u + 4.0 * c23 * v) / (square * square)
     near = abs(mu - other) < SPREAD
     unequal = abs(delta - mu * other) + 8.0 * ROUNDOFF_UP * abs(delta)
@@ -99,24 +109,47 @@ def misfit(b12, b31, d, c23, s2, s3, mu, other, w0, F):
     blur = moved + 2.0 * ROUNDOFF_UP * abs(mu)
     miss += 0.5 * square * unequal if near else 0.0
     n = -(s2 * b12 + s3 * b31) / (square * other)
-    error = ROUNDOFF_UP * (12.0 * abs(n) + 2.0 * abs(w0)) + moved * abs(n / other) + blur * math.sqrt(square)
+    error = (
+        ROUNDOFF_UP * (12.0 * abs(n) + 2.0 * abs(w0))
+        + moved * abs(n / other)
+        + blur * math.sqrt(square)
+    )
     exact = other == 0.0
-    return (0.0 if exact else abs((w0 - n) - F) + error), (0.0 if exact else miss), (0.0 if exact else blur)
+    return (
+        (0.0 if exact else abs((w0 - n) - F) + error),
+        (0.0 if exact else miss),
+        (0.0 if exact else blur),
+    )
 
 
 @inline
 def _curve(T):
-    """mu F and its derivative at the start, mirrored where w0 < 0, and what errs: noise of w', offset and miss."""
+    """mu F and its derivative at the start, mirrored where w0 < 0, and what errs: noise of w',
+    offset and miss.
+    """
     for i in range(LANES):
-        b12, b31, mu, other, w0, slip = T[B12, i], T[B31, i], T[MU, i], T[OTHER, i], T[W0, i], T[SLIP, i]
+        b12, b31, mu, other, w0, slip = (
+            T[B12, i],
+            T[B31, i],
+            T[MU, i],
+            T[OTHER, i],
+            T[W0, i],
+            T[SLIP, i],
+        )
         s, c = sine_cosine(T[PHI, i])
         F, f = mu * (b12 * s + b31 * c), mu * (b12 * c - b31 * s)
-        offset, miss, blur = misfit(b12, b31, T[D, i], T[C23, i], T[S2, i], T[S3, i], mu, other, w0, F)
+        offset, miss, blur = misfit(
+            b12, b31, T[D, i], T[C23, i], T[S2, i], T[S3, i], mu, other, w0, F
+        )
         b = math.sqrt(b12 * b12 + b31 * b31)
         slack = (6.0 * ROUNDOFF_UP + 2.0 * slip) * abs(mu) * b
         T[_F, i], T[_SLOPE, i] = -F if w0 < 0.0 else F, f
         T[_NOISE, i] = slack + (4.0 * ROUNDOFF_UP * abs(w0) + 2.0 * b * blur if b > 0.0 else 0.0)
-        T[_OFFSET, i], T[_MISS, i], T[_GAIN, i] = offset + (0.0 if other == 0.0 else slack), miss, b * abs(other)
+        T[_OFFSET, i], T[_MISS, i], T[_GAIN, i] = (
+            offset + (0.0 if other == 0.0 else slack),
+            miss,
+            b * abs(other),
+        )
 
 
 @inline
@@ -134,7 +167,9 @@ def _phase(T):
 
 @inline
 def drift(w0, f, square, half, s, c, low):
-    """Integral of w(0)/w over the time 2 half; divided by cosh^2 where low = 1/cosh^2, c = 1 and s = tanh/Delta."""
+    """Integral of w(0)/w over the time 2 half; divided by cosh^2 where low = 1/cosh^2, c = 1 and s
+    = tanh/Delta.
+    """
     short = abs(square) * half * half < 1e-3
     third = 2.0 / 3.0 * half * half * half * low if short else (half * low - s * c) / square
     return half * low + s * c - 2.0 * f * s * s + (w0 * w0 + f * f) * abs(third)
@@ -156,8 +191,13 @@ def deviation(offset, miss, gain, mu, other, w0, F, f, square, w, t):
     least = square / most if square > 0.0 else min(w, w0)
     most = most if square > 0.0 else max(w, w0)
     root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(most / least))))))
-    steep = abs(other) / max(abs(mu), 1e-300) * (64.0 * ((root - 1.0) / math.sqrt(root)) + 16.0 * ROUNDOFF_UP)
-    shrinks = square <= 0.0 and (w < w0) == (mu * other > 0.0)  # e as w^((1 - mu)/mu), and w is monotone
+    steep = (
+        abs(other)
+        / max(abs(mu), 1e-300)
+        * (64.0 * ((root - 1.0) / math.sqrt(root)) + 16.0 * ROUNDOFF_UP)
+    )
+    # e as w^((1 - mu)/mu), and w is monotone
+    shrinks = square <= 0.0 and (w < w0) == (mu * other > 0.0)
     steep = 0.0 if shrinks else steep
     growth = 1.0 / (1.0 - min(gain * min(t, 2.0 / least), min(steep, _WILDEST)) / 1024.0)
     growth = _fourth(_fourth(_fourth(_fourth(_fourth(growth)))))
@@ -180,11 +220,13 @@ def _formula(T):
         y1, y2 = w0 * s, c - f * s
         norm = y1 * y1 + y2 * y2
         x, w = 2.0 * arctangent(y1, y2) + turns * TWO_PI, w0 * low / norm
-        moved = deviation(T[_OFFSET, i], T[_MISS, i], T[_GAIN, i], T[MU, i], other, w0, F, f, square, w, t)
-        bar = (noise + moved) * max(drift(w0, f, square, half, s, c, low), 0.0) / norm
-        bar += 16.0 * ROUNDOFF_UP * (abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)) / norm + 6.0 * ROUNDOFF_UP * (
-            w * t + abs(x)
+        moved = deviation(
+            T[_OFFSET, i], T[_MISS, i], T[_GAIN, i], T[MU, i], other, w0, F, f, square, w, t
         )
+        bar = (noise + moved) * max(drift(w0, f, square, half, s, c, low), 0.0) / norm
+        bar += 16.0 * ROUNDOFF_UP * (
+            abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)
+        ) / norm + 6.0 * ROUNDOFF_UP * (w * t + abs(x))
         sx, cx = 2.0 * y1 * y2 / norm, (y2 - y1) * (y2 + y1) / norm
         slope = abs(f * cx - F * sx) + math.sqrt(F * F + f * f) * bar
         bar_w = MARGIN * (slope * bar + moved + 4.0 * noise + 4.0 * ROUNDOFF_UP * w)
@@ -195,10 +237,18 @@ def _formula(T):
         bar_x = MARGIN * bar if size > _SMALLEST and size < _LARGEST else math.inf
         bar_x = 2.0 * ROUNDOFF_UP * x + moved * t if uniform else bar_x
         bar_w = moved if uniform else bar_w
-        bar_x, bar_w = (0.0 if other == 0.0 else math.inf) if rests else bar_x, 0.0 if rests else bar_w
+        bar_x, bar_w = (
+            (0.0 if other == 0.0 else math.inf) if rests else bar_x,
+            0.0 if rests else bar_w,
+        )
         x, w = (0.0 if rests else x), (0.0 if rests else w)
         back = T[W0, i] < 0.0
-        T[X, i], T[W, i], T[BAR_X, i], T[BAR_W, i] = -x if back else x, -w if back else w, bar_x, bar_w
+        T[X, i], T[W, i], T[BAR_X, i], T[BAR_W, i] = (
+            -x if back else x,
+            -w if back else w,
+            bar_x,
+            bar_w,
+        )
         # on the curve itself w keeps its sign
         T[COUNT, i] = 0.0 if other == 0.0 or w > bar_w else float(UNDETERMINED)
 

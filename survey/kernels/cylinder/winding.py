@@ -1,4 +1,5 @@
-"""Turning points of a solution, counted to any time, also where it winds into a focus and w falls below its bound.
+"""Turning points of a solution, counted to any time, also where it winds into a focus and w falls
+below its bound.
 
 About an attracting focus x' = w, w' = f w + g' x + r, |r| <= BOUND_F |x w| + BOUND_DDG x^2 / 2. With a = f/2, Omega =
 sqrt(-g' - a^2) and y = (w - a x)/Omega, the angle obeys theta' = -Omega + e, |e| <= rho C, C = (BOUND_F (|a| + Omega) +
@@ -39,7 +40,8 @@ from survey.kernels.cylinder.steps import (
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
-NEVER, START, RATE, DOUBT, DRIFT = range(5)  # of an end: no turning follows; angle, rate and their doubts
+# of an end: no turning follows; angle, rate and their doubts
+NEVER, START, RATE, DOUBT, DRIFT = range(5)
 STRAIGHT = 1e-7  # rad: so near to its line the angle is kept, or nearer than the error bounds are
 
 
@@ -87,14 +89,18 @@ def zeros(end, dt):
     doubt = (end[DOUBT] + end[DRIFT] * dt + 4.0 * ROUNDOFF_UP * end[RATE] * dt) / math.pi
     first, last = end[START] / math.pi, (end[START] - end[RATE] * dt) / math.pi
     doubt += 4.0 * ROUNDOFF_UP * abs(last)
-    if math.floor(first - doubt) != math.floor(first + doubt) or math.floor(last - doubt) != math.floor(last + doubt):
+    if math.floor(first - doubt) != math.floor(first + doubt) or math.floor(
+        last - doubt
+    ) != math.floor(last + doubt):
         return UNDETERMINED
     return int(math.floor(first) - math.floor(last))
 
 
 @inline
 def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
-    """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is UNDETERMINED."""
+    """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is
+    UNDETERMINED.
+    """
     eqs, end, T = np.zeros((MOST, 10)), np.zeros(5), table()
     count, _hidden = equilibria_inside(p, eqs)
     if p[BOUND_G] == 0.0 or rests(p, phi0, w0):
@@ -147,4 +153,15 @@ def turnings(setting, begin, at, P, starts, times, tolerance, limit, out):
     """`counts` for each row of P; a row of times ends at its first infinity."""
     for i in range(len(P)):
         size = finite(times[i])
-        counts(setting, begin, at, P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, out[i])
+        counts(
+            setting,
+            begin,
+            at,
+            P[i],
+            starts[i, 0],
+            starts[i, 1],
+            times[i, :size],
+            tolerance,
+            limit,
+            out[i],
+        )

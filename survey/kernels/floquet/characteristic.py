@@ -1,15 +1,18 @@
-"""Multipliers, and what follows from them, of points where the coefficients of a polynomial are series.
+"""Multipliers, and what follows from them, of points where the coefficients of a polynomial are
+series.
 
-The polynomial is monic: the characteristic one of M, whose roots are the multipliers l, or, of symplectic and
-reversible systems ("paired": with l, 1 / l is a multiplier), that whose roots are the s = l + 1 / l. Weierstrass's
-iteration finds its roots z_i in lanes, from those at the nearest node; its corrections W_i at the end bound their
-errors, since the roots are the eigenvalues of diag(z_i) - W 1^T: Gershgorin's discs of it, in units that make one of
-them narrow, hold one root each. Of coefficients known to within `doubts` W_i is known to within a bound.
+The polynomial is monic: the characteristic one of M, whose roots are the multipliers l, or, of
+symplectic and reversible systems ("paired": with l, 1 / l is a multiplier), that whose roots are
+the s = l + 1 / l. Weierstrass's iteration finds its roots z_i in lanes, from those at the nearest
+node; its corrections W_i at the end bound their errors, since the roots are the eigenvalues of
+diag(z_i) - W 1^T: Gershgorin's discs of it, in units that make one of them narrow, hold one root
+each. Of coefficients known to within `doubts` W_i is known to within a bound.
 
-A point whose discs meet, or whose answer misses what is asked, is `missed`: its own monodromy has to tell.
+A point whose discs meet, or whose answer misses what is asked, is `missed`: its own monodromy has
+to tell.
 
-Sources: B. T. Smith, J. ACM 17 (1970) 661; V. A. Yakubovich, V. M. Starzhinskii, Linear Differential Equations with
-Periodic Coefficients (1975), III.
+Sources: B. T. Smith, J. ACM 17 (1970) 661; V. A. Yakubovich, V. M. Starzhinskii, Linear
+Differential Equations with Periodic Coefficients (1975), III.
 """
 
 import math
@@ -26,19 +29,38 @@ ITERATIONS = 7
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1  # as in measures.floquet.multipliers, and so are those below
 PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = 1, 2, 3, 4
 MULTIPLIERS, RADIUS, VERDICT, CROSSING, KREIN = range(5)  # columns of `asked`
-TIE = 1e-9  # moduli that differ by less, relative to 1 + the largest, count as equal when multipliers are sorted
+# moduli that differ by less, relative to 1 + the largest, count as equal when multipliers are
+# sorted
+TIE = 1e-9
 
 
 @kernel
 def answer(
-    series, doubts, x, table, near, starts, places, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+    series,
+    doubts,
+    x,
+    table,
+    near,
+    starts,
+    places,
+    n,
+    paired,
+    asked,
+    rtol,
+    floats,
+    signs,
+    verdict,
+    crossing,
+    missed,
 ):
-    """Answer the points places (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in `stability.Answers`.
+    """Answer the points places (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in
+    `stability.Answers`.
 
-    series (n1, K m), of K coefficients, m terms along the row each; table (m, L or more, a multiple of LANES): T_k at
-    the points of a row. near (R + L): the part of each row, then of each column, of which each node has PARTS; doubts
-    (K, parts, parts): how well the coefficients are known there; starts (n1, m, d, 2): the roots at the nodes. Of
-    K = 2 d coefficients the last d are those of the Krein form.
+    series (n1, K m), of K coefficients, m terms along the row each; table (m, L or more, a multiple
+    of LANES): T_k at the points of a row. near (R + L): the part of each row, then of each column,
+    of which each node has PARTS; doubts (K, parts, parts): how well the coefficients are known
+    there; starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d coefficients the last d are
+    those of the Krein form.
     """
     K, m, d, R, L = len(doubts), len(table), starts.shape[2], len(x), places.shape[1]
     work, own = np.empty((2, K * m)), np.empty((1, K * m))
@@ -56,19 +78,53 @@ def answer(
                     for lane in range(LANES):
                         sums[lane] += weight * one[lane]
             for lane in range(LANES):
-                column, own_places[lane] = first + min(lane, count - 1), places[r, first + min(lane, count - 1)]
+                column, own_places[lane] = (
+                    first + min(lane, count - 1),
+                    places[r, first + min(lane, count - 1)],
+                )
                 one, two = near[r], near[R + column]
                 for k in range(K):
                     bars[k, lane] = doubts[k, one, two]
                 for i in range(d):
                     z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
                     y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
-            _lanes(c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
+            _lanes(
+                c,
+                bars,
+                z,
+                y,
+                own_places,
+                count,
+                n,
+                paired,
+                asked,
+                rtol,
+                floats,
+                signs,
+                verdict,
+                crossing,
+                missed,
+            )
 
 
 @kernel
 def answer_points(
-    series, terms, doubts, x, near, starts, places, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+    series,
+    terms,
+    doubts,
+    x,
+    near,
+    starts,
+    places,
+    n,
+    paired,
+    asked,
+    rtol,
+    floats,
+    signs,
+    verdict,
+    crossing,
+    missed,
 ):
     """As `answer`, of points at x (2, N), each with coordinates of its own; near (2, N).
 
@@ -107,7 +163,23 @@ def answer_points(
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
-        _lanes(c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed)
+        _lanes(
+            c,
+            bars,
+            z,
+            y,
+            own_places,
+            count,
+            n,
+            paired,
+            asked,
+            rtol,
+            floats,
+            signs,
+            verdict,
+            crossing,
+            missed,
+        )
 
 
 @kernel
@@ -120,9 +192,11 @@ def _polynomials(table):
 
 
 @kernel
-def _lanes(c, bars, z, y, places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed):
-    """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to within `bars`, and roots
-    z + i y (d, LANES), nearly.
+def _lanes(
+    c, bars, z, y, places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+):
+    """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to
+    within `bars`, and roots z + i y (d, LANES), nearly.
     """
     K, d = len(c), len(z)
     w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
@@ -212,7 +286,9 @@ def _product(z, y, i, d, qr, qi):
 
 @kernel
 def _corrections(c, d, bars, z, y, w, gap, parts):
-    """Fill w with bounds of the corrections |W_i|, and `gap` with the distance of each root to the nearest other."""
+    """Fill w with bounds of the corrections |W_i|, and `gap` with the distance of each root to the
+    nearest other.
+    """
     pr, pi, qr, qi, size, bound = parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
     lanes = len(size)
     for i in range(d):
@@ -225,10 +301,14 @@ def _corrections(c, d, bars, z, y, w, gap, parts):
         for k in range(d):
             a, doubt = c[k], bars[k]
             for lane in range(lanes):
-                bound[lane] = bound[lane] * size[lane] + doubt[lane] + 8.0 * d * ROUNDOFF_UP * abs(a[lane])
+                bound[lane] = (
+                    bound[lane] * size[lane] + doubt[lane] + 8.0 * d * ROUNDOFF_UP * abs(a[lane])
+                )
         for lane in range(lanes):
             total = math.sqrt(pr[lane] * pr[lane] + pi[lane] * pi[lane]) + bound[lane]
-            own[lane] = total / math.sqrt(qr[lane] * qr[lane] + qi[lane] * qi[lane]) * (1.0 + 8.0 * d * EPS)
+            own[lane] = (
+                total / math.sqrt(qr[lane] * qr[lane] + qi[lane] * qi[lane]) * (1.0 + 8.0 * d * EPS)
+            )
         for j in range(d):
             if j == i:
                 continue
@@ -242,7 +322,8 @@ def _corrections(c, d, bars, z, y, w, gap, parts):
 def _paired(z, rho, form, of_forms, re, im, bar, sign):
     """The multipliers of the s = z; returns the verdict, and is a Krein sign open?
 
-    The sign of the multiplier exp(i a), 0 < a < pi, is that of form / q' at s = 2 cos a, q the polynomial of the s.
+    The sign of the multiplier exp(i a), 0 < a < pi, is that of form / q' at s = 2 cos a, q the
+    polynomial of the s.
     """
     d, on, off, open_ = len(rho), 0, False, False
     for i in range(d):
@@ -262,7 +343,9 @@ def _paired(z, rho, form, of_forms, re, im, bar, sign):
             two, size = 1.0 / one, abs(one)
             re[a], im[a], bar[a] = one.real, one.imag, wide
             re[b], im[b] = two.real, two.imag
-            bar[b] = wide / (size * (size - wide)) + 4.0 * EPS / size if size > 2.0 * wide else math.inf
+            bar[b] = (
+                wide / (size * (size - wide)) + 4.0 * EPS / size if size > 2.0 * wide else math.inf
+            )
         elif abs(s) + r < 2.0:
             on += 1
             height = math.sqrt((2.0 - s) * (2.0 + s))
@@ -276,7 +359,8 @@ def _paired(z, rho, form, of_forms, re, im, bar, sign):
                     value = value * s + form[0, k]
                     wide = wide * 2.0 + form[1, k] + 4.0 * d * EPS * abs(form[0, k])
                     if k != i and s < z[k, 0] and abs(z[k, 1]) <= rho[k]:
-                        side = -side  # of the slope of the polynomial; pairs of conjugates do not change it
+                        # of the slope of the polynomial; pairs of conjugates do not change it
+                        side = -side
                 if abs(value) > wide + _slope(form, d) * r:
                     sign[a] = 1 if value * side > 0.0 else -1
                     sign[b] = -sign[a]
@@ -366,10 +450,18 @@ def _crossing(re, im, bar, angle, sign, decided, paired, of_signs):
         to_plus = to_minus = between = math.inf
         doubt = wide = 0.0
         for i in range(n):
-            to_plus, to_minus = min(to_plus, 2.0 * abs(angle[i])), min(to_minus, 2.0 * (math.pi - abs(angle[i])))
+            to_plus, to_minus = (
+                min(to_plus, 2.0 * abs(angle[i])),
+                min(to_minus, 2.0 * (math.pi - abs(angle[i]))),
+            )
             doubt = max(doubt, 4.0 * bar[i])
             for j in range(n):
-                if j != i and angle[i] > 0.0 and angle[j] > 0.0 and (not of_signs or sign[i] * sign[j] < 0):
+                if (
+                    j != i
+                    and angle[i] > 0.0
+                    and angle[j] > 0.0
+                    and (not of_signs or sign[i] * sign[j] < 0)
+                ):
                     between = min(between, abs(angle[i] - angle[j]))
                     wide = max(wide, 2.0 * (bar[i] + bar[j]))
         doubt = max(doubt, wide)

@@ -1,6 +1,8 @@
-"""The propagators of linear systems x' = A(t) x over many steps by the classical Runge-Kutta method, of order 4.
+"""The propagators of linear systems x' = A(t) x over many steps by the classical Runge-Kutta
+method, of order 4.
 
-Each step is two half steps, checked by one full step; their difference / (2^4 - 1), twice, bounds the local error.
+Each step is two half steps, checked by one full step; their difference / (2^4 - 1), twice, bounds
+the local error.
 """
 
 import math
@@ -19,12 +21,32 @@ SUMS = 24.0  # roundings of an entry of a step, beside those of its products
 
 @kernel
 def factors(
-    operations, signs, inside, order, used, terms, numbers, scale, noise, n, point, middle, half, F, error, doubt
+    operations,
+    signs,
+    inside,
+    order,
+    used,
+    terms,
+    numbers,
+    scale,
+    noise,
+    n,
+    point,
+    middle,
+    half,
+    F,
+    error,
+    doubt,
 ):
     """As `steps.factors`; the nodes of one step take the places of the lanes there."""
     S, V = np.zeros((len(operations), 1, NODES.size)), np.empty((numbers.shape[1], NODES.size))
     t, zero, A = np.empty(NODES.size), np.zeros(NODES.size), np.empty((NODES.size, n, n))
-    work, first, second, whole = np.empty((3, n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
+    work, first, second, whole = (
+        np.empty((3, n, n)),
+        np.empty((n, n)),
+        np.empty((n, n)),
+        np.empty((n, n)),
+    )
     for task in range(len(point)):
         i, h = point[task], 2.0 * half[task]
         for node in range(NODES.size):

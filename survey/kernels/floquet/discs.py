@@ -1,6 +1,8 @@
-"""Gershgorin's discs of a matrix that is nearly diagonal in given coordinates, and powers of a matrix, with bounds.
+"""Gershgorin's discs of a matrix that is nearly diagonal in given coordinates, and powers of a
+matrix, with bounds.
 
-See `measures.floquet.multipliers`. The loops fix the order of every sum: the same bits in any block.
+See `measures.floquet.multipliers`. The loops fix the order of every sum: the same bits in any
+block.
 """
 
 import math
@@ -71,7 +73,9 @@ def couplings(M, E, extra, centre, V, W, coupling):
 
 @kernel
 def powers(M, E, number, may_be_stable, verdict):
-    """Decide the verdict (N) by M^2, M^4, ..., `number` squarings: 1 if a norm is below 1, 0 if a trace exceeds n."""
+    """Decide the verdict (N) by M^2, M^4, ..., `number` squarings: 1 if a norm is below 1, 0 if a
+    trace exceeds n.
+    """
     N, n = M.shape[0], M.shape[1]
     A, B, X, Y = np.empty((n, n)), np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
     for p in range(N):
@@ -100,6 +104,11 @@ def powers(M, E, number, may_be_stable, verdict):
                     for k in range(n):
                         total += A[i, k] * A[k, j]
                         one, two = abs(A[i, k]), abs(A[k, j])
-                        bound += one * X[k, j] + X[i, k] * two + X[i, k] * X[k, j] + (n + 1) * ROUNDOFF_UP * one * two
+                        bound += (
+                            one * X[k, j]
+                            + X[i, k] * two
+                            + X[i, k] * X[k, j]
+                            + (n + 1) * ROUNDOFF_UP * one * two
+                        )
                     B[i, j], Y[i, j] = total, bound * (1.0 + 4.0 * n * EPS)
             A, B, X, Y = B, A, Y, X

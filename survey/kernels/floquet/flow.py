@@ -1,5 +1,5 @@
-"""The flow of nonlinear systems x' = f(t, x) and its derivative by the initial state, by Taylor series about the
-beginnings of steps; many points at once, each with steps of its own.
+"""The flow of nonlinear systems x' = f(t, x) and its derivative by the initial state, by Taylor
+series about the beginnings of steps; many points at once, each with steps of its own.
 
 A step goes as far as the last two coefficients allow for `tolerance`, relative to the states (Jorba & Zou), and no
 farther than `reach` / |A|, A = df/dx. No bounds are made here: `measures.floquet.existence` has them of the defect of
@@ -19,7 +19,8 @@ from survey.kernels.jit import kernel
 ORDER = 20
 DIGITS = 2.0**48  # of the ends of steps, so that sums and differences of them are exact
 WIDEST = 16.0  # a step, relative to that for which its series was made
-SHORTER, SHORTEST = 0.1, 1e-9  # where a series is not finite; of the span: steps as short end at a singularity
+# where a series is not finite; of the span: steps as short end at a singularity
+SHORTER, SHORTEST = 0.1, 1e-9
 
 
 @kernel
@@ -27,20 +28,29 @@ def flow(
     operations, signs, inside, order, used, terms, numbers, places, x0, span, reach, tolerance, most, first, X, M, size,
     steps, begin, length, series,
 ):  # fmt: skip
-    """Fill X (N, n), the states at t = span (N) from x0 (N, n) at 0, and the numbers of `steps` (N); NaN: it fails.
+    """Fill X (N, n), the states at t = span (N) from x0 (N, n) at 0, and the numbers of `steps`
+    (N); NaN: it fails.
 
-    numbers (N, count), places (n): of the states among them; `most` steps at most. M (N, n, n), if N > 0: dX/dx0, and
-    size (N, n): the largest moduli of the states at the ends of steps. If first (N + 1) is not empty, step k of point i
-    is recorded at first[i] + k: `begin`, `length`, `series` (n, ORDER + 1) in units of the step.
+    numbers (N, count), places (n): of the states among them; `most` steps at most. M (N, n, n), if
+    N > 0: dX/dx0, and size (N, n): the largest moduli of the states at the ends of steps. If first
+    (N + 1) is not empty, step k of point i is recorded at first[i] + k: `begin`, `length`, `series`
+    (n, ORDER + 1) in units of the step.
     """
     n, lanes = x0.shape[1], 2
     while lanes < lanes_of(n) and lanes < len(x0):  # bits do not depend on it
         lanes *= 2
     derived, recorded = len(M) > 0, len(first) > 0
     S, V = np.zeros((len(operations), ORDER + 1, lanes)), np.zeros((numbers.shape[1], lanes))
-    B, C = np.zeros((len(operations), ORDER + 1, n * lanes)), np.zeros((len(operations), n, n * lanes))
+    B, C = (
+        np.zeros((len(operations), ORDER + 1, n * lanes)),
+        np.zeros((len(operations), n, n * lanes)),
+    )
     P, W = np.zeros((ORDER + 1, n, n * lanes)), np.zeros((len(terms), n * lanes))
-    rows, a, needed = np.zeros((n, lanes)), np.zeros(lanes), np.zeros((len(operations), n), np.bool_)
+    rows, a, needed = (
+        np.zeros((n, lanes)),
+        np.zeros(lanes),
+        np.zeros((len(operations), n), np.bool_),
+    )
     for k in range(len(terms)):
         needed[terms[k, BASIS], terms[k, COLUMN]] = True
     x, D, F = np.zeros((n, lanes)), np.zeros((n * n, lanes)), np.zeros((n * n, lanes))
@@ -98,7 +108,8 @@ def flow(
                     end = span[i]
                 else:
                     h = 0.5 * rest if h > 0.5 * rest else h
-                    unit = math.ldexp(1.0 / DIGITS, math.ceil(math.log2(span[i])))  # numba 0.61 knows no exp2
+                    # numba 0.61 knows no exp2
+                    unit = math.ldexp(1.0 / DIGITS, math.ceil(math.log2(span[i])))
                     end = t[lane] + max(math.floor(h / unit), 1.0) * unit
                 before, own = t[lane], s[lane]
                 taken = end - before
@@ -135,7 +146,9 @@ def flow(
 
 @kernel
 def _share(S, held, lane, tolerance):
-    """How far the series of the states serve, relative to the step for which they were made; NaN: not at all."""
+    """How far the series of the states serve, relative to the step for which they were made; NaN:
+    not at all.
+    """
     share = WIDEST
     for c in range(len(held)):
         own = held[c]

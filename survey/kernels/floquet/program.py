@@ -1,13 +1,16 @@
-"""The power series of a matrix A(t) in many steps at once: those of its basis functions, operation by operation.
+"""The power series of a matrix A(t) in many steps at once: those of its basis functions, operation
+by operation.
 
-A matrix is a sum of `terms` (basis, row, column, number): number * basis function; `measures.floquet.trace` makes
-it of a user's code. `operations` (count, 5) are the rows (code, a, b, first, last) of the basis functions: a and b
-those that they are made of, first to last the rows (basis, number) of `inside` that a combination adds. The series
-of a function h(y) follows from h' y': b is h', with the sign in `signs`; where y is linear in t its code is larger
-by OF_LINE. A state of a nonlinear system x' = f(t, x) begins with the number a; first to last are the rows of `inside`
+A matrix is a sum of `terms` (basis, row, column, number): number * basis function;
+`measures.floquet.trace` makes it of a user's code. `operations` (count, 5) are the rows (code, a,
+b, first, last) of the basis functions: a and b those that they are made of, first to last the rows
+(basis, number) of `inside` that a combination adds. The series of a function h(y) follows from h'
+y': b is h', with the sign in `signs`; where y is linear in t its code is larger by OF_LINE. A state
+of a nonlinear system x' = f(t, x) begins with the number a; first to last are the rows of `inside`
 that make up its f, whose lower orders give its own (`measures.floquet.orbit`).
 
-S[basis, n, lane] is the coefficient of tau^n, t = middle + tau * half; V[number, lane] are the numbers.
+S[basis, n, lane] is the coefficient of tau^n, t = middle + tau * half; V[number, lane] are the
+numbers.
 
 Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), chapter 13.
 """
@@ -17,7 +20,13 @@ from survey.kernels.math.functions import NAMES, function
 
 ONE, TIME, COMBINATION, PRODUCT, QUOTIENT, FUNCTIONS = range(6)  # the last: of the first of NAMES
 STATE = FUNCTIONS + len(NAMES)
-CODES = {"one": ONE, "time": TIME, "combination": COMBINATION, "product": PRODUCT, "quotient": QUOTIENT}
+CODES = {
+    "one": ONE,
+    "time": TIME,
+    "combination": COMBINATION,
+    "product": PRODUCT,
+    "quotient": QUOTIENT,
+}
 CODES |= {"state": STATE} | {name: FUNCTIONS + k for k, name in enumerate(NAMES)}
 OF_LINE = 32
 BASIS, ROW, COLUMN, NUMBER = range(4)  # columns of `terms`

@@ -1,4 +1,5 @@
-"""The propagators of linear systems x' = A(t) x over many steps by DOP853: an independent check of `steps`.
+"""The propagators of linear systems x' = A(t) x over many steps by DOP853: an independent check of
+`steps`.
 
 The local error is that of the embedded pair, entry by entry, and the rounding of the sums.
 """
@@ -19,7 +20,22 @@ WEIGHT = float(np.abs(B).sum())
 
 @kernel
 def factors(
-    operations, signs, inside, order, used, terms, numbers, scale, noise, n, point, middle, half, F, error, doubt
+    operations,
+    signs,
+    inside,
+    order,
+    used,
+    terms,
+    numbers,
+    scale,
+    noise,
+    n,
+    point,
+    middle,
+    half,
+    F,
+    error,
+    doubt,
 ):
     """As `steps.factors`."""
     lanes, size = lanes_of(n), n * n
@@ -34,7 +50,9 @@ def factors(
             for k in range(numbers.shape[1]):
                 V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
-                W[k, lane] = numbers[i, terms[k, NUMBER]] * (scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]])
+                W[k, lane] = numbers[i, terms[k, NUMBER]] * (
+                    scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]]
+                )
         norm[:] = 0.0
         for stage in range(STAGES + 1):
             for lane in range(lanes):
@@ -57,7 +75,12 @@ def factors(
             new = K[stage]
             new[:] = 0.0
             for q in range(len(terms)):
-                row, column, weight, basis = terms[q, ROW] * n, terms[q, COLUMN] * n, W[q], S[terms[q, BASIS], 0]
+                row, column, weight, basis = (
+                    terms[q, ROW] * n,
+                    terms[q, COLUMN] * n,
+                    W[q],
+                    S[terms[q, BASIS], 0],
+                )
                 for c in range(n):
                     one, two = new[row + c], Y[column + c]
                     for lane in range(lanes):
@@ -88,12 +111,19 @@ def factors(
 
 @kernel
 def motion(operations, signs, inside, order, terms, numbers, places, x0, span, steps, X, M):
-    """Fill X (N, n), the states of x' = f(t, x) at t = span (N) from x0 at 0, and M = dX/dx0 (N, n, n).
+    """Fill X (N, n), the states of x' = f(t, x) at t = span (N) from x0 at 0, and M = dX/dx0 (N, n,
+    n).
 
-    In steps[i] equal steps; numbers (N, count), places (n) of the states among them, as in `flow.flow`.
+    In steps[i] equal steps; numbers (N, count), places (n) of the states among them, as in
+    `flow.flow`.
     """
     n = x0.shape[1]
-    S, V, t, zero = np.zeros((len(operations), 1, 1)), np.empty((numbers.shape[1], 1)), np.empty(1), np.zeros(1)
+    S, V, t, zero = (
+        np.zeros((len(operations), 1, 1)),
+        np.empty((numbers.shape[1], 1)),
+        np.empty(1),
+        np.zeros(1),
+    )
     y, K, new = np.empty((n, n + 1)), np.empty((STAGES, n, n + 1)), np.empty((n, n + 1))
     for i in range(len(x0)):
         for k in range(numbers.shape[1]):

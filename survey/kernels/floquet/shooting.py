@@ -1,4 +1,6 @@
-"""Boundary value problems along chains of steps, the shots of multiple shooting: bounds of their solutions."""
+"""Boundary value problems along chains of steps, the shots of multiple shooting: bounds of their
+solutions.
+"""
 
 import math
 
@@ -57,7 +59,9 @@ def responses(F, delta, first, back, ends, at_end, states, last, late):
                     total = 0.0
                     for c in range(width):
                         largest = max(largest, abs(A[r, c]))
-                        total += abs(A[r, c]) * (delta[source, c] if source >= begin else at_end[i, c])
+                        total += abs(A[r, c]) * (
+                            delta[source, c] if source >= begin else at_end[i, c]
+                        )
                     if k < end:
                         states[k, r] += total
                     else:

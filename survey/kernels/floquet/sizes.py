@@ -1,4 +1,6 @@
-"""How large A(t) is on a piece of the period, how fast it varies, and what its rounding may add, from samples of it."""
+"""How large A(t) is on a piece of the period, how fast it varies, and what its rounding may add,
+from samples of it.
+"""
 
 import math
 
@@ -13,10 +15,11 @@ MOST_SHIFT = 500.0  # powers of 2 of a unit, in a sweep
 
 @kernel
 def samples(terms, values, errors, numbers, doubts, A, E, largest):
-    """Fill A (N, m, n, n), its largest entries E of error bounds (N, n, n), and raise `largest` (N, n, n) to its own.
+    """Fill A (N, m, n, n), its largest entries E of error bounds (N, n, n), and raise `largest` (N,
+    n, n) to its own.
 
-    values, errors (B, N or 1, m) are those of the basis functions that `terms` number from 0; numbers, doubts
-    (N, count).
+    values, errors (B, N or 1, m) are those of the basis functions that `terms` number from 0;
+    numbers, doubts (N, count).
     """
     N, m = A.shape[0], A.shape[1]
     bar = np.empty(E.shape[1:])
@@ -67,9 +70,9 @@ def balance(matrices, scale):
 
 @kernel
 def measure(A, E, scale, weights, transform, resolved, size, rate, noise):
-    """Fill `size` (N), the largest sum of moduli in a row of A (N, m, n, n) in the units `scale` (N, n); `rate` (N),
-    how fast it varies on a piece of length 1; and `noise` (N), twice the largest sum of E (N, n, n) in a row. Where A
-    is not finite `size` is NaN.
+    """Fill `size` (N), the largest sum of moduli in a row of A (N, m, n, n) in the units `scale`
+    (N, n); `rate` (N), how fast it varies on a piece of length 1; and `noise` (N), twice the
+    largest sum of E (N, n, n) in a row. Where A is not finite `size` is NaN.
 
     The rate stands for 1 / distance of a singularity, or a frequency: the largest k / (1 + ln(max |c| / |c_k|)) of the
     Chebyshev coefficients c_k, twice (see `hill.user_equation`), of a sum of all entries with `weights`; those that are

@@ -1,7 +1,9 @@
-"""The propagators of linear systems x' = A(t) x over many steps, by Taylor series about their middles.
+"""The propagators of linear systems x' = A(t) x over many steps, by Taylor series about their
+middles.
 
-U(tau), U = 1 at the middle of a step, takes the state from there; F = U(1) U(-1)^-1 takes it over the step: so a series
-serves twice its reach. Each (point, step) is a task, and LANES of them are solved at once.
+U(tau), U = 1 at the middle of a step, takes the state from there; F = U(1) U(-1)^-1 takes it over
+the step: so a series serves twice its reach. Each (point, step) is a task, and LANES of them are
+solved at once.
 
 The bound of |F - exact| counts, in the maximum norm of rows: the terms beyond the last, whose recurrence is continued
 with norms for the coefficients; the rounding of every operation, carried along by the same recurrence; that of A's
@@ -28,23 +30,52 @@ def lanes_of(n):
 
 @kernel
 def factors(
-    operations, signs, inside, order, used, terms, numbers, scale, noise, n, point, middle, half, F, error, doubt
+    operations,
+    signs,
+    inside,
+    order,
+    used,
+    terms,
+    numbers,
+    scale,
+    noise,
+    n,
+    point,
+    middle,
+    half,
+    F,
+    error,
+    doubt,
 ):
-    """Fill F (tasks, n, n), bounds `error` (tasks) of its rows' errors and `doubt` (tasks) of their relative size.
+    """Fill F (tasks, n, n), bounds `error` (tasks) of its rows' errors and `doubt` (tasks) of their
+    relative size.
 
-    Task k is the step of `point[k]` from middle[k] - half[k] to middle[k] + half[k]. numbers (N, count), scale (N, n):
-    A_ij is taken times scale_j / scale_i, powers of 2. If there is room for twice as many, the propagators F^-1 of the
-    steps backwards follow.
+    Task k is the step of `point[k]` from middle[k] - half[k] to middle[k] + half[k]. numbers (N,
+    count), scale (N, n): A_ij is taken times scale_j / scale_i, powers of 2. If there is room for
+    twice as many, the propagators F^-1 of the steps backwards follow.
     """
     lanes, ways = lanes_of(n), 2 if len(F) > len(point) else 1
     places = len(operations)
     S, X = np.zeros((places, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
     B, C = np.zeros((places, ORDER + 1, n * lanes)), np.zeros((places, n, n * lanes))
     V, W = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), n * lanes))
-    a, w, e = np.zeros((ORDER + 1, lanes)), np.empty((ORDER + 1 + BEYOND, lanes)), np.empty((ORDER + 1, lanes))
+    a, w, e = (
+        np.zeros((ORDER + 1, lanes)),
+        np.empty((ORDER + 1 + BEYOND, lanes)),
+        np.empty((ORDER + 1, lanes)),
+    )
     rows, t, s, own = np.empty((n, lanes)), np.empty(lanes), np.empty(lanes), np.empty(lanes)
-    even, odd, work = np.empty((n, n * lanes)), np.empty((n, n * lanes)), np.empty((4, n, n * lanes))
-    total, of_both, of_odd, found = np.empty(lanes), np.empty(lanes), np.empty(lanes), np.empty(lanes)
+    even, odd, work = (
+        np.empty((n, n * lanes)),
+        np.empty((n, n * lanes)),
+        np.empty((4, n, n * lanes)),
+    )
+    total, of_both, of_odd, found = (
+        np.empty(lanes),
+        np.empty(lanes),
+        np.empty(lanes),
+        np.empty(lanes),
+    )
     per_row, needed = np.zeros(n), np.zeros((places, n), np.bool_)
     for k in range(len(terms)):
         per_row[terms[k, ROW]] += 1.0
@@ -58,7 +89,9 @@ def factors(
             for k in range(numbers.shape[1]):
                 V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
-                weight = numbers[i, terms[k, NUMBER]] * (scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]])
+                weight = numbers[i, terms[k, NUMBER]] * (
+                    scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]]
+                )
                 for c in range(n):
                     W[k, c * lanes + lane] = weight
         X[0] = 0.0
@@ -110,7 +143,8 @@ def norm_of(S, W, terms, k, rows, out):
 
 @kernel
 def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
-    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]; `needed` (basis, row) rows of X are multiplied.
+    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]; `needed` (basis, row) rows of X
+    are multiplied.
 
     Each row of X, C and B[basis, order] holds `lanes` numbers for every column, as one long vector.
     """
@@ -131,16 +165,26 @@ def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
                     basis, before = B[m, j], X[k - j, row]
                     for q in range(n * lanes):
                         sums[q] += basis[q] * before[q]
-                for j in range(first, k + 1, 4):  # four at once: sums are read and written less often
+                # four at once: sums are read and written less often
+                for j in range(first, k + 1, 4):
                     b0, b1, b2, b3 = B[m, j], B[m, j + 1], B[m, j + 2], B[m, j + 3]
-                    x0, x1, x2, x3 = X[k - j, row], X[k - j - 1, row], X[k - j - 2, row], X[k - j - 3, row]
+                    x0, x1, x2, x3 = (
+                        X[k - j, row],
+                        X[k - j - 1, row],
+                        X[k - j - 2, row],
+                        X[k - j - 3, row],
+                    )
                     for q in range(n * lanes):
                         sums[q] += (b0[q] * x0[q] + b1[q] * x1[q]) + (b2[q] * x2[q] + b3[q] * x3[q])
     new = X[k + 1]
     new[:] = 0.0
     for q in range(len(terms)):
         one, weight = new[terms[q, ROW]], W[q]
-        two = X[k, terms[q, COLUMN]] if terms[q, BASIS] == ONE else C[terms[q, BASIS], terms[q, COLUMN]]
+        two = (
+            X[k, terms[q, COLUMN]]
+            if terms[q, BASIS] == ONE
+            else C[terms[q, BASIS], terms[q, COLUMN]]
+        )
         for i in range(n * lanes):
             one[i] += weight[i] * two[i]
     share = np.empty(lanes)
@@ -155,13 +199,16 @@ def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
 
 @kernel
 def _rounded(a, w, e, own, s, k, most):
-    """Fill e[k + 1], a bound of the rounding of X[k + 1], from the norms a of A's and w of X's coefficients."""
+    """Fill e[k + 1], a bound of the rounding of X[k + 1], from the norms a of A's and w of X's
+    coefficients.
+    """
     new = e[k + 1]
     for lane in range(len(new)):
         new[lane] = own[lane] * w[k, lane]
     for j in range(k + 1):
         one, two, before = a[j], w[k - j], e[k - j]
-        count = ROUNDOFF_UP * (k + j + 6.0 + most)  # a basis function's coefficient j, products, k - j sums, a row
+        # a basis function's coefficient j, products, k - j sums, a row
+        count = ROUNDOFF_UP * (k + j + 6.0 + most)
         for lane in range(len(new)):
             new[lane] += one[lane] * (before[lane] + count * two[lane])
     for lane in range(len(new)):
@@ -186,8 +233,8 @@ def _halves(X, even, odd):
 
 @kernel
 def _missing(a, w, e, s, total, of_both, of_odd):
-    """Fill bounds (lanes) of the errors of a series at tau = 1 and of the sum of its odd terms, and `total`, the sum of
-    its terms' norms: what it lacks beyond its last term, and its rounding.
+    """Fill bounds (lanes) of the errors of a series at tau = 1 and of the sum of its odd terms, and
+    `total`, the sum of its terms' norms: what it lacks beyond its last term, and its rounding.
     """
     lanes = len(s)
     for lane in range(lanes):
@@ -220,9 +267,14 @@ def _missing(a, w, e, s, total, of_both, of_odd):
         fall = math.sqrt(last / before) if before > 0.0 else 0.0
         if last <= ROUNDOFF_UP * largest:  # beside zeros of coefficients the fall is an accident
             fall = min(fall, 0.94)
-        rest = 2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
+        rest = (
+            2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
+        )
         # over two orders, as even and odd ones may differ
-        end, earlier = w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane], w[ORDER + BEYOND - 2, lane]
+        end, earlier = (
+            w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane],
+            w[ORDER + BEYOND - 2, lane],
+        )
         ratio = w[ORDER + BEYOND, lane] / earlier if earlier > 0.0 else 0.0
         cut = cut + end * ratio / (1.0 - ratio) if ratio < 0.9 else math.inf
         cut += s[lane] * rest * total[lane] / (ORDER + 1)
@@ -232,10 +284,12 @@ def _missing(a, w, e, s, total, of_both, of_odd):
 
 @kernel
 def _over(even, odd, of_both, of_odd, work, error):
-    """Make `odd` G = F - 1, F the propagator over the steps, from the halves of U; fill the bounds `error` of its rows.
+    """Make `odd` G = F - 1, F the propagator over the steps, from the halves of U; fill the bounds
+    `error` of its rows.
 
-    G = D U(-1)^-1 with D = U(1) - U(-1), twice the odd terms: exact to what is small where the step is. `work`
-    (4, n, n lanes) and `even` are used up. Of the computed V = U(-1)^-1, G V^-1 = D is off by G (1 - U(-1) V) V^-1.
+    G = D U(-1)^-1 with D = U(1) - U(-1), twice the odd terms: exact to what is small where the step
+    is. `work` (4, n, n lanes) and `even` are used up. Of the computed V = U(-1)^-1, G V^-1 = D is
+    off by G (1 - U(-1) V) V^-1.
     """
     n, lanes = len(even), len(error)
     U, left, inverse, G = work[0], work[1], work[2], work[3]
@@ -261,7 +315,11 @@ def _over(even, odd, of_both, of_odd, work, error):
     for lane in range(lanes):
         rounding = (n + 2.0) * ROUNDOFF_UP * (across[lane] + tall[lane] * down[lane])
         given = 2.0 * of_odd[lane] + tall[lane] * of_both[lane]
-        own = broad[lane] * (given + rounding) + tall[lane] * rest[lane] + ROUNDOFF_UP * (1.0 + tall[lane])
+        own = (
+            broad[lane] * (given + rounding)
+            + tall[lane] * rest[lane]
+            + ROUNDOFF_UP * (1.0 + tall[lane])
+        )
         error[lane] = own if own < math.inf else math.inf
     for i in range(n):
         one, two = odd[i], G[i]
@@ -301,7 +359,9 @@ def _product(A, B, lanes, out):
 
 @kernel
 def _invert(work, inverse, n, lanes):
-    """Gauss-Jordan elimination of `work`, which is near 1, on `inverse`; no pivots are chosen: residuals tell."""
+    """Gauss-Jordan elimination of `work`, which is near 1, on `inverse`; no pivots are chosen:
+    residuals tell.
+    """
     factor = np.empty(lanes)
     for k in range(n):
         pivot, other = work[k], inverse[k]
@@ -358,7 +418,9 @@ def multiply(left, right, zero, out):
 
 @kernel
 def add_outer(A, by, before, out):
-    """Add `by` times the sum of the moduli in each row of A, times `before` (n) of each column, to out (n, n)."""
+    """Add `by` times the sum of the moduli in each row of A, times `before` (n) of each column, to
+    out (n, n).
+    """
     for j in range(len(A)):
         total = 0.0
         for m in range(len(A)):
@@ -393,7 +455,8 @@ def copy(A, out):
 
 @kernel
 def products(F, error, doubt, first, n, M, E, R):
-    """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds E of its entries.
+    """Fill M (N, n, n), the product of the steps first[i] to first[i + 1] of each point, and bounds
+    E of its entries.
 
     To first order the error is the sum over the steps of (F_last ... F_k+1) d_k (F_k-1 ... F_1), the sums of |d_k| in
     a row being error[k] at most; `doubt` bounds the relative size of what is left out. R is the part of E that
@@ -402,7 +465,8 @@ def products(F, error, doubt, first, n, M, E, R):
     longest = 0
     for i in range(len(M)):
         longest = max(longest, first[i + 1] - first[i])
-    before, rounding = np.empty((longest + 1, n)), np.empty(longest + 1)  # the largest in columns of |F_k-1 ... F_1|
+    # the largest in columns of |F_k-1 ... F_1|
+    before, rounding = np.empty((longest + 1, n)), np.empty(longest + 1)
     A, B = np.empty((n, n)), np.empty((n, n))
     for i in range(len(M)):
         steps = first[i + 1] - first[i]
@@ -435,8 +499,9 @@ def products(F, error, doubt, first, n, M, E, R):
 def carried(F, error, doubt, first, which, n, V, W, B):
     """Fill B (N, n, n) of the points `which`: bounds of |W e V|, e the error of the product but for multiplying.
 
-    As in `products`, but the errors are carried in the coordinates V, W (complex, N, n, n): where these are nearly the
-    eigenvectors, what grows on the way and shrinks again counts as little as it matters.
+    As in `products`, but the errors are carried in the coordinates V, W (complex, N, n, n): where
+    these are nearly the eigenvectors, what grows on the way and shrinks again counts as little as
+    it matters.
     """
     longest = 0
     for i in which:
@@ -465,10 +530,12 @@ def carried(F, error, doubt, first, which, n, V, W, B):
 
 @kernel
 def gradients(F, error, doubt, first, B, out):
-    """Fill out (N, K) with bounds of the errors of the K sums over i, j of B_ji M_ij; B is (N, K, n, n).
+    """Fill out (N, K) with bounds of the errors of the K sums over i, j of B_ji M_ij; B is (N, K,
+    n, n).
 
-    As in `products`, but what errors of different entries do to a sum is bounded together: the error d of a step adds
-    sum of d_ij (X B L)_ji, X the product of the steps before it and L that of those behind it.
+    As in `products`, but what errors of different entries do to a sum is bounded together: the
+    error d of a step adds sum of d_ij (X B L)_ji, X the product of the steps before it and L that
+    of those behind it.
     """
     n, K, longest = F.shape[1], B.shape[1], 0
     for i in range(len(B)):
@@ -495,7 +562,9 @@ def gradients(F, error, doubt, first, B, out):
                         largest = max(largest, abs(Z[j, c]))
                         rounded += abs(A[j, c]) * tops[j]
                     total += largest
-                out[i, q] += error[first[i] + k] * total + n * ROUNDOFF_UP * row_norm(step) * rounded
+                out[i, q] += (
+                    error[first[i] + k] * total + n * ROUNDOFF_UP * row_norm(step) * rounded
+                )
                 multiply(A, step, 0.0, Z)
                 A[:] = Z
             out[i, q] *= math.exp(min(2.0 * more, 700.0)) * (1.0 + 1e-9)
@@ -526,7 +595,9 @@ def compile_further():
     one, _two, three, _operations, which, _terms = _zeros()
     complex_three = three.astype(np.complex128)
     products(three, one, one, np.zeros(2, np.int64), 1, three, three, three)
-    carried(three, one, one, np.zeros(2, np.int64), which[:0], 1, complex_three, complex_three, three)
+    carried(
+        three, one, one, np.zeros(2, np.int64), which[:0], 1, complex_three, complex_three, three
+    )
 
 
 def _zeros():

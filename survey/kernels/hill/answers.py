@@ -1,6 +1,8 @@
-"""Arithmetic of Hill's question, point by point: how many steps, and what follows from the half-period factors.
+"""Arithmetic of Hill's question, point by point: how many steps, and what follows from the
+half-period factors.
 
-The results of a point at T/2 are the columns of `kernels.lanes`. Formulas: `survey.measures.hill.monodromy`.
+The results of a point at T/2 are the columns of `kernels.lanes`. Formulas:
+`survey.measures.hill.monodromy`.
 """
 
 from math import asinh, atan2, isfinite, pi, sqrt
@@ -26,7 +28,8 @@ UNTRIED = -1
 
 @kernel
 def first_rungs(p, bound, span, rate, phase, distance, ladder, out):
-    """The first rung of the ladder, of numbers of steps, with `phase` steps per radian and `distance` times `rate`.
+    """The first rung of the ladder, of numbers of steps, with `phase` steps per radian and
+    `distance` times `rate`.
 
     |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2] in row r of `p` and of `out`, which holds rungs:
     the length of the ladder where no number is enough, UNTRIED where the point or its row is not finite.
@@ -52,7 +55,8 @@ def first_rungs(p, bound, span, rate, phase, distance, ladder, out):
 
 @kernel
 def segments(rung, top, order, rows, on_rung, starts):
-    """Points with a rung in 0..top by row and rung: their flat indices in `order`; returns the number of segments.
+    """Points with a rung in 0..top by row and rung: their flat indices in `order`; returns the
+    number of segments.
 
     Segment i is order[starts[i] : starts[i + 1]], all in row rows[i] and on rung on_rung[i].
     """
@@ -84,13 +88,27 @@ def segments(rung, top, order, rows, on_rung, starts):
 
 
 @kernel
-def measure(first, results, squares, rule, wanted, rtol, full_period, overflow, floats, verdict, missed, status):
-    """What follows from `results` (n, RESULTS) of n of N points, from the `first` on, by arithmetic: `floats` (14, N),
-    `verdict`, who has `missed` `rtol`.
+def measure(
+    first,
+    results,
+    squares,
+    rule,
+    wanted,
+    rtol,
+    full_period,
+    overflow,
+    floats,
+    verdict,
+    missed,
+    status,
+):
+    """What follows from `results` (n, RESULTS) of n of N points, from the `first` on, by
+    arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
 
-    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
-    `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count for `missed`; `full_period` as in
-    `_squares`; `squares` (n, 4, or empty) holds what it finds, where more digits of it are known.
+    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
+    `overflow`. `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count
+    for `missed`; `full_period` as in `_squares`; `squares` (n, 4, or empty) holds what it finds,
+    where more digits of it are known.
     """
     for row in range(len(results)):
         i = first + row
@@ -122,7 +140,11 @@ def measure(first, results, squares, rule, wanted, rtol, full_period, overflow, 
             floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
             wide |= not bar <= rtol * (1.0 + abs(d))
         for c in range(4):
-            at, value, bar = FACTOR_ROWS[c], results[row, lanes.Y1 + c], results[row, lanes.Y1_BAR + c]
+            at, value, bar = (
+                FACTOR_ROWS[c],
+                results[row, lanes.Y1 + c],
+                results[row, lanes.Y1_BAR + c],
+            )
             if wanted[at // 2]:
                 floats[at, i], floats[at + 1, i] = value, bar
                 wide |= not bar <= rtol * (1.0 + abs(value))
@@ -130,8 +152,12 @@ def measure(first, results, squares, rule, wanted, rtol, full_period, overflow, 
 
 
 @kernel
-def transcendental(first, results, squares, wanted, rtol, full_period, floats, verdict, missed, status):
-    """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and who misses."""
+def transcendental(
+    first, results, squares, wanted, rtol, full_period, floats, verdict, missed, status
+):
+    """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and
+    who misses.
+    """
     for row in range(len(results)):
         i = first + row
         if status[i] != 0:
@@ -143,15 +169,26 @@ def transcendental(first, results, squares, wanted, rtol, full_period, floats, v
             missed[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
         if wanted[ROTATION // 2]:
             zeros, doubt = results[row, lanes.Y1_ZEROS] + results[row, lanes.Y2_ZEROS], 0.0
-            if full_period:  # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1' y2
+            # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1'
+            # y2
+            if full_period:
                 zeros, bar = results[row, lanes.Y2_ZEROS], results[row, lanes.Y2_BAR]
                 if abs(results[row, lanes.Y2]) <= bar:
-                    doubt = min(bar * (abs(results[row, lanes.DY1]) + results[row, lanes.DY1_BAR]), 1.0)
+                    doubt = min(
+                        bar * (abs(results[row, lanes.DY1]) + results[row, lanes.DY1_BAR]), 1.0
+                    )
             x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
             bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
-            if not full_period:  # a zero next to T/2 may be miscounted where the other product's sign leaves it open
-                lost1 = abs(results[row, lanes.Y1]) <= results[row, lanes.Y1_BAR] and not sine > sine_bar
-                lost2 = abs(results[row, lanes.Y2]) <= results[row, lanes.Y2_BAR] and not cosine > cosine_bar
+            # a zero next to T/2 may be miscounted where the other product's sign leaves it open
+            if not full_period:
+                lost1 = (
+                    abs(results[row, lanes.Y1]) <= results[row, lanes.Y1_BAR]
+                    and not sine > sine_bar
+                )
+                lost2 = (
+                    abs(results[row, lanes.Y2]) <= results[row, lanes.Y2_BAR]
+                    and not cosine > cosine_bar
+                )
                 bar += 0.5 * lost1 + 0.5 * lost2
             floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
             missed[i] |= not bar <= rtol * (1.0 + x)
@@ -159,21 +196,26 @@ def transcendental(first, results, squares, wanted, rtol, full_period, floats, v
 
 @kernel
 def exponents(first, count, rtol, floats, verdict, missed):
-    """The exponents of `count` points from each of `first` on, whose D and bar are known, and who misses `rtol`."""
+    """The exponents of `count` points from each of `first` on, whose D and bar are known, and who
+    misses `rtol`.
+    """
     for start in first:
         for i in range(start, start + count):
             # |D| - 2 = 4 sinh^2(exponent / 2)
             growth = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
-            missed[i] |= _grows(growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i])
+            missed[i] |= _grows(
+                growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i]
+            )
 
 
 @splice
 def _squares(result, squares, i, full_period):
-    """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2', or row i of `squares` if it has rows.
+    """sin^2 and cos^2 of half the angle, each with its bar: -y1' y2 and y1 y2', or row i of
+    `squares` if it has rows.
 
-    With `full_period` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2', the smaller one from
-    their product, and the zeros of y2 in (0, T) give the band (that solution's angle advances from 0 to between d pi
-    and (d + 1) pi).
+    With `full_period` the results are those at T: then (2 - D) / 4 and (2 + D) / 4, D = y1 + y2',
+    the smaller one from their product, and the zeros of y2 in (0, T) give the band (that solution's
+    angle advances from 0 to between d pi and (d + 1) pi).
     """
     y1, dy1, y2, dy2 = result[lanes.Y1], result[lanes.DY1], result[lanes.Y2], result[lanes.DY2]
     y1_bar, dy2_bar = result[lanes.Y1_BAR], result[lanes.DY2_BAR]
@@ -184,7 +226,12 @@ def _squares(result, squares, i, full_period):
         bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
     if len(squares) > 0:
-        sine, sine_bar, cosine, cosine_bar = squares[i, 0], squares[i, 1], squares[i, 2], squares[i, 3]
+        sine, sine_bar, cosine, cosine_bar = (
+            squares[i, 0],
+            squares[i, 1],
+            squares[i, 2],
+            squares[i, 3],
+        )
     elif full_period:
         both, both_bar = _both(result)
         if abs(sine) < abs(cosine):
@@ -196,11 +243,13 @@ def _squares(result, squares, i, full_period):
 
 @inline
 def _both(result):
-    """sin^2 cos^2 of half the angle and its bar, from the results at T: (t^2 - s^2 - p^2) / 4, where t is half the
-    difference of y2 and y1', p half their sum, and s half the difference of y1 and y2', as det M = 1.
+    """sin^2 cos^2 of half the angle and its bar, from the results at T: (t^2 - s^2 - p^2) / 4,
+    where t is half the difference of y2 and y1', p half their sum, and s half the difference of y1
+    and y2', as det M = 1.
 
-    Next to an edge t is nearly the root of s^2 + p^2, which is 0 where both solutions are periodic: it is known to the
-    bars of the results where the trace is known to their root. Times in units that balance the bars of y2 and y1'.
+    Next to an edge t is nearly the root of s^2 + p^2, which is 0 where both solutions are periodic:
+    it is known to the bars of the results where the trace is known to their root. Times in units
+    that balance the bars of y2 and y1'.
     """
     unit = sqrt(result[lanes.DY1_BAR] / result[lanes.Y2_BAR]) if result[lanes.Y2_BAR] > 0.0 else 1.0
     unit = unit if 0.0 < unit < np.inf else 1.0
@@ -225,7 +274,9 @@ def _sharper(value, bar, product, product_bar, other, other_bar):
     if not least > 0.0:
         return value, bar
     quotient = product / other
-    found = (product_bar + abs(quotient) * other_bar) / least * (1.0 + 4.0 * EPS) + 2.0 * EPS * abs(quotient)
+    found = (product_bar + abs(quotient) * other_bar) / least * (1.0 + 4.0 * EPS) + 2.0 * EPS * abs(
+        quotient
+    )
     return (quotient, found) if found < bar else (value, bar)
 
 
@@ -261,7 +312,9 @@ def exponent(growth, bar, verdict):
     if verdict == STABLE or verdict == MARGINAL:
         return 0.0, 0.0
     middle = _asinh(growth)
-    return middle, max(_asinh(growth + bar) - middle, middle - _asinh(growth - bar)) + 8.0 * EPS * middle
+    return middle, max(
+        _asinh(growth + bar) - middle, middle - _asinh(growth - bar)
+    ) + 8.0 * EPS * middle
 
 
 @inline
@@ -282,13 +335,16 @@ def _rotation(sine, sine_bar, cosine, cosine_bar, verdict, zeros):
         return 0.5 * np.rint(2.0 * value), 0.0
     if verdict == UNSTABLE:
         return value, 0.0
-    bar = max(_spread(sine, sine_bar), _spread(cosine, cosine_bar)) / pi  # arctan2 of both is no worse than either
+    # arctan2 of both is no worse than either
+    bar = max(_spread(sine, sine_bar), _spread(cosine, cosine_bar)) / pi
     return value, max(bar, 4.0 * EPS * (1.0 + value))
 
 
 @inline
 def _spread(square, bar):
-    """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by arcsin sqrt(bar)."""
+    """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by
+    arcsin sqrt(bar).
+    """
     slope = 2.0 * sqrt(max(square - bar, 0.0) * max(1.0 - square - bar, 0.0))
     most = 0.5 * pi * sqrt(min(bar, 1.0))
     return min(bar / slope, most) if slope > 0.0 else most

@@ -1,11 +1,12 @@
-"""Cells of a plane on which the signs of the four half-period factors are shown, halved on their series alone.
+"""Cells of a plane on which the signs of the four half-period factors are shown, halved on their
+series alone.
 
 A cell holds the four factors y1, y2', y1', y2 at T/2 as sum_jk c_jk T_j(X) T_k(Y), X and Y from -1 to 1 across it, each
 within a slack. A factor has one sign where |c_00| > sum of the other |c_jk| + slack (|T_j| <= 1), whatever lies
 between points. The series of half a cell follows from the cell's own, by a matrix.
 
-Sources: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 8 (series, tails);
-I. E. Sutherland, G. W. Hodgman, Comm. ACM 17 (1974) 32 (polygons).
+Sources: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 8
+(series, tails); I. E. Sutherland, G. W. Hodgman, Comm. ACM 17 (1974) 32 (polygons).
 """
 
 import numpy as np
@@ -15,7 +16,8 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import EPS
 
 UNSOLVED = 3  # no verdict: a cell whose factors must be solved first
-# A series serves a block if its tail, at the last cells, is at most this share of what a factor varies there.
+# A series serves a block if its tail, at the last cells, is at most this share of what a factor
+# varies there.
 ENOUGH = 1e-4
 # It serves a cell no more where its tail is more than this share.
 BLURRED = 0.1
@@ -29,10 +31,11 @@ LEAF = 7
 def descend(series, doubts, blocks, depth, halves):
     """Halve B blocks until a cell is decided or `depth` halvings small: leaves (>= M, 7), and M.
 
-    `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor the series' tail in X, in Y, and its other slack;
-    `blocks` (B, 4): number of halvings and index along X, the same along Y; `halves` (2, depth, 2, n, n): per axis and
-    number of halvings the matrices to the lower and to the upper half. A leaf is its block, its verdict, or
-    UNSOLVED, and which parts of it are stable and unstable at least.
+    `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor the series' tail in X, in Y, and its
+    other slack; `blocks` (B, 4): number of halvings and index along X, the same along Y; `halves`
+    (2, depth, 2, n, n): per axis and number of halvings the matrices to the lower and to the upper
+    half. A leaf is its block, its verdict, or UNSOLVED, and which parts of it are stable and
+    unstable at least.
     """
     n, most = series.shape[2], depth[0] + depth[1] + 2
     stack, slack = np.empty((most, 4, n, n)), np.empty((most, 4))
@@ -117,8 +120,14 @@ def _sure(sums, bars, f):
 @inline
 def decide(sums, bars):
     """The verdict of the cell: unstable <=> y1 y2' < 0 or y1' y2 > 0."""
-    first, second = _sure(sums, bars, 0) and _sure(sums, bars, 1), _sure(sums, bars, 2) and _sure(sums, bars, 3)
-    cosine, sine = (sums[0, 0] > 0.0) == (sums[1, 0] > 0.0), (sums[2, 0] > 0.0) != (sums[3, 0] > 0.0)
+    first, second = (
+        _sure(sums, bars, 0) and _sure(sums, bars, 1),
+        _sure(sums, bars, 2) and _sure(sums, bars, 3),
+    )
+    cosine, sine = (
+        (sums[0, 0] > 0.0) == (sums[1, 0] > 0.0),
+        (sums[2, 0] > 0.0) != (sums[3, 0] > 0.0),
+    )
     if (first and not cosine) or (second and not sine):
         return UNSTABLE
     return STABLE if first and second else UNDECIDED
@@ -126,12 +135,14 @@ def decide(sums, bars):
 
 @inline
 def _too_short(sums, bars, doubt, here, block, depth):
-    """Along which axes is the series too short for the unsure factors of this cell, so that solving its halves helps?
+    """Along which axes is the series too short for the unsure factors of this cell, so that solving
+    its halves helps?
 
-    The tail must be small beside what a factor varies: on the block itself, whose halves are solved otherwise, beside
-    what it varies on the last cells; on a smaller cell, which is solved itself otherwise, beside what it varies there.
-    Below the other slack it does not matter. An axis whose tail hides a factor is halved before the other; where it
-    is halved to the end already, nothing helps.
+    The tail must be small beside what a factor varies: on the block itself, whose halves are solved
+    otherwise, beside what it varies on the last cells; on a smaller cell, which is solved itself
+    otherwise, beside what it varies there. Below the other slack it does not matter. An axis whose
+    tail hides a factor is halved before the other; where it is halved to the end already, nothing
+    helps.
     """
     x = y = hidden_x = hidden_y = False
     full = here[0] == block[0] and here[2] == block[2]
@@ -147,12 +158,16 @@ def _too_short(sums, bars, doubt, here, block, depth):
         return x and here[0] > block[0], y and here[2] > block[2]
     if (hidden_x and here[0] == depth[0]) or (hidden_y and here[2] == depth[1]):
         return False, False
-    return x and here[0] < depth[0] and hidden_x >= hidden_y, y and here[2] < depth[1] and hidden_y >= hidden_x
+    return x and here[0] < depth[0] and hidden_x >= hidden_y, y and here[2] < depth[
+        1
+    ] and hidden_y >= hidden_x
 
 
 @inline
 def _children(here, block, along_x, along_y, leaves, count):
-    """What must be solved next: halves or quarters of the block, or this cell of it; returns the new count."""
+    """What must be solved next: halves or quarters of the block, or this cell of it; returns the
+    new count.
+    """
     full = here[0] == block[0] and here[2] == block[2]
     for i in range(2 if full and along_x else 1):
         for j in range(2 if full and along_y else 1):
@@ -182,7 +197,9 @@ def _halve(stack, slack, where, size, top, axis, matrices, sums):
 
 @inline
 def _times(matrix, series, size, axis, out):
-    """The (upper triangular) matrix along one axis of the series; `out` may be `series`, as sums run upwards."""
+    """The (upper triangular) matrix along one axis of the series; `out` may be `series`, as sums
+    run upwards.
+    """
     for f in range(4):
         for j in range(size[0]):
             for k in range(size[1]):
@@ -198,12 +215,16 @@ def _times(matrix, series, size, axis, out):
 
 @inline
 def _shorten(own, slack, size, doubt):
-    """Drop the highest degrees, as long as they are small beside the block's slack, and add them to the cell's."""
+    """Drop the highest degrees, as long as they are small beside the block's slack, and add them to
+    the cell's.
+    """
     for axis in range(2):
         while size[axis] > 2:
             last, small = size[axis] - 1, True
             for f in range(4):
-                small &= _layer(own[f], size, axis, last) <= DROPPED * (doubt[f, 0] + doubt[f, 1] + doubt[f, 2])
+                small &= _layer(own[f], size, axis, last) <= DROPPED * (
+                    doubt[f, 0] + doubt[f, 1] + doubt[f, 2]
+                )
             if not small:
                 break
             for f in range(4):
@@ -222,7 +243,9 @@ def _layer(own, size, axis, last):
 
 @inline
 def _cut(own, sums, bars, polygons):
-    """The least parts of the cell that are stable and unstable: where the linear parts exceed all else in size."""
+    """The least parts of the cell that are stable and unstable: where the linear parts exceed all
+    else in size.
+    """
     stable = unstable = 0.0
     for signs in range(16):
         for i in range(4):  # the square
@@ -231,9 +254,18 @@ def _cut(own, sums, bars, polygons):
         corners = 4
         for f in range(4):
             x, y = own[f, 1, 0], own[f, 0, 1]
-            rest = sums[f, 1] - abs(x) - abs(y) + bars[f] + 8.0 * EPS * (abs(sums[f, 0]) + sums[f, 1])
+            rest = (
+                sums[f, 1] - abs(x) - abs(y) + bars[f] + 8.0 * EPS * (abs(sums[f, 0]) + sums[f, 1])
+            )
             sign = 1.0 if (signs >> f) & 1 == 1 else -1.0
-            corners = _clip(polygons[f % 2], corners, sign * sums[f, 0] - rest, sign * x, sign * y, polygons[1 - f % 2])
+            corners = _clip(
+                polygons[f % 2],
+                corners,
+                sign * sums[f, 0] - rest,
+                sign * x,
+                sign * y,
+                polygons[1 - f % 2],
+            )
         part = _area(polygons[0], corners)
         cosine, sine = (signs & 1) == ((signs >> 1) & 1), ((signs >> 2) & 1) != ((signs >> 3) & 1)
         if cosine and sine:
@@ -245,7 +277,9 @@ def _cut(own, sums, bars, polygons):
 
 @inline
 def _clip(old, corners, constant, slope_x, slope_y, new):
-    """Cut the polygon to where constant + slope_x X + slope_y Y > 0; returns the number of corners of the new one."""
+    """Cut the polygon to where constant + slope_x X + slope_y Y > 0; returns the number of corners
+    of the new one.
+    """
     count = 0
     for i in range(corners):
         after = i + 1 if i + 1 < corners else 0

@@ -1,6 +1,8 @@
-"""DOP853 for Hill's equation: adaptive steps of y'' + z y = 0 from z at any t, with bounds of their local errors.
+"""DOP853 for Hill's equation: adaptive steps of y'' + z y = 0 from z at any t, with bounds of their
+local errors.
 
-Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and dop853.f.
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.5 and
+dop853.f.
 """
 
 import numpy as np
@@ -13,7 +15,8 @@ from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
 from survey.kernels.unroll import summed, unroll
 
 SMALLEST, LARGEST = 0.2, 5.0  # ratios of a step to the one before
-# Zeros are counted by signs at the ends of steps: a step stays below this many radians of the fastest phase.
+# Zeros are counted by signs at the ends of steps: a step stays below this many radians of the
+# fastest phase.
 _LONGEST = 2.0
 STEP_LIMIT = 200_000
 DOUBT = 0.01
@@ -32,7 +35,8 @@ def hill_step(z, h):
     p21, d21 = _ended(0.0, h, sums[3:6], doubt)
     p12, d12 = _ended(0.0, h, sums[6:9], doubt)
     p22, d22 = _ended(1.0, h, sums[9:12], doubt)
-    # one entry's estimate may vanish by symmetry (constant z): each takes the largest of all, in the scale of the phase
+    # one entry's estimate may vanish by symmetry (constant z): each takes the largest of all, in
+    # the scale of the phase
     rate = max(np.sqrt(size), 1.0 / h)
     estimate = max(max(d11, d22), max(d12 * rate, d21 / rate))
     return p11, p12, p21, p22, estimate, estimate / rate, estimate * rate
@@ -52,13 +56,17 @@ def _sums(z, h):
             slopes.append((v, -z[i] * y))
         for k in range(2):
             for weights in (B, E5, E3):
-                sums.append(summed(weights[j] * slopes[j][k] for j in range(STAGES) if weights[j] != 0.0))
+                sums.append(
+                    summed(weights[j] * slopes[j][k] for j in range(STAGES) if weights[j] != 0.0)
+                )
     return tuple(sums)
 
 
 @inline
 def _ended(start, h, sums, doubt):
-    """The new value, and dop853.f's combination of the estimates of order 5 and 3, which must not vanish by chance."""
+    """The new value, and dop853.f's combination of the estimates of order 5 and 3, which must not
+    vanish by chance.
+    """
     value, fifth, third = sums
     return start + h * value, abs(h) * (combined(fifth, third) + doubt * abs(fifth))
 
@@ -69,19 +77,25 @@ def hill_walk(potential, p, row, table, span, tolerance, out):
 
     (z, size of the terms whose sum z is) = potential(t, p, row, table).
 
-    Fills `out` as `survey.kernels.lanes.chain` does. False when STEP_LIMIT steps did not reach the end.
+    Fills `out` as `survey.kernels.lanes.chain` does. False when STEP_LIMIT steps did not reach the
+    end.
     """
-    return hill_walk_pieces(potential, p, row, table, np.array([0.0, span]), 0.0, span, tolerance, out)
+    return hill_walk_pieces(
+        potential, p, row, table, np.array([0.0, span]), 0.0, span, tolerance, out
+    )
 
 
 @inline
 def hill_walk_pieces(potential, p, row, table, edges, slack, longest, tolerance, out):
-    """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a step ends.
+    """As `hill_walk`, from the first to the last of `edges`; z may jump at those between, where a
+    step ends.
 
-    No step is longer than `longest`. `potential` is evaluated no nearer to an edge than `slack`, so on the right side.
+    No step is longer than `longest`. `potential` is evaluated no nearer to an edge than `slack`, so
+    on the right side.
     """
     z = np.empty(STAGES)
-    longest = min(longest, 0.25 * (edges[-1] - edges[0]))  # else a coefficient whose average rules escapes the estimate
+    # else a coefficient whose average rules escapes the estimate
+    longest = min(longest, 0.25 * (edges[-1] - edges[0]))
     piece, t, steps, h = 1, edges[0], 0, min(longest, 0.1)
     y1, v1, s1, t1, w1 = 1.0, 0.0, 0.0, 0.0, 0.0
     y2, v2, s2, t2, w2 = 0.0, 1.0, 0.0, 0.0, 0.0

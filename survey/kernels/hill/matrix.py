@@ -22,7 +22,8 @@ def samples_only(samples, h, coefficients):
 def rounding(size, h):
     """Bounds D11, D12, D21 of the rounding of one step h; z itself is known to 4 ROUNDING times `size` >= |z|.
 
-    Where `size` is large on the step's scale, as it is beside larger values of z, that reaches y within the step.
+    Where `size` is large on the step's scale, as it is beside larger values of z, that reaches y
+    within the step.
     """
     excess = 0.125 * h * h * size - 0.5
     within = 2.0 * ROUNDING * (1.0 + 4.0 * (excess + abs(excess)))
@@ -46,8 +47,8 @@ def doubled(first, second, full, order, size, h):
 def exponential(x, y, z):
     """exp of the traceless matrix (x, y; z, -x): branch-free, to rounding for |x^2 + y z| <= 16.
 
-    cosh and sinh(r)/r of r = sqrt(delta) are entire in delta: series at delta/16, then twice the doubling rules,
-    in e = cosh - 1 and s = sinh(r)/r, which lose no digits.
+    cosh and sinh(r)/r of r = sqrt(delta) are entire in delta: series at delta/16, then twice the
+    doubling rules, in e = cosh - 1 and s = sinh(r)/r, which lose no digits.
     """
     delta = x * x + y * z
     d = delta * 0.0625

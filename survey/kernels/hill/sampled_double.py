@@ -1,9 +1,10 @@
-"""Taylor series of order 34 in double-double arithmetic, of z known in every step by its interpolant.
+"""Taylor series of order 34 in double-double arithmetic, of z known in every step by its
+interpolant.
 
-On a step z is the polynomial through its values at NODES Chebyshev points of the first kind, given as a power series
-from the step's start; the rest is `taylor_double`. What that polynomial misses follows from its last Chebyshev
-coefficients, and counts as an error of z all over the step. Domain: z smooth on the scale of a step, known to 32
-digits; steps of any lengths.
+On a step z is the polynomial through its values at NODES Chebyshev points of the first kind, given
+as a power series from the step's start; the rest is `taylor_double`. What that polynomial misses
+follows from its last Chebyshev coefficients, and counts as an error of z all over the step. Domain:
+z smooth on the scale of a step, known to 32 digits; steps of any lengths.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 8.
 """
@@ -19,24 +20,27 @@ from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
 NODES = 20
-# What follows the results of a full period: sin^2 and cos^2 of half the angle, (2 - D) / 4 and (2 + D) / 4, each with
-# its error bound.
+# What follows the results of a full period: sin^2 and cos^2 of half the angle, (2 - D) / 4 and (2 +
+# D) / 4, each with its error bound.
 SINE, SINE_BAR, COSINE, COSINE_BAR = range(RESULTS, RESULTS + 4)
 SQUARES = 4
 
 
 def missing(before, last, size):
-    """What an interpolant misses, from the sizes of its last four Chebyshev coefficients, pair by pair, and of z."""
+    """What an interpolant misses, from the sizes of its last four Chebyshev coefficients, pair by
+    pair, and of z.
+    """
     # rounding may cancel two coefficients altogether, and then only their rounding is known
     return 3 * last * (last / (before + PAIR_ROUNDOFF * size + 1e-300) + 0.02)
 
 
 @kernel
 def solve(series, misses, lengths, full_period, out):
-    """y'' + z y = 0 over all steps, from z's series in x = t / h (steps, NODES, 2), lengths (steps, 2), `missing` of z.
+    """y'' + z y = 0 over all steps, from z's series in x = t / h (steps, NODES, 2), lengths (steps,
+    2), `missing` of z.
 
-    Fills `out` as `survey.kernels.lanes.chain` does; with `full_period` also its columns SINE to COSINE_BAR, where
-    D = y1 + y2'.
+    Fills `out` as `survey.kernels.lanes.chain` does; with `full_period` also its columns SINE to
+    COSINE_BAR, where D = y1 + y2'.
     """
     steps, work = len(series), workspace(0)
     z, even, odd = work[0], work[1], work[2]
@@ -48,17 +52,25 @@ def solve(series, misses, lengths, full_period, out):
             z[0, i], z[1, i] = series[n, i, 0], series[n, i, 1]
         square = mul(h, h)
         step(z, even, odd, square, False, c)
-        # Variation of constants: an error of z moves the propagator by at most that error times both solutions.
+        # Variation of constants: an error of z moves the propagator by at most that error times
+        # both solutions.
         size = np.abs(even[0]).sum() + np.abs(odd[0]).sum()
         miss = square[0] * misses[n] * size * size
         longer, shorter = div(h, unit), div(unit, h)
         c[2], c[3] = mul((c[2], c[3]), longer)
         c[4], c[5] = mul((c[4], c[5]), shorter)
-        c[8], c[9], c[10] = c[8] + miss, (c[9] + miss) * longer[0], (c[10] + 2.0 * miss) * shorter[0]
+        c[8], c[9], c[10] = (
+            c[8] + miss,
+            (c[9] + miss) * longer[0],
+            (c[10] + 2.0 * miss) * shorter[0],
+        )
         c[11] = 0.0
     y1, v1, y2, v2 = composed(chain, 0.0, out)
     if full_period:
-        bar, trace = out[Y1_BAR] + out[DY2_BAR] + PAIR_ROUNDOFF * (abs(y1[0]) + abs(v2[0]) + 2.0), add(y1, v2)
+        bar, trace = (
+            out[Y1_BAR] + out[DY2_BAR] + PAIR_ROUNDOFF * (abs(y1[0]) + abs(v2[0]) + 2.0),
+            add(y1, v2),
+        )
         out[SINE] = 0.25 * add((2.0, 0.0), (-trace[0], -trace[1]))[0]
         out[COSINE] = 0.25 * add((2.0, 0.0), trace)[0]
         out[SINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[SINE])

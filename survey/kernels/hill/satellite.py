@@ -1,9 +1,10 @@
-"""Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at given u.
+"""Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at
+given u.
 
-A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the complement of 1/k;
-`given` is the parameter of this row that is known exactly, and `which` says which one it is.
-`scenes/satellite.md`: The equation: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2 sn^2 (OL), cn^2 (PR),
--sn^2 (OR): no cancelling constant.
+A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the
+complement of 1/k; `given` is the parameter of this row that is known exactly, and `which` says
+which one it is. `scenes/satellite.md`: The equation: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2
+sn^2 (OL), cn^2 (PR), -sn^2 (OR): no cancelling constant.
 """
 
 import numpy as np
@@ -18,7 +19,9 @@ CLOSE = 1e-10
 
 
 def complete_integrals(k, kc):
-    """K and E of arrays of moduli and complements, as `elliptic.complete` in numpy, which has nothing to compile."""
+    """K and E of arrays of moduli and complements, as `elliptic.complete` in numpy, which has
+    nothing to compile.
+    """
     a, b, weight, total = np.ones_like(kc), kc, 0.5, 0.5 * k * k
     for _ in range(MEANS):
         gap = a - b
@@ -28,7 +31,11 @@ def complete_integrals(k, kc):
             break
         c, mean, other = 0.5 * gap, 0.5 * (a + b), np.sqrt(a * b)
         if number < wide.size:
-            c, mean, other = np.where(wide, c, 0.0), np.where(wide, mean, a), np.where(wide, other, b)
+            c, mean, other = (
+                np.where(wide, c, 0.0),
+                np.where(wide, mean, a),
+                np.where(wide, other, b),
+            )
         a, b = mean, other
         weight *= 2.0
         total = total + weight * c * c
@@ -37,9 +44,11 @@ def complete_integrals(k, kc):
 
 
 def half_periods(k, kc):
-    """2 K(k), or K(1/k) / k for rotations, rounded, and the rest, as phases are rho times as long (DLMF 19.8.5).
+    """2 K(k), or K(1/k) / k for rotations, rounded, and the rest, as phases are rho times as long
+    (DLMF 19.8.5).
 
-    In the machine's extended floats (on some machines float64) and numpy, which has nothing to compile.
+    In the machine's extended floats (on some machines float64) and numpy, which has nothing to
+    compile.
     """
     a, b = np.ones_like(kc, dtype=np.longdouble), kc.astype(np.longdouble)
     wide = np.flatnonzero(b < a)
@@ -64,10 +73,11 @@ def motion(u, k, oblate, pairs, last):
 
 @kernel
 def sample(rows, nodes, out):
-    """c0 = w^2 + g and c1 = 2 w at the `nodes` (fractions) of the steps of the half period: out[r, step, c, node].
+    """c0 = w^2 + g and c1 = 2 w at the `nodes` (fractions) of the steps of the half period: out[r,
+    step, c, node].
 
-    Steps are even in number, and `nodes` symmetric: cn(2K - u) = -cn(u) gives the second half of a libration from the
-    first, where u has a smaller rounding error.
+    Steps are even in number, and `nodes` symmetric: cn(2K - u) = -cn(u) gives the second half of a
+    libration from the first, where u has a smaller rounding error.
     """
     pairs = np.empty((2, MEANS))
     steps, width = out.shape[1], len(nodes)
@@ -93,7 +103,10 @@ def sample(rows, nodes, out):
         velocity = 2 if librates else 3
         for i in range(own * width):
             w = k * lanes[velocity, i]
-            lanes[0, i], lanes[4, i] = w * w + squared * (lanes[shape, i] * lanes[shape, i]), 2.0 * w
+            lanes[0, i], lanes[4, i] = (
+                w * w + squared * (lanes[shape, i] * lanes[shape, i]),
+                2.0 * w,
+            )
         for n in range(own):
             for i in range(width):
                 out[r, n, 0, i], out[r, n, 1, i] = lanes[0, n * width + i], lanes[4, n * width + i]
@@ -118,8 +131,8 @@ def tabulate(row, table):
     table[0, MEANS] = means(row[1], table)
 
 
-# In double-double the clock is the pendulum itself, x'' = -sin x cos x: sin x, cos x, w = x', and w^2 for z.
-# dn = cos x and k sn = sin x for librations; cn and sn for rotations.
+# In double-double the clock is the pendulum itself, x'' = -sin x cos x: sin x, cos x, w = x', and
+# w^2 for z. dn = cos x and k sn = sin x for librations; cn and sn for rotations.
 SIN, COS, W, SQUARE = range(4)
 CLOCK = 4
 # What a row is given by: k, 1 - k or asin k.
@@ -160,7 +173,9 @@ def half_period(exact):
 
 @inline
 def slowest(exact, clock):
-    """The clock where w is least, from where errors do not grow: u = K for librations, K(1/k) / k for rotations."""
+    """The clock where w is least, from where errors do not grow: u = K for librations, K(1/k) / k
+    for rotations.
+    """
     for n in range(CLOCK):
         clock[n, 0, 0], clock[n, 1, 0] = 0.0, 0.0
     if exact[4] > 0.0:
@@ -186,7 +201,9 @@ def pendulum(exact, h, clock):
 
 @inline
 def coefficient(side, exact, rho, clock, z):
-    """Series of z = (rho + w)^2 + g; w is odd about u = K for librations, even about K(1/k) / k for rotations."""
+    """Series of z = (rho + w)^2 + g; w is odd about u = K for librations, even about K(1/k) / k for
+    rotations.
+    """
     sign, oblate = 1.0 if exact[4] > 0.0 else side, exact[5] > 0.0
     twice = dd.scaled(rho, 2.0 * sign)
     for n in range(1, clock.shape[2]):
@@ -203,7 +220,9 @@ def coefficient(side, exact, rho, clock, z):
 
 @inline
 def missed(exact, clock):
-    """Where w is largest sin x = 0, |cos x| = 1, |w| = k: how far off, sin x and w relative to their amplitudes."""
+    """Where w is largest sin x = 0, |cos x| = 1, |w| = k: how far off, sin x and w relative to
+    their amplitudes.
+    """
     k = exact[0], exact[1]
     sine = abs(clock[SIN, 0, 0]) / min(1.0, k[0])
     cosine, w = (clock[COS, 0, 0], clock[COS, 1, 0]), (clock[W, 0, 0], clock[W, 1, 0])

@@ -1,7 +1,9 @@
-"""The separatrix k = 1 of a satellite as a problem of scattering: f'' + (2 sech^2 u + 2 rho sech u + m) f = 0.
+"""The separatrix k = 1 of a satellite as a problem of scattering: f'' + (2 sech^2 u + 2 rho sech u
++ m) f = 0.
 
-f is Jost's solution, f exp(nu u) -> 1 as u -> inf, nu^2 = -m: a series in exp(-u) where that is small, then Taylor
-series along the axis down to u = 0. As the coefficient is even, f(0) and f'(0) hold all of it.
+f is Jost's solution, f exp(nu u) -> 1 as u -> inf, nu^2 = -m: a series in exp(-u) where that is
+small, then Taylor series along the axis down to u = 0. As the coefficient is even, f(0) and f'(0)
+hold all of it.
 
 Source: derived in `scenes/satellite.md` ("The separatrix").
 """

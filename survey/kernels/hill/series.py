@@ -1,5 +1,5 @@
-"""Discriminants, or factors, of many rows from their Chebyshev series: rows share nothing, lanes of a row share their
-coefficients.
+"""Discriminants, or factors, of many rows from their Chebyshev series: rows share nothing, lanes of
+a row share their coefficients.
 
 Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1.
 """
@@ -35,7 +35,16 @@ def _sum(c, tile, sums, count):
     for i in range(count):
         sums[i] = 0.0
     for k in range(len(c) - TERMS, -1, -TERMS):
-        c0, c1, c2, c3, c4, c5, c6, c7 = c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7]
+        c0, c1, c2, c3, c4, c5, c6, c7 = (
+            c[k],
+            c[k + 1],
+            c[k + 2],
+            c[k + 3],
+            c[k + 4],
+            c[k + 5],
+            c[k + 6],
+            c[k + 7],
+        )
         t = tile[k : k + TERMS]
         for i in range(count):
             low = (c0 * t[0, i] + c1 * t[1, i]) + (c2 * t[2, i] + c3 * t[3, i])
@@ -45,9 +54,9 @@ def _sum(c, tile, sums, count):
 
 @kernel
 def _lagrange(n, x, tile, top, weights):
-    """Magnitudes of the Lagrange polynomials of the n nodes at x in the first lanes of the first n rows of `weights`,
-    finite numbers in others, from T_k in the rows of `tile`; see `chebyshev.lagrange`. `top` keeps T_n, whose
-    recurrence errs by less than n^2 EPS.
+    """Magnitudes of the Lagrange polynomials of the n nodes at x in the first lanes of the first n
+    rows of `weights`, finite numbers in others, from T_k in the rows of `tile`; see
+    `chebyshev.lagrange`. `top` keeps T_n, whose recurrence errs by less than n^2 EPS.
     """
     for i in range(len(x)):
         top[i] = abs(2.0 * x[i] * tile[n - 1, i] - tile[n - 2, i]) + n * n * EPS
@@ -60,17 +69,19 @@ def _lagrange(n, x, tile, top, weights):
 
 @kernel
 def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdict, missed):
-    """D of the `rows` from its series at x (L): D, its bar and the verdict; `missed` where not enough.
+    """D of the `rows` from its series at x (L): D, its bar and the verdict; `missed` where not
+    enough.
 
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], to which is added, if n > 0, what is `at_nodes` (R,
-    K), of which n count, times the magnitudes of Lagrange's polynomials; K and terms are multiples of TERMS. Columns
-    as in `kernels.hill.answers.measure`.
+    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], to which is added, if n > 0,
+    what is `at_nodes` (R, K), of which n count, times the magnitudes of Lagrange's polynomials; K
+    and terms are multiples of TERMS. Columns as in `kernels.hill.answers.measure`.
     """
     terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
     kept = tiles if len(rows) > ROWS else 1  # of the tables: of no more than what is read again
     table, weights = np.empty((kept, terms, TILE)), np.empty((kept, at_nodes.shape[1], TILE))
     sums, bounds = np.empty(TILE), np.empty(TILE)
-    # A tile of the table stays in the first cache for some rows, and what is written within some pages.
+    # A tile of the table stays in the first cache for some rows, and what is written within some
+    # pages.
     for turn in range((len(rows) + ROWS - 1) // ROWS * tiles):
         start, t = turn // tiles * ROWS, turn % tiles
         count, place = len(x) - t * TILE if t == tiles - 1 else TILE, t if kept > 1 else 0
@@ -96,14 +107,16 @@ def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdic
 
 @splice
 def _decide(d, bar, wide, floats, rtol, verdict, missed):
-    """D, its bar and the verdict of neighbouring points, and who missed; `wide`: the bars may miss rtol. Views: an
-    offset index is not vector code.
+    """D, its bar and the verdict of neighbouring points, and who missed; `wide`: the bars may miss
+    rtol. Views: an offset index is not vector code.
     """
     for i in range(len(verdict)):
         floats[0, i], floats[1, i] = d[i], bar[i]
     for i in range(len(verdict)):
         stable, unstable = abs(d[i]) < 2.0 - bar[i], abs(d[i]) > 2.0 + bar[i]
-        verdict[i] = np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
+        verdict[i] = (
+            np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
+        )
     for i in range(len(verdict)):
         missed[i] = verdict[i] == UNDECIDED
     if wide:
@@ -113,7 +126,9 @@ def _decide(d, bar, wide, floats, rtol, verdict, missed):
 
 @splice
 def _table(x, even, odd, tile):
-    """T_k at x (or of y = 2 x^2 - 1 if `even`; T_{2k + 1} if `odd`) in the first lanes of the rows of `tile`."""
+    """T_k at x (or of y = 2 x^2 - 1 if `even`; T_{2k + 1} if `odd`) in the first lanes of the rows
+    of `tile`.
+    """
     for i in range(len(x)):
         y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
         tile[0, i] = x[i] if odd else 1.0
@@ -126,11 +141,13 @@ def _table(x, even, odd, tile):
 
 @kernel
 def factors(coefficients, bars, x, even, turns, left, right, share, full_period, results):
-    """The results (R x, RESULTS) of R rows at x: y1, y1', y2, y2' from their series `coefficients` (4, R, terms) within
-    `bars` (4, R); if `even`, from those of (y1 + y2') / 2, y1', y2 and, odd, (y1 - y2') / 2.
+    """The results (R x, RESULTS) of R rows at x: y1, y1', y2, y2' from their series `coefficients`
+    (4, R, terms) within `bars` (4, R); if `even`, from those of (y1 + y2') / 2, y1', y2 and, odd,
+    (y1 - y2') / 2.
 
-    The numbers of zeros follow from `turns` (5, R, nodes), rotation numbers, and the least and the largest number of
-    zeros of y1 and of y2, at the nodes `left` and `right` of x, `share` of the way between; NaN where they do not tell.
+    The numbers of zeros follow from `turns` (5, R, nodes), rotation numbers, and the least and the
+    largest number of zeros of y1 and of y2, at the nodes `left` and `right` of x, `share` of the
+    way between; NaN where they do not tell.
     """
     _, rows, terms = coefficients.shape
     table, odd, sums = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((4, TILE))
@@ -164,12 +181,13 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
 
 @kernel
 def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full_period, results):
-    """As `factors` at points on their own, x (2, N) across and along the rows, from series `coefficients` (4, terms
-    along, terms across) of a panel within `bars` (4); the last of the four is multiplied by `scale` (N). Only the first
-    `number` (4, terms along) of the terms across count.
+    """As `factors` at points on their own, x (2, N) across and along the rows, from series
+    `coefficients` (4, terms along, terms across) of a panel within `bars` (4); the last of the four
+    is multiplied by `scale` (N). Only the first `number` (4, terms along) of the terms across
+    count.
 
-    `nodes` (4, N) are the two nodes across the rows, and the two along them, around each point, `share` (2, N) of the
-    way between, and `turns` (5, nodes across, nodes along).
+    `nodes` (4, N) are the two nodes across the rows, and the two along them, around each point,
+    `share` (2, N) of the way between, and `turns` (5, nodes across, nodes along).
     """
     _, terms, across = coefficients.shape
     table, odd, rows = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((across, TILE))
@@ -196,7 +214,12 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
             if even:
                 dy2_bar = y1_bar = y1_bar + dy2_bar * scale[at]
                 y1, dy2 = y1 + dy2 * scale[at], y1 - dy2 * scale[at]
-            own[lanes.Y1], own[lanes.DY1], own[lanes.Y2], own[lanes.DY2] = y1, sums[1, i], sums[2, i], dy2
+            own[lanes.Y1], own[lanes.DY1], own[lanes.Y2], own[lanes.DY2] = (
+                y1,
+                sums[1, i],
+                sums[2, i],
+                dy2,
+            )
             own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1]
             own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2], dy2_bar
             a, b, c, d = nodes[0, at], nodes[1, at], nodes[2, at], nodes[3, at]
@@ -213,8 +236,8 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
 
 @kernel
 def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, verdict, missed):
-    """As `discriminants` at points on their own, from the `first` on: series and x as in `points`, of one function, D,
-    within `bar`.
+    """As `discriminants` at points on their own, from the `first` on: series and x as in `points`,
+    of one function, D, within `bar`.
     """
     terms, across = coefficients.shape
     table, rows = np.empty((terms, TILE)), np.empty((across, TILE))
@@ -233,13 +256,21 @@ def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, ve
             for i in range(count):
                 sums[i] += table[k, i] * part[i]
         begin, end = first + start, first + end
-        _decide(sums, bounds, not bar <= rtol, floats[:, begin:end], rtol, verdict[begin:end], missed[begin:end])
+        _decide(
+            sums,
+            bounds,
+            not bar <= rtol,
+            floats[:, begin:end],
+            rtol,
+            verdict[begin:end],
+            missed[begin:end],
+        )
 
 
 @splice
 def _count(own, mirrored, full_period, near, beyond, m_low, m_high, d_low, d_high):
-    """Numbers of zeros, NaN where they are not known: between these of y1, and of y2, at nodes around the point, or
-    `beyond` the last. `near` is the rotation number between those of nodes.
+    """Numbers of zeros, NaN where they are not known: between these of y1, and of y2, at nodes
+    around the point, or `beyond` the last. `near` is the rotation number between those of nodes.
 
     A point -p, `mirrored`, has the rotation number of p, whose y1 is the y2' of -p.
     """

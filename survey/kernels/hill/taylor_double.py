@@ -1,10 +1,12 @@
-"""Taylor series of order 34 in double-double arithmetic, for points whose verdict float64 leaves open: 30 digits.
+"""Taylor series of order 34 in double-double arithmetic, for points whose verdict float64 leaves
+open: 30 digits.
 
-z(t) is a polynomial in a "clock", functions with their own differential equations (cos 2t; sin x, cos x and x' of a
-pendulum), whose series give that of z. The clock starts where it is known exactly and its errors do not grow, and
-runs from there to one or both ends of the half period; where it ends its values are known too, and what they miss
-is its error. Both solutions are expanded from the identity in every step. All errors travel as in
-`survey.kernels.lanes`. Domain: z analytic, with such a clock. Fixed steps; 0.2 to 1 ms for a point of moderate z.
+z(t) is a polynomial in a "clock", functions with their own differential equations (cos 2t; sin x,
+cos x and x' of a pendulum), whose series give that of z. The clock starts where it is known exactly
+and its errors do not grow, and runs from there to one or both ends of the half period; where it
+ends its values are known too, and what they miss is its error. Both solutions are expanded from the
+identity in every step. All errors travel as in `survey.kernels.lanes`. Domain: z analytic, with
+such a clock. Fixed steps; 0.2 to 1 ms for a point of moderate z.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, I.8.
 """
@@ -33,7 +35,8 @@ ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
 PHASE, DISTANCE = 1.4, 0.1
 STEP_LIMIT = 100_000
-# A step: its propagator as four double-doubles, local bounds of truncation and rounding (3), dz of the clock.
+# A step: its propagator as four double-doubles, local bounds of truncation and rounding (3), dz of
+# the clock.
 STEP = 12
 SOLUTIONS = 3
 # Of a step, relative to its size in the largest norm: sums of products, the reciprocal steps, h.
@@ -53,7 +56,9 @@ def workspace(clock):
 
 @inline
 def solutions(z, even, odd, square):
-    """Series in x = t / h of both solutions from the identity; multiplies z by `square` = h^2 and returns its size."""
+    """Series in x = t / h of both solutions from the identity; multiplies z by `square` = h^2 and
+    returns its size.
+    """
     size = 0.0
     for n in range(ORDER + 1):
         z[0, n], z[1, n] = mul((z[0, n], z[1, n]), square)
@@ -70,7 +75,9 @@ def solutions(z, even, odd, square):
 
 @inline
 def step(z, even, odd, square, reverse, out):
-    """Propagator of (y, h y') and local bounds over one step; of the step mirrored in time where `reverse`."""
+    """Propagator of (y, h y') and local bounds over one step; of the step mirrored in time where
+    `reverse`.
+    """
     size = solutions(z, even, odd, square)
     p11, p12, p21, p22 = total(even), total(odd), slope(even), slope(odd)
     if reverse:
@@ -103,7 +110,8 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
     distance of the clock from the origin, after it (side 1) or before it (-1), `p` a double-double, and returns the
     most by which |z| can move per unit of the clock's error; `miss(row, clock)` is that error at the clock's end.
 
-    Fills `out` as `survey.kernels.lanes.chain` does; `work` from `workspace`, `chain` (steps, STEP) is scratch.
+    Fills `out` as `survey.kernels.lanes.chain` does; `work` from `workspace`, `chain` (steps, STEP)
+    is scratch.
     """
     steps = before + after
     h = over(span, float(steps))

@@ -1,12 +1,16 @@
-"""Normal form of a satellite's planar motion to order 4: twist of the isoenergetic map across the plane.
+"""Normal form of a satellite's planar motion to order 4: twist of the isoenergetic map across the
+plane.
 
-H = p_beta^2/2 + p^2/(2 cos^2 beta) - rho p + W cos^2 v cos^2 beta, beta the angle from the plane, in u; along a planar
-motion of energy h the solutions beta = c1 y1 + c2 y2 of Hill's equation, z = p^2 + g, g = c0 - sin^2 x, make
+H = p_beta^2/2 + p^2/(2 cos^2 beta) - rho p + W cos^2 v cos^2 beta, beta the angle from the plane,
+in u; along a planar motion of energy h the solutions beta = c1 y1 + c2 y2 of Hill's equation, z =
+p^2 + g, g = c0 - sin^2 x, make
 
-    Q(c1, c2) = integral over a period of [(p^2/3 - g/6) beta^4 - H2 beta^2 dz/dh / 2] - T_h H2(T/2)^2 / 2
+    Q(c1, c2) = integral over a period of [(p^2/3 - g/6) beta^4 - H2 beta^2 dz/dh / 2] - T_h
+    H2(T/2)^2 / 2
 
-with H2 = (beta'^2 + z beta^2)/2 and dz/dh = 2 p xi' - sin 2x xi at constant u. By symmetry half a period suffices.
-Everything by Taylor series; the integrals by Gauss-Legendre's formula in every step.
+with H2 = (beta'^2 + z beta^2)/2 and dz/dh = 2 p xi' - sin 2x xi at constant u. By symmetry half a
+period suffices. Everything by Taylor series; the integrals by Gauss-Legendre's formula in every
+step.
 
 Source: derived in `scenes/satellite.md` ("Nonlinear stability").
 """
@@ -32,7 +36,14 @@ def _expand(state, c0, rho, series):
         series[0], series[1], series[2], series[3], series[4], series[5], series[6], series[7]
     )  # fmt: skip
     s[0], c[0], w[0] = state[0], state[1], state[2]
-    one[0], one[1], two[0], two[1], xi[0], xi[1] = state[3], state[4], state[5], state[6], state[7], state[8]
+    one[0], one[1], two[0], two[1], xi[0], xi[1] = (
+        state[3],
+        state[4],
+        state[5],
+        state[6],
+        state[7],
+        state[8],
+    )
     for n in range(ORDER):
         sw = cw = sc = ss = ww = 0.0
         for i in range(n + 1):
@@ -81,7 +92,11 @@ def _form(at, c0, rho, out):
     z, quartic = p * p + g, p * p / 3.0 - g / 6.0
     moved = 2.0 * p * slope - 2.0 * s * at[1] * xi
     # H2 = e11 c1^2 + 2 e12 c1 c2 + e22 c2^2
-    e11, e12, e22 = 0.5 * (d1 * d1 + z * y1 * y1), 0.5 * (d1 * d2 + z * y1 * y2), 0.5 * (d2 * d2 + z * y2 * y2)
+    e11, e12, e22 = (
+        0.5 * (d1 * d1 + z * y1 * y1),
+        0.5 * (d1 * d2 + z * y1 * y2),
+        0.5 * (d2 * d2 + z * y2 * y2),
+    )
     b11, b12, b22 = y1 * y1, y1 * y2, y2 * y2
     out[0] = quartic * b11 * b11 - 0.5 * moved * e11 * b11
     out[1] = 6.0 * quartic * b11 * b22 - 0.5 * moved * (e11 * b22 + 4.0 * e12 * b12 + e22 * b11)
@@ -91,7 +106,9 @@ def _form(at, c0, rho, out):
 
 @kernel
 def _half(k, half, c0, rho, finer, found):
-    """Fill `found` (12): the three coefficients of Q, sizes of their terms, y1, y1', y2, y2' at T/2, growth, steps."""
+    """Fill `found` (12): the three coefficients of Q, sizes of their terms, y1, y1', y2, y2' at
+    T/2, growth, steps.
+    """
     series, at, form = np.zeros((SERIES, ORDER + 1)), np.zeros(9), np.zeros(6)
     size = 1.0 + abs(rho) + k
     count = int(np.ceil(half * size * finer / REACH))
@@ -121,7 +138,9 @@ def _half(k, half, c0, rho, finer, found):
 
 @kernel
 def _normal(found, out):
-    """Twist and resonant coefficient from `found`, -> out (4) with bars of their rounding; NaN where not stable."""
+    """Twist and resonant coefficient from `found`, -> out (4) with bars of their rounding; NaN
+    where not stable.
+    """
     y1, d1, y2, d2 = found[6], found[7], found[8], found[9]
     noise = (16.0 + found[11]) * EPS * found[10]
     out[:] = np.nan
@@ -139,10 +158,11 @@ def _normal(found, out):
 
 @kernel
 def twists(k, half, c0, rho, out):
-    """Fill `out` (n, 4): TWIST to RESONANT_BAR, for n motions k, half periods and rho; NaN where linearly unstable.
+    """Fill `out` (n, 4): TWIST to RESONANT_BAR, for n motions k, half periods and rho; NaN where
+    linearly unstable.
 
-    The twist is d(angle per period)/dJ at constant energy, J the action across the plane; at the resonance of order 4
-    the Hamiltonian is J^2 (TWIST + RESONANT cos 4 phi)/2.
+    The twist is d(angle per period)/dJ at constant energy, J the action across the plane; at the
+    resonance of order 4 the Hamiltonian is J^2 (TWIST + RESONANT cos 4 phi)/2.
     """
     found, other = np.zeros(12), np.zeros(4)
     for i in range(len(k)):

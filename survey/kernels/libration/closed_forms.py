@@ -1,8 +1,10 @@
-"""The triangular libration point L4 of the spatial circular problem: frequencies, closed forms, nearest resonance.
+"""The triangular libration point L4 of the spatial circular problem: frequencies, closed forms,
+nearest resonance.
 
-Equation numbers are those of `scenes/libration.md`. No digit is lost from mu = 1e-100 to mu_R: s, 1 - 5v and 1 - 10v,
-which vanish at mu_R, mu1 and mu2, are made from the differences of mu and these numbers, v from the small root, and
-every factor in double-double; numerators by Horner's rule in v, since in u their leading terms cancel as v -> 0.
+Equation numbers are those of `scenes/libration.md`. No digit is lost from mu = 1e-100 to mu_R: s, 1
+- 5v and 1 - 10v, which vanish at mu_R, mu1 and mu2, are made from the differences of mu and these
+numbers, v from the small root, and every factor in double-double; numerators by Horner's rule in v,
+since in u their leading terms cancel as v -> 0.
 """
 
 import numpy as np
@@ -42,7 +44,9 @@ def store(f, which, number):
 
 @kernel
 def factors(mu, f):
-    """The FORM_FACTORS (F1)-(F6) in double-double, f[:, factor]; True where 0 < mu < mu_R, else nothing is done."""
+    """The FORM_FACTORS (F1)-(F6) in double-double, f[:, factor]; True where 0 < mu < mu_R, else
+    nothing is done.
+    """
     square = dd.times(gap(mu, MU_R), -27.0)  # s^2 = 1 - 4x
     if not (mu > 0.0 and square[0] > 0.0):
         return False
@@ -77,7 +81,8 @@ def form(row, f):
         slope = slope * v + value
         value = value * v + NUMERATORS[row, k]
         noise = noise * v + abs(value)
-    noise = ROUNDOFF * (2.0 * noise - abs(value) + v * abs(slope))  # running bound of Horner's rule; v is rounded
+    # running bound of Horner's rule; v is rounded
+    noise = ROUNDOFF * (2.0 * noise - abs(value) + v * abs(slope))
     above, below, count = 1.0, COMMON[row], 3
     for j in range(f.shape[1]):
         for _ in range(POWERS[row, j]):
@@ -114,7 +119,9 @@ def form_double(row, f):
 
 @kernel
 def closed_forms(mu, values, bars):
-    """The first closed forms (rows of `values` and `bars`) at every mu, in float64; NaN outside 0 < mu < mu_R."""
+    """The first closed forms (rows of `values` and `bars`) at every mu, in float64; NaN outside 0 <
+    mu < mu_R.
+    """
     f = np.empty((2, len(FORM_FACTORS)))
     for n in range(len(mu)):
         good = factors(mu[n], f)
@@ -134,7 +141,9 @@ def closed_forms_double(mu, values, bars):
 
 @inline
 def product(k, f):
-    """k . omega = (k1 + k3) - k1 (1 - omega1) - k2 omega2 and its error bound; 1 - omega1 = v / (1 + omega1)."""
+    """k . omega = (k1 + k3) - k1 (1 - omega1) - k2 omega2 and its error bound; 1 - omega1 = v / (1
+    + omega1).
+    """
     first = dd.times(dd.div((f[0, V], f[1, V]), dd.shifted((f[0, W1], f[1, W1]), 1.0)), -k[0])
     second = dd.times((f[0, W2], f[1, W2]), -k[1])
     integer = k[0] + k[2]
@@ -147,7 +156,8 @@ def product(k, f):
 def linear(mu, vectors, frequencies, nearest, distance):
     """omega1, omega2 (rows of `frequencies`), the index among `vectors` of the nearest resonance, |k . omega|, its bar.
 
-    The last two are rows of `distance`. NaN and -1 outside 0 < mu < mu_R. Of equals the first counts.
+    The last two are rows of `distance`. NaN and -1 outside 0 < mu < mu_R. Of equals the first
+    counts.
     """
     f = np.empty((2, len(FORM_FACTORS)))
     near = 64.0 * ROUNDOFF  # |k . omega| in float64 is good to less

@@ -1,9 +1,11 @@
-"""Closed forms of the normal form at L4, as integers: numerators in v = omega2^2, and the powers of their factors.
+"""Closed forms of the normal form at L4, as integers: numerators in v = omega2^2, and the powers of
+their factors.
 
-Each form is numerator(v) / common * product of FORM_FACTORS ** powers, with u = omega1^2 = 1 - v, x = u v, s = u - v:
-the coefficients of orders 4 and 6, their combinations a20, a11, a02 of (3.10), and D4, D6, which are the forms N and
-M of (1.4), (3.14) at (omega2, omega1, 0). For their origin, and how far they are proved, see
-`scenes/libration.md`; the combinations follow from the coefficients by exact algebra.
+Each form is numerator(v) / common * product of FORM_FACTORS ** powers, with u = omega1^2 = 1 - v, x
+= u v, s = u - v: the coefficients of orders 4 and 6, their combinations a20, a11, a02 of (3.10),
+and D4, D6, which are the forms N and M of (1.4), (3.14) at (omega2, omega1, 0). For their origin,
+and how far they are proved, see `scenes/libration.md`; the combinations follow from the
+coefficients by exact algebra.
 """
 
 import numpy as np
@@ -54,4 +56,7 @@ LABELS = NAMES[:16]  # r1^i r2^j r3^k as "ijk": the first six are of order 4, th
 DEGREE = max(len(numerator) for _, _, numerator in FORMS.values()) - 1
 COMMON = np.array([common for common, _, _ in FORMS.values()], dtype=float)
 POWERS = np.array([powers for _, powers, _ in FORMS.values()])
-NUMERATORS = np.array([[*numerator, *[0] * (DEGREE + 1 - len(numerator))] for _, _, numerator in FORMS.values()], float)
+NUMERATORS = np.array(
+    [[*numerator, *[0] * (DEGREE + 1 - len(numerator))] for _, _, numerator in FORMS.values()],
+    float,
+)

@@ -1,7 +1,8 @@
-"""Danby's problem in lanes: the monodromy of the elliptic triangular points over half a period, and its factors.
+"""Danby's problem in lanes: the monodromy of the elliptic triangular points over half a period, and
+its factors.
 
-In the true anomaly f, with r(f) = 1 / (1 + e cos f), rotated axes and the state (x, q, p, m) = (xi, eta' + xi,
-xi' - eta, -eta) (`scenes/libration_elliptic.md`):
+In the true anomaly f, with r(f) = 1 / (1 + e cos f), rotated axes and the state (x, q, p, m) = (xi,
+eta' + xi, xi' - eta, -eta) (`scenes/libration_elliptic.md`):
 
     x' = p - m      m' = x - q      q' = -x' - d2 r m      p' = -m' + d1 r x
 
@@ -24,18 +25,20 @@ TILE = 64
 VECTOR = 8
 ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
 WORST = 300.0
-# Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the sum of local
-# errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the error of each; a method's own.
+# Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the
+# sum of local errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the
+# error of each; a method's own.
 V, SUM, D1, D2, E, COLUMNS, OWN = 16, 26, 27, 28, 29, 30, 70
 COLUMN = 10
 
 
 @splice
 def chain(columns, own, v, h, e, d1, d2, out):
-    """Fill `out` (N, RESULTS) for points (e, d1, d2) (N each), all with the same steps of lengths `h` (steps).
+    """Fill `out` (N, RESULTS) for points (e, d1, d2) (N each), all with the same steps of lengths
+    `h` (steps).
 
-    `columns(v, h, work, count)` fills the rows COLUMNS.. of one step for `count` lanes, with `own` rows from OWN on
-    for itself; v = 1 + cos f at the nodes of each step (steps, nodes).
+    `columns(v, h, work, count)` fills the rows COLUMNS.. of one step for `count` lanes, with `own`
+    rows from OWN on for itself; v = 1 + cos f at the nodes of each step (steps, nodes).
     """
     steps, size = len(h), len(e)
     work = np.empty((OWN + own, TILE))
@@ -68,7 +71,9 @@ def start(work, count):
 
 @splice
 def copy(work, first, column, count):
-    """Column `column` of the step from rows first.. : forward (4) and its error, backward being the identity."""
+    """Column `column` of the step from rows first.. : forward (4) and its error, backward being the
+    identity.
+    """
     to = COLUMNS + COLUMN * column
     for i in range(count):
         for j in range(4):
@@ -123,10 +128,14 @@ def _exchanged(items):
 
 
 def _by_inverse(f, b):
-    """A row of F times B^-1 = (b22, b32, -b02, -b12; b23, b33, -b03, -b13; -b20, -b30, b00, b10; -b21, ...)."""
+    """A row of F times B^-1 = (b22, b32, -b02, -b12; b23, b33, -b03, -b13; -b20, -b30, b00, b10;
+    -b21, ...).
+    """
     through_x = [_dot(f[:2], row[2:]) for row in b]
     through_y = [_dot(f[2:], row[:2]) for row in b]
-    return [through_x[k] - through_y[k] for k in (2, 3)] + [through_y[k] - through_x[k] for k in (0, 1)]
+    return [through_x[k] - through_y[k] for k in (2, 3)] + [
+        through_y[k] - through_x[k] for k in (0, 1)
+    ]
 
 
 @splice
@@ -149,7 +158,8 @@ def finish(work, i, steps, out):
 @inline
 def bars(work, i, steps):
     """Error bounds of the entries of each row of the propagator of lane i."""
-    # Cauchy and Schwarz: V_ii sums the squares of 4 n - 3 terms, four of each step but one of the last
+    # Cauchy and Schwarz: V_ii sums the squares of 4 n - 3 terms, four of each step but one of the
+    # last
     doubt, terms = np.exp(min(work[SUM, i], WORST)), 4.0 * steps - 3.0
     e0, e1 = doubt * np.sqrt(terms * work[16, i]), doubt * np.sqrt(terms * work[20, i])
     e2, e3 = doubt * np.sqrt(terms * work[23, i]), doubt * np.sqrt(terms * work[25, i])

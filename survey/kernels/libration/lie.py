@@ -1,4 +1,5 @@
-"""Birkhoff's normal form at the triangular libration points, many mu in lock step: the plans of `lie_plan`.
+"""Birkhoff's normal form at the triangular libration points, many mu in lock step: the plans of
+`lie_plan`.
 
 A row is a coefficient in all lanes: real part, imaginary part, size and bar. `size` bounds its modulus, and `bar` the
 modulus of its error plus ROUND sizes, which covers the roundings of the products that the row enters; so a product of
@@ -12,14 +13,26 @@ from math import nan, sqrt
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration.lie_plan import CLEAR, DELTA, DIVIDE, ETA, FINISH, LINEAR, MULTIPLY, ONE, XI
+from survey.kernels.libration.lie_plan import (
+    CLEAR,
+    DELTA,
+    DIVIDE,
+    ETA,
+    FINISH,
+    LINEAR,
+    MULTIPLY,
+    ONE,
+    XI,
+)
 from survey.kernels.math import double
 from survey.kernels.math.roundoff import ROUNDOFF
 
 LANES = 32
 RE, IM, SIZE, BAR, WIDTH = 0, LANES, 2 * LANES, 3 * LANES, 4 * LANES
-ROUND = 2.2 * ROUNDOFF  # a product's roundings are 3 sqrt 2 ROUNDOFF of |C| |f| |g|, shared by two factors
-CONSTANT = 3.0 * ROUNDOFF  # beyond ROUND: a constant has four, and its product one; a quotient by a divisor, three
+# a product's roundings are 3 sqrt 2 ROUNDOFF of |C| |f| |g|, shared by two factors
+ROUND = 2.2 * ROUNDOFF
+# beyond ROUND: a constant has four, and its product one; a quotient by a divisor, three
+CONSTANT = 3.0 * ROUNDOFF
 FORMS = 1.01 * ROUNDOFF  # the linear forms' relative error: rounded double-doubles
 SLACK = 1.0 + 1e-9  # the roundings of the bars themselves
 K = (1.299038105676658, -3.5759170798963886e-17)  # 3 sqrt(3) / 4
@@ -31,8 +44,8 @@ NARROW = 1e-12  # a divisor below it is not divided by
 def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, norms):
     """values (3, M, N): real and imaginary parts and bars of the M diagonal coefficients.
 
-    norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R) or next to mu_R, and in what a
-    divisor below NARROW would enter.
+    norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R) or next to mu_R,
+    and in what a divisor below NARROW would enter.
     """
     big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), LANES))
     for first in range(0, len(mu), LANES):
@@ -68,7 +81,9 @@ def _set(row, i, re, im, relative):
 
 @kernel
 def start(mu, i, harmonics, big, divisors):
-    """Lane i: the linear forms of xi and eta in z1, z2 and conjugates, in the order of their keys, and the divisors."""
+    """Lane i: the linear forms of xi and eta in z1, z2 and conjugates, in the order of their keys,
+    and the divisors.
+    """
     s, u, v, w1, w2 = frequencies(mu if mu > 0.0 and mu <= 0.5 else nan)
     if not s[0] > LEAST:
         s = (nan, nan)
@@ -117,10 +132,23 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
         elif operation == DIVIDE:
             for t in range(first, last):
                 _divide(
-                    big[target + indices[0, t]], big[source + indices[1, t]], divisors[indices[2, t]], numbers[0, t]
+                    big[target + indices[0, t]],
+                    big[source + indices[1, t]],
+                    divisors[indices[2, t]],
+                    numbers[0, t],
                 )
         else:
-            measure(big, source, indices, first, last, norms[target, :, :, lane : lane + count], RE, IM, BAR)
+            measure(
+                big,
+                source,
+                indices,
+                first,
+                last,
+                norms[target, :, :, lane : lane + count],
+                RE,
+                IM,
+                BAR,
+            )
 
 
 @inline
@@ -143,7 +171,9 @@ def _linear(out, f, number):
     for i in range(LANES):
         re, im = out[RE + i] + number * f[RE + i], out[IM + i] + number * f[IM + i]
         out[RE + i], out[IM + i] = re, im
-        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + ROUNDOFF * (abs(re) + abs(im))
+        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + ROUNDOFF * (
+            abs(re) + abs(im)
+        )
 
 
 @inline
@@ -167,14 +197,18 @@ def _divide(out, f, divisor, sign):
 
 @inline
 def measure(big, source, weights, first, last, out, real, imaginary, bar):
-    """Sums over a degree's monomials, both conjugates, of |k_j| |F|, and their bars; where a row's parts begin."""
+    """Sums over a degree's monomials, both conjugates, of |k_j| |F|, and their bars; where a row's
+    parts begin.
+    """
     out[:] = 0.0
     for t in range(first, last):
         row = big[source + np.uint64(t - first)]
         for j in range(3):
             weight = 2.0 * float(weights[j, t])
             for i in range(out.shape[2]):
-                out[0, j, i] += weight * sqrt(row[real + i] * row[real + i] + row[imaginary + i] * row[imaginary + i])
+                out[0, j, i] += weight * sqrt(
+                    row[real + i] * row[real + i] + row[imaginary + i] * row[imaginary + i]
+                )
                 out[1, j, i] += weight * row[bar + i]
     for j in range(3):
         for i in range(out.shape[2]):

@@ -1,9 +1,11 @@
-"""Birkhoff's normal form at the triangular libration points in double-double arithmetic: the plans of `lie_plan`.
+"""Birkhoff's normal form at the triangular libration points in double-double arithmetic: the plans
+of `lie_plan`.
 
-As `lie`, with two rows for each real number: the high and the low part of a coefficient's real part and imaginary part,
-its size and its bar, both float64. `ROUND`, `CONSTANT` and the bounds of sums are those of `lie` with DIGIT, the bound
-of one operation of double-doubles, in place of float64's. What is known of the frequencies, which lose digits towards
-mu_R, enters as a relative error of the linear forms and of each divisor (`start`).
+As `lie`, with two rows for each real number: the high and the low part of a coefficient's real part
+and imaginary part, its size and its bar, both float64. `ROUND`, `CONSTANT` and the bounds of sums
+are those of `lie` with DIGIT, the bound of one operation of double-doubles, in place of float64's.
+What is known of the frequencies, which lose digits towards mu_R, enters as a relative error of the
+linear forms and of each divisor (`start`).
 """
 
 from math import inf, nan, sqrt
@@ -12,13 +14,24 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.lie import SLACK, K, frequencies, measure
-from survey.kernels.libration.lie_plan import CLEAR, DELTA, DIVIDE, ETA, FINISH, LINEAR, MULTIPLY, ONE, XI
+from survey.kernels.libration.lie_plan import (
+    CLEAR,
+    DELTA,
+    DIVIDE,
+    ETA,
+    FINISH,
+    LINEAR,
+    MULTIPLY,
+    ONE,
+    XI,
+)
 from survey.kernels.math import double
 
 LANES = 16
 RE, RE_LOW, IM, IM_LOW, SIZE, BAR = (n * LANES for n in range(6))
 WIDTH = 6 * LANES
-DIGIT = 2.0**-103  # of one operation, relative: at most 7 squares of the unit roundoff, which is 2^-53
+# of one operation, relative: at most 7 squares of the unit roundoff, which is 2^-53
+DIGIT = 2.0**-103
 ROUND = 2.2 * DIGIT
 CONSTANT = 3.0 * DIGIT
 LEAST = 1e-9  # s below it is at mu_R itself
@@ -38,7 +51,9 @@ def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, 
             row = big[diagonal[d]]
             for i in range(count):
                 values[0, d, first + i], values[1, d, first + i] = row[RE + i], row[IM + i]
-                values[2, d, first + i] = (row[BAR + i] + abs(row[RE_LOW + i]) + abs(row[IM_LOW + i])) * SLACK
+                values[2, d, first + i] = (
+                    row[BAR + i] + abs(row[RE_LOW + i]) + abs(row[IM_LOW + i])
+                ) * SLACK
 
 
 @inline
@@ -53,9 +68,10 @@ def _set(row, i, re, im, relative):
 def start(mu, i, harmonics, big, divisors):
     """As `lie.start`; a divisor's row holds its high part, its low part and its relative error.
 
-    s^2 = 1 - 27 mu (1 - mu) has an absolute error of 6 DIGIT, since its terms are at most 1. So s has the error `e`
-    below, v = (1 - s)/2 and u = 1 - v have at most 11 DIGIT + e/2, and their roots, since u >= 1/2 and v is computed
-    without cancellation, the relative error W = 14 DIGIT + e/2; the linear forms contain 1/sqrt(s) besides.
+    s^2 = 1 - 27 mu (1 - mu) has an absolute error of 6 DIGIT, since its terms are at most 1. So s
+    has the error `e` below, v = (1 - s)/2 and u = 1 - v have at most 11 DIGIT + e/2, and their
+    roots, since u >= 1/2 and v is computed without cancellation, the relative error W = 14 DIGIT +
+    e/2; the linear forms contain 1/sqrt(s) besides.
     """
     s, u, v, w1, w2 = frequencies(mu if mu > 0.0 and mu <= 0.5 else nan)
     if not s[0] > LEAST:
@@ -112,10 +128,23 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
         elif operation == DIVIDE:
             for t in range(first, last):
                 _divide(
-                    big[target + indices[0, t]], big[source + indices[1, t]], divisors[indices[2, t]], numbers[0, t]
+                    big[target + indices[0, t]],
+                    big[source + indices[1, t]],
+                    divisors[indices[2, t]],
+                    numbers[0, t],
                 )
         else:
-            measure(big, source, indices, first, last, norms[target, :, :, lane : lane + count], RE, IM, BAR)
+            measure(
+                big,
+                source,
+                indices,
+                first,
+                last,
+                norms[target, :, :, lane : lane + count],
+                RE,
+                IM,
+                BAR,
+            )
 
 
 @inline
@@ -126,8 +155,12 @@ def _multiply(out, f, g, number, sign):
         p = double.times((f[RE + i], f[RE_LOW + i]), number)
         q = double.times((f[IM + i], f[IM_LOW + i]), number * sign)
         a, b = (g[RE + i], g[RE_LOW + i]), (g[IM + i], g[IM_LOW + i])
-        re = double.add((out[RE + i], out[RE_LOW + i]), double.sub(double.mul(p, a), double.mul(q, b)))
-        im = double.add((out[IM + i], out[IM_LOW + i]), double.add(double.mul(p, b), double.mul(q, a)))
+        re = double.add(
+            (out[RE + i], out[RE_LOW + i]), double.sub(double.mul(p, a), double.mul(q, b))
+        )
+        im = double.add(
+            (out[IM + i], out[IM_LOW + i]), double.add(double.mul(p, b), double.mul(q, a))
+        )
         bar = size * (f[SIZE + i] * g[BAR + i] + f[BAR + i] * g[SIZE + i])
         out[RE + i], out[RE_LOW + i], out[IM + i], out[IM_LOW + i] = re[0], re[1], im[0], im[1]
         out[BAR + i] += bar + DIGIT * (abs(re[0]) + abs(im[0]))
@@ -143,7 +176,9 @@ def _linear(out, f, number, low):
         re = double.add((out[RE + i], out[RE_LOW + i]), re)
         im = double.add((out[IM + i], out[IM_LOW + i]), im)
         out[RE + i], out[RE_LOW + i], out[IM + i], out[IM_LOW + i] = re[0], re[1], im[0], im[1]
-        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + DIGIT * (abs(re[0]) + abs(im[0]))
+        out[BAR + i] += size * (f[BAR + i] + CONSTANT * f[SIZE + i]) + DIGIT * (
+            abs(re[0]) + abs(im[0])
+        )
 
 
 @inline
@@ -165,4 +200,7 @@ def _divide(out, f, divisor, sign):
         out[RE + i], out[RE_LOW + i], out[IM + i], out[IM_LOW + i] = re[0], re[1], im[0], im[1]
         off = 1.2 * divisor[2 * LANES + i]
         out[SIZE + i] = abs(scale[0]) * f[SIZE + i] * (1.0 + off) * SLACK
-        out[BAR + i] = abs(scale[0]) * f[BAR + i] * (1.0 + off) * SLACK + (CONSTANT + ROUND + off) * out[SIZE + i]
+        out[BAR + i] = (
+            abs(scale[0]) * f[BAR + i] * (1.0 + off) * SLACK
+            + (CONSTANT + ROUND + off) * out[SIZE + i]
+        )

@@ -1,4 +1,5 @@
-"""Which products and brackets bring a Hamiltonian at L4 to Birkhoff's normal form: made once for an order, in numpy.
+"""Which products and brackets bring a Hamiltonian at L4 to Birkhoff's normal form: made once for an
+order, in numpy.
 
 Lie transforms by chi_3, chi_4, ... in turn. With F_d the terms of degree d so far, {H2, chi_s} + (off-diagonal part of
 F_s) = 0 and F_d becomes the sum over n of ad^n F_{d - n (s - 2)} / n!, ad f = {f, chi_s}; the terms in H2 join those of
@@ -20,7 +21,8 @@ import numpy as np
 from survey.kernels.libration.monomials import brackets, monomials, norm, products
 
 CLEAR, MULTIPLY, LINEAR, FINISH, DIVIDE, MEASURE = range(6)
-XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10  # the rows set before the first operation, and the first other one
+# the rows set before the first operation, and the first other one
+XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10
 NONE = -1
 SQRT_3 = Fraction(isqrt(3 * 10**80), 10**40)  # 40 digits
 
@@ -28,11 +30,14 @@ SQRT_3 = Fraction(isqrt(3 * 10**80), 10**40)  # 40 digits
 class Plan(NamedTuple):
     """What the kernel runs: arrays."""
 
-    code: np.ndarray  # (n, 6): operation; rows of target, source and factor; first and last of the terms
+    # (n, 6): operation; rows of target, source and factor; first and last of the terms
+    code: np.ndarray
     indices: np.ndarray  # (3, T) of the terms
     numbers: (
         np.ndarray
-    )  # (2, T): of a product its factor and the sign of f; of a multiple its factor and what that lacks
+        # (2, T): of a product its factor and the sign of f; of a multiple its factor and what that
+        # lacks
+    )
     harmonics: np.ndarray  # (m, 3) of the divisors
     diagonal: np.ndarray  # rows of the normal form's coefficients
     rows: int
@@ -72,7 +77,9 @@ class Draft:
     def multiply(self, name, terms, rows, target, source, factor):
         """target += the terms' sum, for the first `rows` rows of the target."""
         first, _last = self.hold(terms[:3], terms[3:], name)
-        self.add(MULTIPLY, target, source, factor, first, first + int(np.searchsorted(terms[0], rows)))
+        self.add(
+            MULTIPLY, target, source, factor, first, first + int(np.searchsorted(terms[0], rows))
+        )
 
     def linear(self, target, source, start, stop, number):
         """Rows start to stop of the target += number times those of the source."""
@@ -86,7 +93,9 @@ class Draft:
     def plan(self, diagonal):
         indices, numbers = (np.concatenate(part, axis=1) for part in (self.indices, self.numbers))
         code, harmonics = np.array(self.code, np.int64), self.divisors.astype(float)
-        return Plan(code, indices.astype(np.uint64), numbers, harmonics, diagonal, self.rows, self.measured)
+        return Plan(
+            code, indices.astype(np.uint64), numbers, harmonics, diagonal, self.rows, self.measured
+        )
 
 
 def chain(stage, degree):
@@ -116,7 +125,9 @@ def cutoffs(order, remainders=False):
 
 
 def sources(stage, degree, limit):
-    """The part of the chain that reaches terms up to |k| <= limit; none where only {K_j, chi} does and limit is 0."""
+    """The part of the chain that reaches terms up to |k| <= limit; none where only {K_j, chi} does
+    and limit is 0.
+    """
     links = [] if limit == NONE else chain(stage, degree)
     return [] if limit == 0 and links and links[0][0] < stage else links
 
@@ -125,7 +136,8 @@ def sources(stage, degree, limit):
 def plan(order, remainders=False):
     """The `Plan` for the normal form of degrees 4, 6, ..., `order`.
 
-    With `remainders` all terms up to degree order + 1 are kept through all stages, and their norms measured.
+    With `remainders` all terms up to degree order + 1 are kept through all stages, and their norms
+    measured.
     """
     if order < 4 or order % 2:
         raise ValueError("the order of a normal form is even, and at least 4")
@@ -133,7 +145,9 @@ def plan(order, remainders=False):
     top, last = order + remainders, max(need)
     F = {d: out.allocate(rows(d, need[2][d])) for d in range(3, top + 1)}
     expand(out, F, need[2])
-    harmonics = np.concatenate([monomials(s).harmonic[monomials(s).sign > 0] for s in range(3, last + 1)])
+    harmonics = np.concatenate(
+        [monomials(s).harmonic[monomials(s).sign > 0] for s in range(3, last + 1)]
+    )
     out.divisors = np.unique(harmonics[norm(harmonics) > 0], axis=0)
     chi = out.allocate(max(len(monomials(s).keys) for s in range(3, last + 1)))
     parts = [out.allocate(max(rows(d, need[2][d]) for d in range(3, top + 1))) for _ in range(2)]
@@ -147,9 +161,14 @@ def plan(order, remainders=False):
 
 
 def solved(normal_forms, mu, order, remainders=False):
-    """What a kernel like `lie.normal_forms` gives at mu (N): values (3, M, N), {(stage, degree): norms (2, 3, N)}."""
+    """What a kernel like `lie.normal_forms` gives at mu (N): values (3, M, N), {(stage, degree):
+    norms (2, 3, N)}.
+    """
     what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
-    values, norms = np.empty((3, len(what.diagonal), mu.size)), np.empty((len(what.measured), 2, 3, mu.size))
+    values, norms = (
+        np.empty((3, len(what.diagonal), mu.size)),
+        np.empty((len(what.measured), 2, 3, mu.size)),
+    )
     normal_forms(*what[:6], mu, values, norms)
     return values, dict(zip(what.measured, norms, strict=True))
 
@@ -208,7 +227,9 @@ def measure(out, stage, top, F, wanted):
 
 
 def expand(out, F, cut):
-    """F_n, n >= 3, the Taylor expansion at L4, from products xi^i eta^j of the linear forms, degree by degree."""
+    """F_n, n >= 3, the Taylor expansion at L4, from products xi^i eta^j of the linear forms, degree
+    by degree.
+    """
     top = max(F)
     width = [max([min(m, cut[n]) for n in range(max(m, 3), top + 1) if (n - m) % 2 == 0], default=NONE)
              for m in range(top + 1)]  # fmt: skip
@@ -216,7 +237,8 @@ def expand(out, F, cut):
         width[m] = max(width[m], min(m, width[m + 1] + 1))
     count = [monomials(m, True).rows(width[m]) for m in range(top + 1)]
     size = max(count)
-    powers = [[out.allocate(size) for _ in range(top + 1)] for _ in range(2)]  # xi^i eta^(m - i), delta in odd i
+    # xi^i eta^(m - i), delta in odd i
+    powers = [[out.allocate(size) for _ in range(top + 1)] for _ in range(2)]
     pure = [ONE, *[out.allocate(size) for _ in range(2)]]  # xi^m
     for n in F:
         out.add(CLEAR, F[n], 0, 0, 0, rows(n, cut[n]))
@@ -265,14 +287,18 @@ def _collect(out, n, m, target, count, powers):
         if rational != 0 and len(at):
             number = float(rational) * (sqrt(3.0) if root else 1.0) * spread
             exact = rational * (SQRT_3 if root else 1)
-            low = [float(exact * Fraction(share) - Fraction(high)) for share, high in zip(spread, number, strict=True)]
+            low = [
+                float(exact * Fraction(share) - Fraction(high))
+                for share, high in zip(spread, number, strict=True)
+            ]
             first, last = out.hold((target + at, powers[i] + row, np.zeros(len(at))), (number, low))
             out.add(LINEAR, 0, 0, 0, first, last)
 
 
 @cache
 def potential(n, i, j):
-    """Coefficient of xi^i eta^j zeta^(n - i - j) in H_n, n >= 3, without the factor delta = 1 - 2 mu of odd i.
+    """Coefficient of xi^i eta^j zeta^(n - i - j) in H_n, n >= 3, without the factor delta = 1 - 2
+    mu of odd i.
 
     A rational number, and whether sqrt(3) is to multiply it.
 
@@ -281,14 +307,21 @@ def potential(n, i, j):
     total = Fraction(0)
     for t in range(n // 2 + 1):
         legendre = Fraction(
-            (-1) ** t * factorial(2 * n - 2 * t), 2**n * factorial(t) * factorial(n - t) * factorial(n - 2 * t)
+            (-1) ** t * factorial(2 * n - 2 * t),
+            2**n * factorial(t) * factorial(n - t) * factorial(n - 2 * t),
         )
         for a in range(t + 1):  # xi^(2 a) eta^(2 b) zeta^(2 c) of |q|^(2 t)
             b, c = (j - (n - 2 * t - (i - 2 * a))), (n - i - j) // 2
             if i < 2 * a or b < 0 or b % 2 or a + b // 2 + c != t or n - 2 * t < i - 2 * a:
                 continue
             b //= 2
-            power = n - 2 * t - (i - 2 * a)  # of eta in s^(n - 2 t); its sqrt 3 come in pairs but for one
+            # of eta in s^(n - 2 t); its sqrt 3 come in pairs but for one
+            power = n - 2 * t - (i - 2 * a)
             spread = Fraction(factorial(t), factorial(a) * factorial(b) * factorial(c))
-            total += legendre * spread * comb(n - 2 * t, power) * Fraction(3 ** (power // 2), 2 ** (n - 2 * t))
+            total += (
+                legendre
+                * spread
+                * comb(n - 2 * t, power)
+                * Fraction(3 ** (power // 2), 2 ** (n - 2 * t))
+            )
     return -((-1) ** n) * total, j % 2 == 1

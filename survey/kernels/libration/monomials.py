@@ -18,7 +18,9 @@ BASE = 64  # exponents are digits of a key
 
 @dataclass(frozen=True)
 class Monomials:
-    """All monomials of one degree: exponents (n, 6), harmonic (n, 3), representative's row, sign -1 if conjugate."""
+    """All monomials of one degree: exponents (n, 6), harmonic (n, 3), representative's row, sign -1
+    if conjugate.
+    """
 
     exponents: np.ndarray
     harmonic: np.ndarray
@@ -68,16 +70,20 @@ def monomials(degree, planar=False):
 
 @cache
 def products(degree, factor, planar=True):
-    """Terms (out, f, g, C, sign of f) of the product of polynomials of two degrees; f, out are representatives' rows,
-    g is an index among all monomials: out += C f g, where f is conjugated if its sign is -1."""
+    """Terms (out, f, g, C, sign of f) of the product of polynomials of two degrees; f, out are
+    representatives' rows, g is an index among all monomials: out += C f g, where f is conjugated if
+    its sign is -1."""
     f, g = monomials(degree, planar), monomials(factor, planar)
     together = f.exponents[:, None] + g.exponents[None]
-    return _terms(monomials(degree + factor, planar), f, together, np.ones(together.shape[:2], np.int64))
+    return _terms(
+        monomials(degree + factor, planar), f, together, np.ones(together.shape[:2], np.int64)
+    )
 
 
 @cache
 def brackets(degree, factor):
-    """As `products`: terms of the Poisson bracket {f, i g} = -sum over j of f_zj g_zbarj - f_zbarj g_zj.
+    """As `products`: terms of the Poisson bracket {f, i g} = -sum over j of f_zj g_zbarj - f_zbarj
+    g_zj.
 
     {z_j, zbar_j} = i. Of g only the monomials with k != 0 are used.
     """
@@ -95,7 +101,9 @@ def brackets(degree, factor):
 
 
 def _terms(out, f, exponents, number):
-    """Columns (out row, f row, g index, C, sign) of the pairs with number != 0 whose product is a representative."""
+    """Columns (out row, f row, g index, C, sign) of the pairs with number != 0 whose product is a
+    representative.
+    """
     i, j = np.nonzero(number)
     index = out.find(exponents[i, j])
     kept = out.sign[index] > 0

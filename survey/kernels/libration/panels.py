@@ -1,4 +1,5 @@
-"""Danby's half-period factors as Chebyshev series in two variables: y = artanh e, panel by panel, and 4 s - 3.
+"""Danby's half-period factors as Chebyshev series in two variables: y = artanh e, panel by panel,
+and 4 s - 3.
 
 A to t are entire functions of s, and analytic in y but for |Im y| >= pi / 2, where 1 + e cos f vanishes. They grow
 about as exp(2 y), then as exp(4 y), by which they are divided: on panels of length 1, the first and the others.
@@ -19,10 +20,12 @@ TERMS = 26  # in y; NODES in 4 s - 3
 
 @kernel
 def fit(results, matrix, weights, series, sizes, bars):
-    """Series (5, 2, n, n), pairs, from `results` (n^2, RESULTS of `danby_double`) at nodes, those of s inner.
+    """Series (5, 2, n, n), pairs, from `results` (n^2, RESULTS of `danby_double`) at nodes, those
+    of s inner.
 
-    `matrix` (2, n, n) makes coefficients of values; `weights` (n, 2) divide the values at the nodes by their growth.
-    `bars` (5) become the largest bounds of the values' errors, `sizes` (5) the largest of the values.
+    `matrix` (2, n, n) makes coefficients of values; `weights` (n, 2) divide the values at the nodes
+    by their growth. `bars` (5) become the largest bounds of the values' errors, `sizes` (5) the
+    largest of the values.
     """
     n = len(weights)
     along = np.empty((2, n, n))
@@ -42,7 +45,12 @@ def fit(results, matrix, weights, series, sizes, bars):
             for m in range(n):
                 s = (0.0, 0.0)
                 for i in range(n):
-                    s = dd.loose(s, dd.mul((matrix[0, k, i], matrix[1, k, i]), (along[0, i, m], along[1, i, m])))
+                    s = dd.loose(
+                        s,
+                        dd.mul(
+                            (matrix[0, k, i], matrix[1, k, i]), (along[0, i, m], along[1, i, m])
+                        ),
+                    )
                 series[j, 0, k, m], series[j, 1, k, m] = s
 
 
@@ -53,7 +61,9 @@ def artanh(x):
 
 @inline
 def position(e, middle):
-    """x in [-1, 1] of e on its panel, within 2.5 EPS; `middle` is the e in its middle and 1 - e there, pairs."""
+    """x in [-1, 1] of e on its panel, within 2.5 EPS; `middle` is the e in its middle and 1 - e
+    there, pairs.
+    """
     far, rest = dd.two_sum(e, -middle[0])
     return 2.0 * artanh((far + (rest - middle[1])) / ((1.0 - e) + e * middle[2]))
 
@@ -75,7 +85,8 @@ def panels(e, out):
 
 @kernel
 def rows(e, first, middle, coefficients, bars, series, row_bars):
-    """The series (N, 5, NODES) in 4 s - 3 of rows e, all of one panel, and bounds (N, 5) that hold for the row.
+    """The series (N, 5, NODES) in 4 s - 3 of rows e, all of one panel, and bounds (N, 5) that hold
+    for the row.
 
     `coefficients` (5, TERMS, NODES) and `bars` (5) are those of the panel, `first` is it the
     first one? `middle` see `position`.
@@ -130,7 +141,9 @@ def row(e, first, middle, coefficients, bars, series, row_bars):
             one, two = (0.0, 0.0), (0.0, 0.0)
             for k in range(n - 1, -1, -1):  # Clenshaw
                 twice = dd.scaled(dd.mul(x, one), 2.0 if k else 1.0)
-                last = dd.add((coefficients[j, 0, k, m], coefficients[j, 1, k, m]), dd.sub(twice, two))
+                last = dd.add(
+                    (coefficients[j, 0, k, m], coefficients[j, 1, k, m]), dd.sub(twice, two)
+                )
                 one, two = last, one
             series[j, 0, m], series[j, 1, m] = dd.mul(growth, one)
         row_bars[j] = 1.01 * growth[0] * bars[j]
@@ -138,7 +151,9 @@ def row(e, first, middle, coefficients, bars, series, row_bars):
 
 @kernel
 def points(e, mu, first, middle, coefficients, lengths, bars, out):
-    """Fill `out` (N, RESULTS of `traces`) for points of one panel, as `rows`; order k in y has `lengths`[k] terms."""
+    """Fill `out` (N, RESULTS of `traces`) for points of one panel, as `rows`; order k in y has
+    `lengths`[k] terms.
+    """
     in_y, in_s, sums = np.empty(TERMS), np.empty(NODES), np.empty(NODES)
     for i in range(len(e)):
         growth = (1.0 + e[i]) / (1.0 - e[i])

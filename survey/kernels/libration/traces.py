@@ -1,6 +1,8 @@
-"""Trace invariants of a reversible linear Hamiltonian system with two degrees of freedom, point by point.
+"""Trace invariants of a reversible linear Hamiltonian system with two degrees of freedom, point by
+point.
 
-With (P, S; Q, T) the propagator over half the period in canonical coordinates X, Y that the reflection maps to X, -Y:
+With (P, S; Q, T) the propagator over half the period in canonical coordinates X, Y that the
+reflection maps to X, -Y:
 
     A = det P, B = det T, C = det Q, D = det S, t = tr T'P,     A B - C D = t - 1
     a = 4 t - 4,   b = 6 - 8 t + 16 A B = 8 t - 10 + 16 C D,   K = t^2 - 4 A B = (t - 2)^2 - 4 C D
@@ -23,21 +25,27 @@ NONE, MINUS_ONE, KREIN = 0, 1, 2
 # The columns of a point's results, each with its error bound; the rows of its answers.
 A, B, C, D, T, A_BAR, B_BAR, C_BAR, D_BAR, T_BAR = range(10)
 RESULTS, INVARIANTS = 10, 5  # columns, and how many of them are values
-SUM, SUM_BAR, PAIRS, PAIRS_BAR = range(4)  # a, b: the sums of the multipliers, and of the products of two
+# a, b: the sums of the multipliers, and of the products of two
+SUM, SUM_BAR, PAIRS, PAIRS_BAR = range(4)
 NODES = 24  # of a row's series
 TILE = 64
 
 
 @kernel
 def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
-    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, RESULTS); who misses `rtol` is `missed`.
+    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, RESULTS); who misses
+    `rtol` is `missed`.
 
-    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status `overflow`.
+    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
+    `overflow`.
     """
     for i in range(len(results)):
         if status[i] == 0:
             r = results[i]
-            values, bars = (r[A], r[B], r[C], r[D], r[T]), (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR])
+            values, bars = (
+                (r[A], r[B], r[C], r[D], r[T]),
+                (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR]),
+            )
             _settle(values, bars, i, rtol, overflow, floats, verdict, collision, missed, status)
 
 
@@ -96,7 +104,8 @@ def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
 
 @inline
 def decide(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
-    """Stable: both w real, different and in (-1, 0). Certain only where the bars exclude the other answer.
+    """Stable: both w real, different and in (-1, 0). Certain only where the bars exclude the other
+    answer.
 
     `beyond` is t - 2, whose bar is that of t.
     """
@@ -121,15 +130,19 @@ def lost(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
 
 @inline
 def nearest(t, k, t_bar, k_bar):
-    """Which arc of the unit circle is the shorter: from one pair to the other, or through -1 within one pair?
+    """Which arc of the unit circle is the shorter: from one pair to the other, or through -1 within
+    one pair?
 
-    cos theta = 1 + 2 w; the arcs are theta2 - theta1 and 2 (pi - theta2), and the second is the shorter where
-    theta1 < 3 theta2 - 2 pi: where theta2 > 2 pi / 3 and cos theta1 > cos 3 theta2.
+    cos theta = 1 + 2 w; the arcs are theta2 - theta1 and 2 (pi - theta2), and the second is the
+    shorter where theta1 < 3 theta2 - 2 pi: where theta2 > 2 pi / 3 and cos theta1 > cos 3 theta2.
     """
     root, low = sqrt(max(k, 0.0)), sqrt(max(k - k_bar, 0.0))
     bar = t_bar + max(sqrt(k + k_bar) - root, root - low) + 4.0 * EPS
     one, two = t - 1.0 + root, t - 1.0 - root
-    gap, margin = one - two * (4.0 * two * two - 3.0), bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar)
+    gap, margin = (
+        one - two * (4.0 * two * two - 3.0),
+        bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar),
+    )
     if gap > margin and two < -0.5 - bar:
         return MINUS_ONE
     return KREIN if gap < -margin or two > -0.5 + bar else UNDECIDED
@@ -144,9 +157,11 @@ def place(mu):
 
 @kernel
 def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status):
-    """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3 (rows, 5, NODES).
+    """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3
+    (rows, 5, NODES).
 
-    `bars` (rows, 5) hold for the whole row; `missed` remain those that miss `rtol` or are undecided.
+    `bars` (rows, 5) hold for the whole row; `missed` remain those that miss `rtol` or are
+    undecided.
     """
     here, x = np.empty((INVARIANTS, TILE)), np.empty(TILE)
     for r in range(len(rows)):
@@ -156,7 +171,8 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, mi
             for i in range(count):
                 x[i] = place(mu[rows[r], first + i])
             for j in range(INVARIANTS):
-                for i in range(count):  # Clenshaw; NODES is a constant, so that the inner loop is unrolled
+                # Clenshaw; NODES is a constant, so that the inner loop is unrolled
+                for i in range(count):
                     one = two = 0.0
                     for n in range(NODES - 1, 0, -1):
                         one, two = series[r, j, n] + 2.0 * x[i] * one - two, one
@@ -165,4 +181,6 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, mi
                 at = rows[r] * mu.shape[1] + first + i
                 if missed[at]:
                     values = here[A, i], here[B, i], here[C, i], here[D, i], here[T, i]
-                    _settle(values, bar, at, rtol, overflow, floats, verdict, collision, missed, status)
+                    _settle(
+                        values, bar, at, rtol, overflow, floats, verdict, collision, missed, status
+                    )

@@ -53,7 +53,9 @@ def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
     b = dd.shifted(b, 6.0 if by_ab else -10.0)
     size = 1.0 + abs(t[0]) + abs(ab[0] if by_ab else cd[0])
     a_bar = MARGIN * (4.0 * t_bar + 8.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(a[0])
-    b_bar = MARGIN * (16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * PAIR_ROUNDOFF * size) + ROUNDOFF_UP * abs(b[0])
+    b_bar = MARGIN * (
+        16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar + 64.0 * PAIR_ROUNDOFF * size
+    ) + ROUNDOFF_UP * abs(b[0])
     verdict[i] = collision[i] = UNDECIDED
     missed[i] = True
     if not (isfinite(a[0]) and isfinite(b[0]) and a_bar < LARGEST and b_bar < LARGEST):
@@ -61,7 +63,12 @@ def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
         floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
         return
     status[i] = 0
-    floats[SUM, i], floats[SUM_BAR, i], floats[PAIRS, i], floats[PAIRS_BAR, i] = a[0], a_bar, b[0], b_bar
+    floats[SUM, i], floats[SUM_BAR, i], floats[PAIRS, i], floats[PAIRS_BAR, i] = (
+        a[0],
+        a_bar,
+        b[0],
+        b_bar,
+    )
     k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
     beyond = dd.shifted(t, -2.0)[0]
     verdict[i] = decide(t[0], beyond, ab[0], cd[0], k[0], t_bar, ab_bar, cd_bar, k_bar)
@@ -69,7 +76,11 @@ def _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status):
         collision[i] = lost(t[0], beyond, ab[0], cd[0], k[0], t_bar, ab_bar, cd_bar, k_bar)
     elif verdict[i] == STABLE:
         collision[i] = MINUS_ONE if (r[B] > 0.0) == (r[D] > 0.0) else nearest(t, k, t_bar, k_bar)
-    missed[i] = inaccurate(a[0], a_bar, b[0], b_bar, rtol) or verdict[i] == UNDECIDED or collision[i] == UNDECIDED
+    missed[i] = (
+        inaccurate(a[0], a_bar, b[0], b_bar, rtol)
+        or verdict[i] == UNDECIDED
+        or collision[i] == UNDECIDED
+    )
 
 
 @inline
@@ -86,8 +97,12 @@ def discriminant(t, ab, cd, t_bar, ab_bar, cd_bar):
     by_ab = abs(t[0]) * t_bar + 2.0 * ab_bar <= abs(other[0]) * t_bar + 2.0 * cd_bar
     root, last, bar = (t, ab, ab_bar) if by_ab else (other, cd, cd_bar)
     square, last = dd.square(root), dd.scaled(last, 4.0)
-    rounding = PAIR_ROUNDOFF * (4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0])))
-    return dd.sub(square, last), MARGIN * (2.0 * abs(root[0]) * t_bar + t_bar * t_bar + 4.0 * bar + rounding)
+    rounding = PAIR_ROUNDOFF * (
+        4.0 * square[0] + 2.0 * abs(last[0]) + (0.0 if by_ab else 4.0 * abs(root[0]))
+    )
+    return dd.sub(square, last), MARGIN * (
+        2.0 * abs(root[0]) * t_bar + t_bar * t_bar + 4.0 * bar + rounding
+    )
 
 
 @inline
@@ -108,7 +123,8 @@ def nearest(t, k, t_bar, k_bar):
 
 @kernel
 def to_series(results, matrix, series, bars):
-    """Chebyshev series (5, 2, NODES) of A to t and their bars (5) from results (NODES, 15) at the nodes.
+    """Chebyshev series (5, 2, NODES) of A to t and their bars (5) from results (NODES, 15) at the
+    nodes.
 
     `matrix` (2, NODES, NODES) makes coefficients of values, row by coefficient.
     """
@@ -117,14 +133,21 @@ def to_series(results, matrix, series, bars):
         for n in range(NODES):
             s = (0.0, 0.0)
             for i in range(NODES):
-                s = dd.add(s, dd.mul((matrix[0, n, i], matrix[1, n, i]), (results[i, j], results[i, LOW + j])))
+                s = dd.add(
+                    s,
+                    dd.mul(
+                        (matrix[0, n, i], matrix[1, n, i]), (results[i, j], results[i, LOW + j])
+                    ),
+                )
             series[j, 0, n], series[j, 1, n] = s
             bars[j] = max(bars[j], results[n, BARS + j])
 
 
 @kernel
 def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, missed, status):
-    """Answer all points mu (N) of a row from its series (5, 2, NODES) in 4 s - 3; the `bars` (5) hold for the row."""
+    """Answer all points mu (N) of a row from its series (5, 2, NODES) in 4 s - 3; the `bars` (5)
+    hold for the row.
+    """
     r = np.empty(BARS + INVARIANTS)
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)

@@ -3,7 +3,17 @@
 import math
 
 from survey.kernels.jit import inline, kernel
-from survey.kernels.math.double import HALF_PI, HALF_PI_REST, add, mul, neg, over, shifted, square, two_prod
+from survey.kernels.math.double import (
+    HALF_PI,
+    HALF_PI_REST,
+    add,
+    mul,
+    neg,
+    over,
+    shifted,
+    square,
+    two_prod,
+)
 
 TERMS = 15  # of the sine and of the cosine of an eighth of a turn at most
 
@@ -12,7 +22,9 @@ TERMS = 15  # of the sine and of the cosine of an eighth of a turn at most
 def radians(turns):
     """2 pi turns."""
     high, low = two_prod(4.0 * turns, HALF_PI[0])
-    return add(add((high, low), two_prod(4.0 * turns, HALF_PI[1])), (4.0 * turns * HALF_PI_REST, 0.0))
+    return add(
+        add((high, low), two_prod(4.0 * turns, HALF_PI[1])), (4.0 * turns * HALF_PI_REST, 0.0)
+    )
 
 
 @inline

@@ -1,4 +1,6 @@
-"""Numbers with running error bounds: pairs (value, bound), for formulas short enough that such bounds stay sharp."""
+"""Numbers with running error bounds: pairs (value, bound), for formulas short enough that such
+bounds stay sharp.
+"""
 
 from math import inf, sqrt
 

@@ -1,4 +1,5 @@
-"""Carlson's R_F and R_J, whose second and third argument y, z may be conjugate: m = (y + z)/2, g = sqrt(y z).
+"""Carlson's R_F and R_J, whose second and third argument y, z may be conjugate: m = (y + z)/2, g =
+sqrt(y z).
 
 By duplication, in real arithmetic; R_J for p > 0, without cancellation as p -> 0.
 
@@ -21,12 +22,22 @@ def rf(x, m, g):
         if abs(x - mean) < CLOSE * mean and abs(m - g) * (m + g) < (CLOSE * mean) ** 2:
             break
         shift = sqrt(x) * sqrt(2.0 * (m + g)) + g
-        x, m, g = 0.25 * (x + shift), 0.25 * (m + shift), 0.25 * sqrt(g * g + shift * (2.0 * m + shift))
+        x, m, g = (
+            0.25 * (x + shift),
+            0.25 * (m + shift),
+            0.25 * sqrt(g * g + shift * (2.0 * m + shift)),
+        )
     mean = (x + m + m) / 3.0
     a, b = 1.0 - x / mean, 1.0 - m / mean
     bc = b * b - (m - g) * (m + g) / (mean * mean)
     e2, e3 = bc - a * a, a * bc
-    fourth = e2 * e2 / 24.0 - 3.0 * e2 * e3 / 44.0 - 5.0 * e2**3 / 208.0 + 3.0 * e3 * e3 / 104.0 + e2 * e2 * e3 / 16.0
+    fourth = (
+        e2 * e2 / 24.0
+        - 3.0 * e2 * e3 / 44.0
+        - 5.0 * e2**3 / 208.0
+        + 3.0 * e3 * e3 / 104.0
+        + e2 * e2 * e3 / 16.0
+    )
     return (1.0 - e2 / 10.0 + e3 / 14.0 + fourth) / sqrt(mean)
 
 
@@ -59,7 +70,10 @@ def rj(x, m, g, p):
     total, factor = 0.0, 1.0
     for _ in range(STEPS):
         mean = (x + m + m + p + p) / 5.0
-        if max(abs(x - mean), abs(p - mean)) < CLOSE * mean and abs(m - g) * (m + g) < (CLOSE * mean) ** 2:
+        if (
+            max(abs(x - mean), abs(p - mean)) < CLOSE * mean
+            and abs(m - g) * (m + g) < (CLOSE * mean) ** 2
+        ):
             break
         first, pair, fourth = sqrt(x), sqrt(2.0 * (m + g)), sqrt(p)
         shift = first * pair + g
@@ -75,19 +89,29 @@ def rj(x, m, g, p):
     xyz = a * bc
     e2 = 2.0 * a * b + bc - 3.0 * c * c
     e3, e4, e5 = xyz + 2.0 * e2 * c + 4.0 * c**3, (2.0 * xyz + e2 * c + 3.0 * c**3) * c, xyz * c * c
-    series = 1.0 - 3.0 * e2 / 14.0 + e3 / 6.0 + 9.0 * e2 * e2 / 88.0 - 3.0 * e4 / 22.0 - 9.0 * e2 * e3 / 52.0
+    series = (
+        1.0
+        - 3.0 * e2 / 14.0
+        + e3 / 6.0
+        + 9.0 * e2 * e2 / 88.0
+        - 3.0 * e4 / 22.0
+        - 9.0 * e2 * e3 / 52.0
+    )
     series += 3.0 * e5 / 26.0 - e2**3 / 16.0 + 3.0 * e3 * e3 / 40.0 + 3.0 * e2 * e4 / 20.0
     return factor * series / (mean * sqrt(mean)) + 6.0 * total
 
 
 @inline
 def rj_spread(x, m, g, spread, p):
-    """As `rj`, from spread = g^2 - m^2, too: where m < 0, y and z are conjugate, and m + g may nearly cancel."""
+    """As `rj`, from spread = g^2 - m^2, too: where m < 0, y and z are conjugate, and m + g may
+    nearly cancel.
+    """
     above = m + g if m >= 0.0 else spread / (g - m)
     first, pair, fourth = sqrt(x), sqrt(2.0 * above), sqrt(p)
     shift, high = first * pair + g, above + first * pair
     root = sqrt(g * g + shift * (2.0 * m + shift)) if m >= 0.0 else sqrt(high * high + spread)
     product = (fourth + first) * (p + fourth * pair + g)
-    # the first duplication by hand; without its quarters R_J is an eighth of what it would be, and counts a quarter
+    # the first duplication by hand; without its quarters R_J is an eighth of what it would be, and
+    # counts a quarter
     rest = rj(x + shift, high, root, p + shift)
     return 6.0 / product * rc_of_one(2.0 * fourth * (p + shift) / product) + 2.0 * rest

@@ -1,10 +1,12 @@
-"""Chebyshev series: nodes, coefficients from values there, what a series may be wrong by, and its sums.
+"""Chebyshev series: nodes, coefficients from values there, what a series may be wrong by, and its
+sums.
 
-The n nodes are those of the first kind. Bits of what is kept rest on how each caller rounds cos(k theta_i), theta_i
-the angle of node i: so `to_coefficients` takes these cosines.
+The n nodes are those of the first kind. Bits of what is kept rest on how each caller rounds cos(k
+theta_i), theta_i the angle of node i: so `to_coefficients` takes these cosines.
 
-Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clenshaw's recurrence), 4.6 (discrete
-orthogonality); L. N. Trefethen, Approximation Theory and Approximation Practice (2013), theorem 15.2.
+Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clenshaw's recurrence),
+4.6 (discrete orthogonality); L. N. Trefethen, Approximation Theory and Approximation Practice
+(2013), theorem 15.2.
 """
 
 from functools import cache
@@ -47,25 +49,32 @@ def to_coefficients(cosines):
 @cache
 def by_columns(n):
     """As `to_coefficients`, transposed: from value i, the first index, to coefficient k."""
-    return to_coefficients(np.cos(np.pi * np.arange(n)[:, None] * (2 * np.arange(n) + 1) / (2 * n))).T
+    return to_coefficients(
+        np.cos(np.pi * np.arange(n)[:, None] * (2 * np.arange(n) + 1) / (2 * n))
+    ).T
 
 
 @cache
 def odd_columns(half):
-    """As `by_columns` of odd functions, from values at the first `half` nodes to the coefficients of T_{2k+1}."""
+    """As `by_columns` of odd functions, from values at the first `half` nodes to the coefficients
+    of T_{2k+1}.
+    """
     theta, k = np.pi * (2 * np.arange(half) + 1) / (4 * half), 2 * np.arange(half) + 1
     return 2 / half * np.cos(theta[:, None] * k)
 
 
 def lebesgue(degree):
-    """Bound of the Lebesgue constant of interpolation of this degree, or a lower one (Trefethen, theorem 15.2)."""
+    """Bound of the Lebesgue constant of interpolation of this degree, or a lower one (Trefethen,
+    theorem 15.2).
+    """
     return 2 / np.pi * np.log(degree + 1) + 1
 
 
 def lagrange(x, n):
     """Magnitudes (n, R) of the Lagrange polynomials of the n nodes at x (R), rounded up.
 
-    That of node i is sin(theta_i) T_n(x) / (n (x - x_i)), at most sqrt 2 (Fejer). T_n is known to within 4 n EPS.
+    That of node i is sin(theta_i) T_n(x) / (n (x - x_i)), at most sqrt 2 (Fejer). T_n is known to
+    within 4 n EPS.
     """
     theta, place = angles(n)[:, None], np.clip(x, -1.0, 1.0)
     with np.errstate(divide="ignore"):
@@ -76,10 +85,12 @@ def lagrange(x, n):
 
 @cache
 def largest_lagrange(n, parts):
-    """Bounds (parts n, n) of the magnitudes of the Lagrange polynomials of n nodes on parts of [-1, 1].
+    """Bounds (parts n, n) of the magnitudes of the Lagrange polynomials of n nodes on parts of [-1,
+    1].
 
-    Node i is in the middle of the parts from parts i on; in the angle all parts are equal. Between samples of the angle
-    a polynomial exceeds them by d^2 / 8 times its second derivative, at most n^2 sqrt 2 (Bernstein; Fejer).
+    Node i is in the middle of the parts from parts i on; in the angle all parts are equal. Between
+    samples of the angle a polynomial exceeds them by d^2 / 8 times its second derivative, at most
+    n^2 sqrt 2 (Bernstein; Fejer).
     """
     samples = 16
     angles = np.linspace(0.0, np.pi, n * parts * samples + 1)
@@ -90,7 +101,9 @@ def largest_lagrange(n, parts):
 
 
 def combined(values, matrix):
-    """values (R, n) times `matrix` (n, m; [from, to]), summed so that a row's bits do not depend on the others."""
+    """values (R, n) times `matrix` (n, m; [from, to]), summed so that a row's bits do not depend on
+    the others.
+    """
     out = np.zeros((len(values), matrix.shape[1]))
     for i, weights in enumerate(matrix):
         out += values[:, i, None] * weights
@@ -98,14 +111,16 @@ def combined(values, matrix):
 
 
 def expand(values, matrix, ulps):
-    """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its `_doubt` (R)."""
+    """The series of each row of `values` (R, n) at nodes, by `matrix` (n, n; [from, to]), and its
+    `_doubt` (R).
+    """
     series = combined(values, matrix)
     return series, _doubt(np.abs(series), ulps)
 
 
 def transform(rows, matrix, ulps):
-    """Coefficients (n, m) along the first axis of `rows`, values at nodes, by `matrix` (n, n; [from, to]), and the
-    `_doubt` (a number) of their sums over the columns.
+    """Coefficients (n, m) along the first axis of `rows`, values at nodes, by `matrix` (n, n;
+    [from, to]), and the `_doubt` (a number) of their sums over the columns.
     """
     series = np.zeros_like(rows)
     for row, weights in zip(rows, matrix, strict=True):
@@ -114,7 +129,9 @@ def transform(rows, matrix, ulps):
 
 
 def tail(sizes):
-    """What series with coefficients of these sizes (..., n) leave out and fold back, from the rate of their decay."""
+    """What series with coefficients of these sizes (..., n) leave out and fold back, from the rate
+    of their decay.
+    """
     last, before = sizes[..., -4:].max(axis=-1), sizes[..., -8:-4].max(axis=-1, initial=0.0)
     with np.errstate(invalid="ignore"):
         rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
@@ -122,9 +139,11 @@ def tail(sizes):
 
 
 def _doubt(sizes, ulps):
-    """`tail` and rounding of such series (R, n), whose argument on [-1, 1] is known to within `ulps` ulp.
+    """`tail` and rounding of such series (R, n), whose argument on [-1, 1] is known to within
+    `ulps` ulp.
 
-    Rounding is that of the transform, of Clenshaw's recurrence, and of the argument, where T_k' <= k^2.
+    Rounding is that of the transform, of Clenshaw's recurrence, and of the argument, where T_k' <=
+    k^2.
     """
     k = np.arange(sizes.shape[1])
     rounding = (sizes * (4.0 + k + (0.5 + ulps) * k * k)).sum(axis=1)
@@ -133,7 +152,9 @@ def _doubt(sizes, ulps):
 
 @kernel
 def restrict(series, x, work, out):
-    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients, by Clenshaw's recurrence; `work` is (2, m)."""
+    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients, by Clenshaw's recurrence;
+    `work` is (2, m).
+    """
     n, m = series.shape
     for r in range(len(x)):
         last, before = work[0], work[1]

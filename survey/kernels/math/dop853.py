@@ -1,11 +1,13 @@
-"""The tableau of DOP853, the Runge-Kutta pair 8(5,3) of Dormand and Prince with dense output of order 7.
+"""The tableau of DOP853, the Runge-Kutta pair 8(5,3) of Dormand and Prince with dense output of
+order 7.
 
-Stages 0..11 make the step; stage 12 is the slope at its end; 13..15 serve the dense output only. `C` nodes, `A`
-stages, `B` weights; `E5`, `E3` weights of the two error estimates, which are combined as in dop853.f:
-error = h e5^2 / sqrt(e5^2 + 0.01 e3^2); `D` dense output. All arrays have length 16, zero where unused.
+Stages 0..11 make the step; stage 12 is the slope at its end; 13..15 serve the dense output only.
+`C` nodes, `A` stages, `B` weights; `E5`, `E3` weights of the two error estimates, which are
+combined as in dop853.f: error = h e5^2 / sqrt(e5^2 + 0.01 e3^2); `D` dense output. All arrays have
+length 16, zero where unused.
 
-Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., II.5 and II.6,
-and their program dop853.f.
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.,
+II.5 and II.6, and their program dop853.f.
 """
 
 from math import sqrt
@@ -229,15 +231,24 @@ D = np.array([_row(16, entries) for entries in _D])
 
 
 def _refuse_malformed():
-    """The quadrature conditions to order 8, A 1 = C, A C = C^2/2, D(1): B A = B (1 - C), and sums of the estimates."""
+    """The quadrature conditions to order 8, A 1 = C, A C = C^2/2, D(1): B A = B (1 - C), and sums
+    of the estimates.
+    """
 
     def close(value, wanted):
         return np.allclose(value, wanted, rtol=0, atol=2e-13)
 
     quadrature = all(close(B @ C**q, 1 / (q + 1)) for q in range(ORDER))
-    stages = close(A.sum(axis=1), C) and close((A @ C)[2:], C[2:] ** 2 / 2) and close(B @ A, B * (1 - C))
+    stages = (
+        close(A.sum(axis=1), C) and close((A @ C)[2:], C[2:] ** 2 / 2) and close(B @ A, B * (1 - C))
+    )
     trees = close(B @ (A @ C**6), 1 / 56) and close(B @ (C * (A @ C**5)), 1 / 48)
-    estimates = close(E3.sum(), 0) and close(E5.sum(), 0) and close(E5 @ C, 0) and close(D.sum(axis=1)[1:], 0)
+    estimates = (
+        close(E3.sum(), 0)
+        and close(E5.sum(), 0)
+        and close(E5 @ C, 0)
+        and close(D.sum(axis=1)[1:], 0)
+    )
     if not (quadrature and stages and trees and estimates):
         raise ValueError("the DOP853 tableau is malformed")
 

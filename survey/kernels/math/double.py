@@ -1,11 +1,13 @@
 """Double-double numbers: a pair (hi, lo) of float64 whose exact sum, |lo| <= ulp(hi) / 2, carries about 31 digits.
 
-Each operation is good to a few PAIR_ROUNDOFF (`roundoff`), relative to its result. Strict floats are what makes them
-right: no fastmath, no contraction. Range: products between 1e-290 and 1e300. The error of a product takes one fused
-instruction where the processor has it and Dekker's splitting elsewhere: both are exact, so the bits are the same.
+Each operation is good to a few PAIR_ROUNDOFF (`roundoff`), relative to its result. Strict floats
+are what makes them right: no fastmath, no contraction. Range: products between 1e-290 and 1e300.
+The error of a product takes one fused instruction where the processor has it and Dekker's splitting
+elsewhere: both are exact, so the bits are the same.
 
-Sources: T. J. Dekker, Numer. Math. 18 (1971) 224 (product, split); D. H. Bailey's QD (add, div, sqrt);
-T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955 (inner products); DLMF 19.8(i) (mean).
+Sources: T. J. Dekker, Numer. Math. 18 (1971) 224 (product, split); D. H. Bailey's QD (add, div,
+sqrt); T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955 (inner products); DLMF
+19.8(i) (mean).
 """
 
 from math import sqrt as root
@@ -62,11 +64,15 @@ def _typed(context):
 def _fused(context, builder, signature, values):
     a, b, p = values
     double = ir.DoubleType()
-    fma = builder.module.declare_intrinsic("llvm.fma", (double,), ir.FunctionType(double, (double,) * 3))
+    fma = builder.module.declare_intrinsic(
+        "llvm.fma", (double,), ir.FunctionType(double, (double,) * 3)
+    )
     return builder.call(fma, [a, b, builder.fneg(p)])
 
 
-HAS_FMA = not llvm.get_process_triple().startswith(("x86", "i686")) or llvm.get_host_cpu_features().get("fma", False)
+HAS_FMA = not llvm.get_process_triple().startswith(
+    ("x86", "i686")
+) or llvm.get_host_cpu_features().get("fma", False)
 _error = fused_error if HAS_FMA else inline(split_error)
 
 
@@ -98,7 +104,9 @@ def sub(a, b):
 
 @inline
 def loose(a, b):
-    """a + b within PAIR_ROUNDOFF (|a| + |b|): half of `add`, for terms of one sign, or with errors of their own."""
+    """a + b within PAIR_ROUNDOFF (|a| + |b|): half of `add`, for terms of one sign, or with errors
+    of their own.
+    """
     s, e = two_sum(a[0], b[0])
     return quick_two_sum(s, e + (a[1] + b[1]))
 
@@ -206,7 +214,8 @@ def mean(a, b):
 def convolved(a, b, n):
     """Coefficient n of the product of two series (2, orders), hi and lo; its error is relative to the sum of |terms|.
 
-    An inner product in which the exact float64 sum of the leading parts is corrected once, at the end.
+    An inner product in which the exact float64 sum of the leading parts is corrected once, at the
+    end.
     """
     s, c = 0.0, 0.0
     for i in range(n + 1):

@@ -1,7 +1,8 @@
 """Jacobi's elliptic functions and the complete integrals, from the modulus and its complement.
 
-The complement k' = sqrt(1 - k^2) is an argument of its own, so nothing is lost as k -> 1: give it as
-sqrt((1 - k)(1 + k)), or from 1 - k where that is what is known. All by the arithmetic-geometric mean.
+The complement k' = sqrt(1 - k^2) is an argument of its own, so nothing is lost as k -> 1: give it
+as sqrt((1 - k)(1 + k)), or from 1 - k where that is what is known. All by the arithmetic-geometric
+mean.
 
 Sources: DLMF 19.8(i) and 22.20(ii); R. Bulirsch, Numer. Math. 7 (1965) 78-90 (sn, cn, dn).
 """
@@ -11,7 +12,8 @@ from math import cos, pi, sin, sqrt
 from survey.kernels.jit import inline, splice
 from survey.kernels.unroll import unroll
 
-# Convergence is quadratic: a relative gap of 1e-8 leaves 1e-17, and k' = 1e-150 gets there in eleven steps.
+# Convergence is quadratic: a relative gap of 1e-8 leaves 1e-17, and k' = 1e-150 gets there in
+# eleven steps.
 GAP = 1e-8
 MEANS = 14
 
@@ -73,7 +75,9 @@ LANES = 5
 
 @splice
 def jacobi_lanes(lanes, count, pairs, last):
-    """As `jacobi`, for `count` values u in 0..K: u in lanes[0]; sn, cn, dn in lanes[1..3]; lanes[4] is scratch."""
+    """As `jacobi`, for `count` values u in 0..K: u in lanes[0]; sn, cn, dn in lanes[1..3]; lanes[4]
+    is scratch.
+    """
     mean = 0.5 * (pairs[0, last] + pairs[1, last])
     for i in range(count):
         sine, cosine = _sine_cosine(mean * lanes[0, i])

@@ -4,8 +4,12 @@ import math
 
 from survey.kernels.jit import kernel
 
-NAMES = tuple("sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf".split())
-SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, ASINH, ACOSH, ATANH, EXP, LOG, SQRT, ERF = range(16)
+NAMES = tuple(
+    "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf".split()
+)
+SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, ASINH, ACOSH, ATANH, EXP, LOG, SQRT, ERF = range(
+    16
+)
 
 
 @kernel

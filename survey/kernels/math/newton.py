@@ -1,8 +1,9 @@
-"""Newton's method kept inside a bracket: the one loop for zeros that are simple and of whose sign both ends are known.
+"""Newton's method kept inside a bracket: the one loop for zeros that are simple and of whose sign
+both ends are known.
 
-Others differ in more than their function: `math.quartic.root` starts from parabolas and ends in double-double,
-`cylinder.returns.solved` stops at the image of another orbit, or one that is accurate enough, and keeps the last image;
-`nutation.wells.lowest` keeps its steps strictly inside.
+Others differ in more than their function: `math.quartic.root` starts from parabolas and ends in
+double-double, `cylinder.returns.solved` stops at the image of another orbit, or one that is
+accurate enough, and keeps the last image; `nutation.wells.lowest` keeps its steps strictly inside.
 """
 
 from survey.kernels.jit import inline
@@ -10,7 +11,8 @@ from survey.kernels.jit import inline
 
 @inline
 def bracketed(residual, solution, given, start, bracket, close, most):
-    """The last x in `bracket` at which the residual was evaluated, and the next one, which is the zero.
+    """The last x in `bracket` at which the residual was evaluated, and the next one, which is the
+    zero.
 
     residual(solution, given, x) -> (value, slope, does the zero lie above x?). `solution` is a kernel that the
     residual calls: within the tuple `given` it would be called through a pointer. A step that leaves the bracket is

@@ -40,7 +40,9 @@ def roughly(c, y):
 def slopes(c, y):
     """c'(y) and c''(y), in float64."""
     c1, c2, c3, c4 = c[1][0], c[2][0], c[3][0], c[4][0]
-    return c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4)), 2.0 * c2 + y * (6.0 * c3 + y * 12.0 * c4)
+    return c1 + y * (2.0 * c2 + y * (3.0 * c3 + y * 4.0 * c4)), 2.0 * c2 + y * (
+        6.0 * c3 + y * 12.0 * c4
+    )
 
 
 @kernel
@@ -55,7 +57,9 @@ def slope(c, y):
 
 @inline
 def near(height, first, second, side, room):
-    """How far from a point the parabola there has its zero on that side, as a part of `room`; 1 where it has none."""
+    """How far from a point the parabola there has its zero on that side, as a part of `room`; 1
+    where it has none.
+    """
     first *= side
     below = height <= 0.0
     height, first, second = (-height, -first, -second) if below else (height, first, second)
@@ -72,7 +76,8 @@ def near(height, first, second, side, room):
 
 @kernel
 def root(c, inside, outside):
-    """The root between `inside`, where c >= 0, and `outside`, where c <= 0; with a bound of its error.
+    """The root between `inside`, where c >= 0, and `outside`, where c <= 0; with a bound of its
+    error.
 
     Newton's method between brackets, from the nearer of the zeros of the parabolas at the ends.
     """
@@ -83,7 +88,11 @@ def root(c, inside, outside):
     from_inside = near(high, first, second, side, room)
     first, second = slopes(c, outside)
     from_outside = near(low, first, second, -side, room)
-    y = inside + side * room * from_inside if from_inside < from_outside else outside - side * room * from_outside
+    y = (
+        inside + side * room * from_inside
+        if from_inside < from_outside
+        else outside - side * room * from_outside
+    )
     y = y if y != inside else 0.5 * (inside + outside)
     for _ in range(STEPS):
         height, _size = roughly(c, y)
@@ -112,4 +121,6 @@ def root(c, inside, outside):
         pair = add(pair, (-move, 0.0))
         if abs(move * move * second) <= PAIR_SUM_ROUNDOFF * abs(pair[0] * first):
             break
-    return pair, 2.0 * PAIR_SUM_ROUNDOFF * (size / abs(first) + abs(pair[0])) if first != 0.0 else 1.0
+    return pair, 2.0 * PAIR_SUM_ROUNDOFF * (
+        size / abs(first) + abs(pair[0])
+    ) if first != 0.0 else 1.0

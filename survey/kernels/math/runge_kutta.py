@@ -1,7 +1,9 @@
-"""The steps of explicit Runge-Kutta methods, once for all systems; the bits are those of the loops written out.
+"""The steps of explicit Runge-Kutta methods, once for all systems; the bits are those of the loops
+written out.
 
-Three stay apart: two that round in another order, rk4's step of Hill's equation and dop853's of the flow; and dop853's
-of Hill's equation, written out, which leaves out the zeros of the tableau and is faster.
+Three stay apart: two that round in another order, rk4's step of Hill's equation and dop853's of the
+flow; and dop853's of Hill's equation, written out, which leaves out the zeros of the tableau and is
+faster.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1.
 """
@@ -12,7 +14,9 @@ from survey.kernels.unroll import unroll
 
 @inline
 def classical(slope, given, at, y, h):
-    """One step of order 4 of y' = slope(given, t, y), tuples of float64; `at`: t at its start, middle and end."""
+    """One step of order 4 of y' = slope(given, t, y), tuples of float64; `at`: t at its start,
+    middle and end.
+    """
     half, sixth = 0.5 * h, h / 6.0
     first = slope(given, at[0], y)
     second = slope(given, at[1], _moved(y, half, first))
@@ -33,9 +37,11 @@ def _gathered(y, sixth, first, second, third, fourth):
 
 @inline
 def fundamental(A, stages, slope, given, n, h, state, slopes):
-    """Fill `slopes` (stages, n n) of the fundamental matrix of a linear system, by columns, from the identity.
+    """Fill `slopes` (stages, n n) of the fundamental matrix of a linear system, by columns, from
+    the identity.
 
-    slope(given, i, state, out) fills `out` (n n) with the slopes of `state` (n n; scratch) at stage i of the tableau A.
+    slope(given, i, state, out) fills `out` (n n) with the slopes of `state` (n n; scratch) at stage
+    i of the tableau A.
     """
     for i in range(stages):
         for k in range(n * n):

@@ -1,4 +1,6 @@
-"""sin and cos of a float64 in double-double: a table on a grid of 1/16, where the rest is exact, and Taylor series."""
+"""sin and cos of a float64 in double-double: a table on a grid of 1/16, where the rest is exact,
+and Taylor series.
+"""
 
 from fractions import Fraction
 from math import factorial
@@ -44,7 +46,9 @@ def _small(a, b):
 
 @inline
 def sin_cos(x):
-    """sin x and cos x of 0 <= x <= LARGEST, to a few units of 2^-104; relative, where sin x is small with x."""
+    """sin x and cos x of 0 <= x <= LARGEST, to a few units of 2^-104; relative, where sin x is
+    small with x.
+    """
     j = int(x * GRID + 0.5)
     r = x - j / GRID  # exact
     z = two_prod(r, r)

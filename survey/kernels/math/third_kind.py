@@ -1,6 +1,7 @@
 """Complete elliptic integrals by the arithmetic-geometric mean, their sums free of cancellation.
 
-For x, y > 0 and M their mean: R_F(0, x^2, y^2) = pi / (2 M), R_J(0, x^2, y^2, p^2) = 3 pi R / (4 M p^2).
+For x, y > 0 and M their mean: R_F(0, x^2, y^2) = pi / (2 M), R_J(0, x^2, y^2, p^2) = 3 pi R / (4 M
+p^2).
 
 Source: DLMF 19.8(i), 19.22(ii).
 """
@@ -32,10 +33,12 @@ def mean(x, y):
 
 @inline
 def third(x, y, square):
-    """R = 1 + e_0/2 (1 + e_1/2 (1 + ..)), e = (p^2 - x y)/(p^2 + x y), p^2 = `square`, without cancellation.
+    """R = 1 + e_0/2 (1 + e_1/2 (1 + ..)), e = (p^2 - x y)/(p^2 + x y), p^2 = `square`, without
+    cancellation.
 
-    Where p^2 < x y the sum that is complementary, with p' = x y / p for p; where p' is large, what follows once x = y
-    is in closed form: R = 2 p / (x + p), from R_J(0, x^2, x^2, p^2) = 3 pi / (2 (x^2 p + x p^2)) (DLMF 19.20.8).
+    Where p^2 < x y the sum that is complementary, with p' = x y / p for p; where p' is large, what
+    follows once x = y is in closed form: R = 2 p / (x + p), from R_J(0, x^2, x^2, p^2) = 3 pi / (2
+    (x^2 p + x p^2)) (DLMF 19.20.8).
     """
     low = square < x * y
     if low:
@@ -75,7 +78,9 @@ def third_double(x, y, square):
             squared = dd.mul(p, p)
             size = dd.add(squared, xy)
             e = dd.div(dd.sub(squared, xy), size)
-            total = dd.add(total, dd.mul(weight, dd.div(dd.times(xy, 2.0), size)) if low else weight)
+            total = dd.add(
+                total, dd.mul(weight, dd.div(dd.times(xy, 2.0), size)) if low else weight
+            )
             weight = dd.times(dd.mul(weight, e), 0.5)
             p = dd.div(size, dd.times(p, 2.0))
             going = abs(weight[0]) > TINIEST * total[0]

@@ -1,9 +1,12 @@
-"""The action of a nutation, 1/pi times the integral of sqrt P/(1 - u^2), as a sum of positive terms: nothing cancels.
+"""The action of a nutation, 1/pi times the integral of sqrt P/(1 - u^2), as a sum of positive
+terms: nothing cancels.
 
-Small wells off poles and other roots of P by Gauss-Chebyshev quadrature (S15), all others by the trapezoidal rule in a
-variable that keeps every singularity pi away from the real line, wherever roots and poles are (S22).
+Small wells off poles and other roots of P by Gauss-Chebyshev quadrature (S15), all others by the
+trapezoidal rule in a variable that keeps every singularity pi away from the real line, wherever
+roots and poles are (S22).
 
-Source: DLMF 3.5(i), (v); L. N. Trefethen, J. A. C. Weideman, SIAM Review 56 (2014) 385; `scenes/brun.md`.
+Source: DLMF 3.5(i), (v); L. N. Trefethen, J. A. C. Weideman, SIAM Review 56 (2014) 385;
+`scenes/brun.md`.
 """
 
 from math import pi, sqrt
@@ -19,7 +22,8 @@ from survey.kernels.nutation import wells as nu
 ROUGH = 2e-13  # bars of (S14), relative, beyond which the action is a sum
 NODES = 16
 _COSINES = nodes(NODES)
-# (S22): nodes w = STEP n, DOWN <= n <= UP; there c, 1 - c^2, (1 + c)/2, (1 - c)/2, and the weight c s^3
+# (S22): nodes w = STEP n, DOWN <= n <= UP; there c, 1 - c^2, (1 + c)/2, (1 - c)/2, and the weight c
+# s^3
 STEP, DOWN, UP = 0.3125, -256, 320
 NEGLIGIBLE = 1e-19
 _RISE = np.exp(STEP * np.arange(DOWN, UP + 1))
@@ -48,14 +52,17 @@ def small(row, root_low, root_high):
     for i in range(NODES):
         up, down = 0.5 * (1.0 + _COSINES[i]), 0.5 * (1.0 - _COSINES[i])
         q = low * down + high * up - k * width * width * up * down
-        rest = (row[nu.LOW_PLUS] * down + row[nu.HIGH_PLUS] * up) * (row[nu.LOW_MINUS] * down + row[nu.HIGH_MINUS] * up)
+        rest = (row[nu.LOW_PLUS] * down + row[nu.HIGH_PLUS] * up) * (
+            row[nu.LOW_MINUS] * down + row[nu.HIGH_MINUS] * up
+        )
         result += up * down * sqrt(q) / rest
     return width * width * result / NODES
 
 
 @kernel
 def positive(width, roots, square, at_plus, at_minus, noise):
-    """The action by (S22), and what relative errors `noise` of Q at both turning points and of `square` change.
+    """The action by (S22), and what relative errors `noise` of Q at both turning points and of
+    `square` change.
 
     roots: of Q at ul, uh; square = (s + g)/2; at_plus, at_minus: 1 - u and 1 + u of ul, uh.
     """
@@ -71,7 +78,9 @@ def positive(width, roots, square, at_plus, at_minus, noise):
             wl, wh, vl, vh = high * near, low * far, high * far, low * near
             one, other = wl + wh, vl + vh
             one *= one * (at_plus[0] * wl + at_plus[1] * wh) * (at_minus[0] * wl + at_minus[1] * wh)
-            other *= other * (at_plus[0] * vl + at_plus[1] * vh) * (at_minus[0] * vl + at_minus[1] * vh)
+            other *= (
+                other * (at_plus[0] * vl + at_plus[1] * vh) * (at_minus[0] * vl + at_minus[1] * vh)
+            )
             part = _WEIGHT[i] * sqrt(level) / (one * other)
             term = part * (one + other)
             if noisy:
@@ -96,22 +105,37 @@ def action(row):
     value = small(row, low, high)
     if value >= 0.0:
         return value, (64.0 * ROUNDOFF + noise + 2.5 * row[nu.NOISE_WIDTH]) * value
-    at_plus, at_minus = (row[nu.LOW_PLUS], row[nu.HIGH_PLUS]), (row[nu.LOW_MINUS], row[nu.HIGH_MINUS])
+    at_plus, at_minus = (
+        (row[nu.LOW_PLUS], row[nu.HIGH_PLUS]),
+        (row[nu.LOW_MINUS], row[nu.HIGH_MINUS]),
+    )
     square = 0.5 * nu.above(row, low * high)
     noise = row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
     value, moved = positive(width, (low, high), square, at_plus, at_minus, noise)
-    return value, 64.0 * ROUNDOFF * value + moved + 2.0 * (row[nu.NOISE_WIDTH] + row[nu.NOISE_ENDS]) * value
+    return value, 64.0 * ROUNDOFF * value + moved + 2.0 * (
+        row[nu.NOISE_WIDTH] + row[nu.NOISE_ENDS]
+    ) * value
 
 
 @kernel
 def mend(work, answers):
-    """In a tile of `lanes`: (S22) for those actions among `answers` whose terms cancel, small wells' apart."""
+    """In a tile of `lanes`: (S22) for those actions among `answers` whose terms cancel, small
+    wells' apart.
+    """
     for i in range(nl.TILE):
         value, bar, width = answers[nl.ACTION + i], answers[nl.ACTION_BAR + i], work[nl.WIDTH + i]
         if work[nl.GOOD + i] != 2.0 or work[nl.SMALL_ACTION + i] > 0.0 or bar <= ROUGH * abs(value):
             continue
         blur = (work[nl.BAR_V + i] + work[nl.BAR_W + i]) / width
         roots = (sqrt(work[nl.Q_LOW + i]), sqrt(work[nl.Q_HIGH + i]))
-        at_plus, at_minus = (work[nl.V_LOW + i], work[nl.V_HIGH + i]), (work[nl.W_LOW + i], work[nl.W_HIGH + i])
-        value, _moved = positive(width, roots, 0.5 * work[nl.ABOVE + i], at_plus, at_minus, (0.0, 0.0, 0.0))
-        answers[nl.ACTION + i], answers[nl.ACTION_BAR + i] = value, (66.0 * ROUNDOFF + 4.0 * blur) * value
+        at_plus, at_minus = (
+            (work[nl.V_LOW + i], work[nl.V_HIGH + i]),
+            (work[nl.W_LOW + i], work[nl.W_HIGH + i]),
+        )
+        value, _moved = positive(
+            width, roots, 0.5 * work[nl.ABOVE + i], at_plus, at_minus, (0.0, 0.0, 0.0)
+        )
+        answers[nl.ACTION + i], answers[nl.ACTION_BAR + i] = (
+            value,
+            (66.0 * ROUNDOFF + 4.0 * blur) * value,
+        )

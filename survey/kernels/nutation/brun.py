@@ -1,4 +1,6 @@
-"""Initial states and scaled integrals of Brun's problem -> the wells of `wells.py` beside it, all in double-double."""
+"""Initial states and scaled integrals of Brun's problem -> the wells of `wells.py` beside it, all
+in double-double.
+"""
 
 from math import cos, sin, sqrt
 
@@ -64,7 +66,8 @@ def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
 def phase(row, theta, p_theta, start):
     """Fill `start`: the columns DONE to START_BAR of `records`.
 
-    The smaller part comes from P(u0) = (sin theta p_theta)^2 where that loses fewer digits than the difference does.
+    The smaller part comes from P(u0) = (sin theta p_theta)^2 where that loses fewer digits than the
+    difference does.
     """
     sine, cosine = sin(0.5 * theta), cos(0.5 * theta)
     v, w = 2.0 * sine * sine, 2.0 * cosine * cosine
@@ -79,7 +82,10 @@ def phase(row, theta, p_theta, start):
     bow = row[K] * width * width * left * done
     size = row[Q_LOW] * left + row[Q_HIGH] * done
     start[rc.START_BAR] = 8.0 * ROUNDOFF * min(v, w)
-    q, moved = size - bow, (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[rc.START_BAR] / width
+    q, moved = (
+        size - bow,
+        (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[rc.START_BAR] / width,
+    )
     rough = 16.0 * ROUNDOFF * (size + abs(bow)) + moved
     if q > 4.0 * rough:  # done left = c, done + left = 1
         c = (2.0 * sine * cosine * p_theta / width) ** 2 / q
@@ -96,9 +102,11 @@ def phase(row, theta, p_theta, start):
 
 @kernel
 def measure(row, start, c, u, theta, p_theta):
-    """WIDTH of a narrow well, where its turning points leave few digits of it, from P and P' at the start.
+    """WIDTH of a narrow well, where its turning points leave few digits of it, from P and P' at the
+    start.
 
-    There P = (sin theta p_theta)^2 = (u - ul)(uh - u) Q, and P' gives ul + uh - 2 u: (uh - ul)^2 by positive terms.
+    There P = (sin theta p_theta)^2 = (u - ul)(uh - u) Q, and P' gives ul + uh - 2 u: (uh - ul)^2 by
+    positive terms.
     """
     k, width, done, left = row[K], row[WIDTH], start[rc.DONE], start[rc.LEFT]
     height, steep = (2.0 * sin(0.5 * theta) * cos(0.5 * theta) * p_theta) ** 2, slope(c, u)[0]
@@ -115,7 +123,9 @@ def measure(row, start, c, u, theta, p_theta):
     bar = PAIR_SUM_ROUNDOFF * terms / q + 8.0 * ROUNDOFF * abs(offset)
     noise = 1.0
     if square > 0.0:
-        noise = 16.0 * ROUNDOFF + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square
+        noise = (
+            16.0 * ROUNDOFF + row[NOISE_LOW] + row[NOISE_HIGH] + bar * (abs(offset) + bar) / square
+        )
         noise += bends * bends * start[rc.START_BAR] / width
     if noise < row[NOISE_WIDTH]:
         row[WIDTH], row[NOISE_WIDTH] = sqrt(square), noise
@@ -125,18 +135,22 @@ def measure(row, start, c, u, theta, p_theta):
 def of_states(points, rows, kinds, count, heights, starts):
     """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
 
-    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a separatrix), heights
-    (n, HEIGHT) and starts (n, START), with the columns of `records`.
+    Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a
+    separatrix), heights (n, HEIGHT) and starts (n, START), with the columns of `records`.
     """
     both, two = np.empty((2, SIZE)), np.empty(2, np.int64)
     for i in range(len(points)):
         size_a, size_c, epsilon, theta, p_theta, b, a = points[i]
-        k, level, at_plus, at_minus, u, inside = of_state(size_a, size_c, epsilon, theta, p_theta, b, a)
+        k, level, at_plus, at_minus, u, inside = of_state(
+            size_a, size_c, epsilon, theta, p_theta, b, a
+        )
         if not inside:
             kinds[i] = LOST
             continue
         rough = abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0]
-        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR] = find(a, b, k, level, at_plus, at_minus, rough, both, two)
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR] = find(
+            a, b, k, level, at_plus, at_minus, rough, both, two
+        )
         heights[i, rc.FIELD] = abs(k[0])
         well = 1 if two[1] != NONE and u[0] > 0.5 * (both[0, HIGH] + both[1, LOW]) else 0
         count[i] = (two[0] != NONE) + (two[1] != NONE) if two[0] != SEPARATRIX else -1
@@ -151,7 +165,9 @@ def of_states(points, rows, kinds, count, heights, starts):
 
 @kernel
 def of_integrals(points, sign, rows, kinds, heights):
-    """As `of_states`, at (l, alpha, beta), where A = 1 and k = `sign`: both wells, rows (n, 2, SIZE), kinds (n, 2)."""
+    """As `of_states`, at (l, alpha, beta), where A = 1 and k = `sign`: both wells, rows (n, 2,
+    SIZE), kinds (n, 2).
+    """
     k = (sign, 0.0)
     for i in range(len(points)):
         level, a, b = points[i]
@@ -174,12 +190,18 @@ def heights_of_states(points, heights):
         )
         loose = looseness(a, b, abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0])
         found = barrier(a, b, k, about_equator(a, b, level, k), loose, at_plus[0], at_minus[0])
-        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR], heights[i, rc.FIELD] = found[0], found[1], abs(k[0])
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR], heights[i, rc.FIELD] = (
+            found[0],
+            found[1],
+            abs(k[0]),
+        )
 
 
 @kernel
 def saddles_of_states(points, u, bars):
-    """u of the saddle at the momenta of each state, in columns (7, n), and its bar; NaN where there is none."""
+    """u of the saddle at the momenta of each state, in columns (7, n), and its bar; NaN where there
+    is none.
+    """
     for i in range(len(u)):
         b, a = points[5, i], points[6, i]
         k = points[2, i] * points[0, i] * (points[0, i] - points[1, i])
@@ -193,7 +215,18 @@ def heights_of_integrals(points, heights):
     """As `heights_of_states`, for the columns (l, sign, -, -, -, beta, alpha)."""
     for i in range(len(heights)):
         level, sign, b, a = points[0, i], points[1, i], points[5, i], points[6, i]
-        pair, k, high, product = (level, 0.0), (sign, 0.0), dd.two_sum(level, sign), dd.two_prod(a, b)
+        pair, k, high, product = (
+            (level, 0.0),
+            (sign, 0.0),
+            dd.two_sum(level, sign),
+            dd.two_prod(a, b),
+        )
         at_plus, at_minus = dd.sub(high, product)[0], dd.add(high, product)[0]
-        found = barrier(a, b, k, about_equator(a, b, pair, k), looseness(a, b, 0.0), at_plus, at_minus)
-        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR], heights[i, rc.FIELD] = found[0], found[1], 1.0
+        found = barrier(
+            a, b, k, about_equator(a, b, pair, k), looseness(a, b, 0.0), at_plus, at_minus
+        )
+        heights[i, rc.ABOVE], heights[i, rc.ABOVE_BAR], heights[i, rc.FIELD] = (
+            found[0],
+            found[1],
+            1.0,
+        )

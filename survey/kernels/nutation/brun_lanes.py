@@ -1,7 +1,8 @@
-"""As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, lastly in double-double.
+"""As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, lastly
+in double-double.
 
-Points are columns of GIVEN numbers: A, C, epsilon, theta0, p_theta0, b, a; or l, the sign of k, -1 for the lower of two
-wells and 1 for the upper one, C/A, nothing, b, a.
+Points are columns of GIVEN numbers: A, C, epsilon, theta0, p_theta0, b, a; or l, the sign of k, -1
+for the lower of two wells and 1 for the upper one, C/A, nothing, b, a.
 """
 
 import numpy as np
@@ -13,7 +14,8 @@ from survey.kernels.nutation import lanes as nl
 from survey.kernels.nutation.brun import of_state
 from survey.kernels.nutation.lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, B, finish, store
 
-# steps of Laguerre's method and of Newton's, means; at first from the initial state or from the poles
+# steps of Laguerre's method and of Newton's, means; at first from the initial state or from the
+# poles
 FEW, FEW_FROM_POLES, MORE, MOST = (3, 1, 8), (6, 1, 8), (12, 1, 12), (30, 4, 26)
 LEFT, CANCELLED, DONE = 0, 1, 2
 
@@ -34,7 +36,13 @@ def states(work):
     for i in range(TILE):
         b, a = work[B + i], work[A + i]
         k, level, at_plus, at_minus, u, inside = of_state(
-            work[i], work[TILE + i], work[2 * TILE + i], work[3 * TILE + i], work[4 * TILE + i], b, a
+            work[i],
+            work[TILE + i],
+            work[2 * TILE + i],
+            work[3 * TILE + i],
+            work[4 * TILE + i],
+            b,
+            a,
         )
         polynomial(work, (k[0] if inside else np.nan, k[1]), level, at_plus, at_minus, i)
         work[nl.U + i] = u[0]
@@ -138,7 +146,8 @@ def in_state(done, low, high, which):
 def answer(polynomials, fill, known_u, points, actions, out, wells, done):
     """Tile after tile: the polynomials of its points, their wells, and their answers.
 
-    All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that is asked for.
+    All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that
+    is asked for.
     """
     work, answers = np.zeros(lanes_double.ALL), np.empty(OUTPUTS * TILE)
     left = which = np.arange(len(done))
@@ -183,7 +192,8 @@ def compile_others():
 
 @kernel
 def of_states(points, actions, out, wells, done):
-    """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are DONE (n).
+    """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are
+    DONE (n).
 
     actions: accurate ones of small wells.
     """

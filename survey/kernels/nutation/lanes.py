@@ -1,8 +1,10 @@
-"""Single wells off separatrices, poles and double roots, many at once: what `brun` and `agm` do, lanes innermost.
+"""Single wells off separatrices, poles and double roots, many at once: what `brun` and `agm` do,
+lanes innermost.
 
-The formulas, the double-double set-up and the bars are those of `wells.py` beside it and of `methods/agm.py`; a lane is
-done only where every number of its set-up is proved to be right to an eighth of a rounding and where the fixed numbers
-of steps suffice: otherwise it is left to them. A lane's bits do not depend on its neighbours.
+The formulas, the double-double set-up and the bars are those of `wells.py` beside it and of
+`methods/agm.py`; a lane is done only where every number of its set-up is proved to be right to an
+eighth of a rounding and where the fixed numbers of steps suffice: otherwise it is left to them. A
+lane's bits do not depend on its neighbours.
 """
 
 from math import copysign, pi, sqrt
@@ -17,7 +19,9 @@ GIVEN = 7  # rows of what is given
 # The outputs of a nutation, and the rows of a tile that hold them, then their bars.
 NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 U_MIN, U_MAX, PERIOD, PRECESSION, SPIN, ACTION = range(0, 6 * TILE, TILE)
-U_MIN_BAR, U_MAX_BAR, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(6 * TILE, 12 * TILE, TILE)
+U_MIN_BAR, U_MAX_BAR, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(
+    6 * TILE, 12 * TILE, TILE
+)
 OUTPUTS = 12
 RIGHT = 0.125 * ROUNDOFF  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
@@ -30,7 +34,8 @@ COSINES = nodes(NODES)
 B, A = 5 * TILE, 6 * TILE
 # pairs: k, L, L + k - a b, L + k + a b, b - a, b + a
 K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
-# pairs: 1 - u and 1 + u of both turning points (first, roughly, of those beside their poles), ul + uh
+# pairs: 1 - u and 1 + u of both turning points (first, roughly, of those beside their poles), ul +
+# uh
 V_HIGH, W_LOW, V_LOW, W_HIGH, SUM = range(19 * TILE, 29 * TILE, 2 * TILE)
 # pairs: Q at the turning points, s of (S5), 4 q0 - k S^2
 Q_LOW, Q_HIGH, MIDDLE, BEND = range(29 * TILE, 37 * TILE, 2 * TILE)
@@ -40,10 +45,13 @@ U, LOW, HIGH, WIDTH, ABOVE, LEVEL, GOOD, WELLS = range(37 * TILE, 45 * TILE, TIL
 X, Y, WEIGHT, SERIES = range(45 * TILE, 49 * TILE, TILE)  # the mean
 # Both poles: the charts, see `chart`; then the sums R: 1 - e, weight, total, 1 if complementary
 UP, DOWN = 49 * TILE, 54 * TILE
-LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)  # l of (S11) at the poles, and its slope
-# the sum and the difference of the parts of both poles, with all their digits, and their relative error (0: unknown)
+# l of (S11) at the poles, and its slope
+LINE_UP, LINE_DOWN, INCLINE = range(59 * TILE, 62 * TILE, TILE)
+# the sum and the difference of the parts of both poles, with all their digits, and their relative
+# error (0: unknown)
 FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
-BAR_V, BAR_W, SMALL_ACTION = range(65 * TILE, 68 * TILE, TILE)  # of the first two pairs; (S15), where it is known
+# of the first two pairs; (S15), where it is known
+BAR_V, BAR_W, SMALL_ACTION = range(65 * TILE, 68 * TILE, TILE)
 # the roots of Q at the turning points, P at U
 ROOT_LOW, ROOT_HIGH, HERE = range(68 * TILE, 71 * TILE, TILE)
 ROWS = 71
@@ -70,7 +78,9 @@ def halley(c0, c1, c2, c3, c4, y):
 
 @inline
 def residual(c0, c1, c2, c3, c4, y):
-    """c(y) at a float64, by Horner's rule with the error of each operation: to a few 2^-98 of the sum of |terms|."""
+    """c(y) at a float64, by Horner's rule with the error of each operation: to a few 2^-98 of the
+    sum of |terms|.
+    """
     s, e = c4
     for high, low in (c3, c2, c1, c0):
         p, q = dd.two_prod(s, y)
@@ -81,15 +91,22 @@ def residual(c0, c1, c2, c3, c4, y):
 
 @inline
 def polished(c0, c1, c2, c3, c4, x):
-    """The root near x as a pair, by Newton's step and the second order of its error, and a bound of what is left."""
+    """The root near x as a pair, by Newton's step and the second order of its error, and a bound of
+    what is left.
+    """
     a0, a1, a2, a3, a4 = abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
-    size, steep = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))), a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
+    size, steep = (
+        a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))),
+        a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4)),
+    )
     first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
     second = 2.0 * c2[0] + x * (6.0 * c3[0] + x * 12.0 * c4[0])
     inverse = 1.0 / first
     move, size_inverse = residual(c0, c1, c2, c3, c4, x) * inverse, abs(inverse)
     turn = 0.5 * move * second * inverse
-    rest = 4.0 * turn * turn + size_inverse * (8.0 * ROUNDOFF * steep + 2.0 * move * move * (a3 + 9.0 * a4))
+    rest = 4.0 * turn * turn + size_inverse * (
+        8.0 * ROUNDOFF * steep + 2.0 * move * move * (a3 + 9.0 * a4)
+    )
     bar = 2.0 * PAIR_SUM_ROUNDOFF * (size * size_inverse + x) + abs(move) * rest
     return dd.quick_two_sum(x, -move * (1.0 + turn)), bar
 
@@ -118,14 +135,24 @@ def chart(work, row, at, here, slope, i):
     """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; and where to start."""
     k, u = work[K + i], 1.0 - at
     bend = (k - work[L + i]) - 6.0 * k * u * u
-    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = at, here, slope, bend
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
+        at,
+        here,
+        slope,
+        bend,
+    )
     work[row + 4 * TILE + i] = first_step(here, slope, bend, at)
 
 
 @inline
 def step(method, work, row, i):
     """A step towards a turning point."""
-    at, here, slope, bend = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i]
+    at, here, slope, bend = (
+        work[row + i],
+        work[row + TILE + i],
+        work[row + 2 * TILE + i],
+        work[row + 3 * TILE + i],
+    )
     k = work[K + i]
     y = method(here, slope, bend, 4.0 * k * (1.0 - at), -k, work[row + 4 * TILE + i])
     work[row + 4 * TILE + i] = min(max(y, -at), 2.0 - at)
@@ -133,7 +160,9 @@ def step(method, work, row, i):
 
 @inline
 def between(c0, c1, c2, c3, c4, work, row, i):
-    """As `laguerre`, from the point in `work` towards a root between a pole and `top`, where c > 0: never beyond."""
+    """As `laguerre`, from the point in `work` towards a root between a pole and `top`, where c > 0:
+    never beyond.
+    """
     y, low, high = work[row + i], work[row + TILE + i], work[row + 2 * TILE + i]
     value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
     low, high = y if value <= 0.0 else low, y if value > 0.0 else high
@@ -155,9 +184,11 @@ def search(work, i):
 
 @inline
 def choose(work, i):
-    """Where there are two wells, the inner turning point of the one that holds U for the outer one of the other.
+    """Where there are two wells, the inner turning point of the one that holds U for the outer one
+    of the other.
 
-    Where P is even and so the well, to the last bit: the advance that vanishes then does so exactly.
+    Where P is even and so the well, to the last bit: the advance that vanishes then does so
+    exactly.
     """
     k, v, w = work[K + i], work[V_HIGH + i], work[W_LOW + i]
     total, width = w - v, 2.0 - v - w
@@ -201,7 +232,10 @@ def polish(work, i):
     """A step of Newton's method towards both turning points."""
     k, minus, plus = pair(work, K, i), pair(work, MINUS, i), pair(work, PLUS, i)
     c2, c3, c4 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0), dd.neg(k)
-    at_plus, at_minus = dd.times(pair(work, PLUS_POLE, i), 2.0), dd.times(pair(work, MINUS_POLE, i), 2.0)
+    at_plus, at_minus = (
+        dd.times(pair(work, PLUS_POLE, i), 2.0),
+        dd.times(pair(work, MINUS_POLE, i), 2.0),
+    )
     v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, work[V_HIGH + i])
     w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, work[W_LOW + i])
     store(work, V_HIGH, i, v)
@@ -215,7 +249,11 @@ def settle(work, i):
     k, level, v, w = pair(work, K, i), pair(work, L, i), pair(work, V_HIGH, i), pair(work, W_LOW, i)
     bar_v, bar_w = work[BAR_V + i], work[BAR_W + i]
     high, low = dd.shifted(dd.neg(v), 1.0), dd.shifted(w, -1.0)
-    v_low, w_high, total = dd.shifted(dd.neg(w), 2.0), dd.shifted(dd.neg(v), 2.0), dd.loose(w, dd.neg(v))
+    v_low, w_high, total = (
+        dd.shifted(dd.neg(w), 2.0),
+        dd.shifted(dd.neg(v), 2.0),
+        dd.loose(w, dd.neg(v)),
+    )
     width = (v_low[0] - v[0]) + (v_low[1] - v[1])
     rest, bow, double = dd.loose(level, dd.neg(k)), dd.mul(k, dd.square(total)), dd.scaled(k, 2.0)
     common = dd.loose(rest, bow)
@@ -227,21 +265,31 @@ def settle(work, i):
     level_rest = (level[0] - 0.5 * common[0]) + (level[1] - 0.5 * common[1])
     root_low, root_high = sqrt(far[0]), sqrt(near[0])
     g = root_low * root_high
-    error = 8.0 * (abs(k[0]) * (bar_v + bar_w) + PAIR_SUM_ROUNDOFF * (abs(level[0]) + 8.0 * abs(k[0])))
+    error = 8.0 * (
+        abs(k[0]) * (bar_v + bar_w) + PAIR_SUM_ROUNDOFF * (abs(level[0]) + 8.0 * abs(k[0]))
+    )
     smooth = middle[0] >= 0.0
     sure = (error < RIGHT * near[0]) & (error < RIGHT * far[0]) & (bar_v + bar_w < BLUR * width)
     sure &= smooth | ((error < RIGHT * abs(bend[0])) & (bar_v + bar_w < RIGHT * width))
     sure &= (bar_v < RIGHT * v[0]) & (bar_w < RIGHT * w[0])
     sure &= (bar_w < RIGHT * v_low[0]) & (bar_v < RIGHT * w_high[0])
     sure &= (work[MINUS + i] != 0.0) & (work[PLUS + i] != 0.0)
-    sure &= width > 4.0 * (bar_v + bar_w + ROUNDOFF * (abs(low[0]) + abs(high[0])))  # else it is a regular precession
+    # else it is a regular precession
+    sure &= width > 4.0 * (bar_v + bar_w + ROUNDOFF * (abs(low[0]) + abs(high[0])))
     two = (k[0] > 0.0) & (bend[0] < 0.0)
     aside = (-0.5 * total[0] > high[0]) | (-0.5 * total[0] < low[0])  # Q is least outside the well
     sure &= (k[0] <= 0.0) | (bend[0] > error) | (aside & (bend[0] < -error))
     work[WELLS + i] = 2.0 if two else 1.0
     work[GOOD + i] = 1.0 if sure else 0.0
-    work[ABOVE + i] = middle[0] + g if smooth else 0.25 * k[0] * width * width * bend[0] / (g - middle[0])
-    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = low[0], high[0], width, level_rest
+    work[ABOVE + i] = (
+        middle[0] + g if smooth else 0.25 * k[0] * width * width * bend[0] / (g - middle[0])
+    )
+    work[LOW + i], work[HIGH + i], work[WIDTH + i], work[LEVEL + i] = (
+        low[0],
+        high[0],
+        width,
+        level_rest,
+    )
     store(work, V_LOW, i, v_low)
     store(work, W_HIGH, i, w_high)
     store(work, SUM, i, total)
@@ -258,13 +306,21 @@ def parameter(gap, near, far, q_far, root_near, incline, g, xy):
     line = root_near + incline * near
     slanted = line <= SLANT * root_near
     here, there, across = q_far * near, g * far, near * far * line * line
-    return (here + there) ** 2 if slanted else gap * gap * g, xy * (4.0 * here * far if slanted else across), line
+    return (
+        (here + there) ** 2 if slanted else gap * gap * g,
+        xy * (4.0 * here * far if slanted else across),
+        line,
+    )
 
 
 @inline
 def enter(work, row, over, under, i):
     """The start of a sum R (S12) for p^2/(x y) = over/under: e is odd in its logarithm."""
-    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i] = 2.0 * min(over, under) / (over + under), 1.0, 0.0
+    work[row + i], work[row + TILE + i], work[row + 2 * TILE + i] = (
+        2.0 * min(over, under) / (over + under),
+        1.0,
+        0.0,
+    )
     work[row + 3 * TILE + i] = 1.0 if over < under else 0.0
 
 
@@ -290,7 +346,9 @@ def prepare(work, i):
 def last_sum(work, row, i):
     """The sum R with one more term, and the size of what is left out."""
     rest, weight = work[row + i], work[row + TILE + i]
-    total = work[row + 2 * TILE + i] + (weight * rest if work[row + 3 * TILE + i] == 1.0 else weight)
+    total = work[row + 2 * TILE + i] + (
+        weight * rest if work[row + 3 * TILE + i] == 1.0 else weight
+    )
     return total, abs(0.5 * weight * (1.0 - rest))
 
 
@@ -305,7 +363,9 @@ def add_term(work, row, i):
 
 @inline
 def take_mean(work, weight, i):
-    """A step of the mean; e of both sums: with r = (1 - e^2) (x + y)/(2 sqrt(x y)) the next is (1 - r)/(1 + r)."""
+    """A step of the mean; e of both sums: with r = (1 - e^2) (x + y)/(2 sqrt(x y)) the next is (1 -
+    r)/(1 + r).
+    """
     x, y = work[X + i], work[Y + i]
     middle, root = 0.5 * (x + y), sqrt(x * y)
     up, down = middle * add_term(work, UP, i), middle * add_term(work, DOWN, i)
@@ -324,7 +384,10 @@ def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, pe
     here, there = q_far * near, root_near * root_far * far
     both = here + there
     direct = near * both + 0.5 * width * (both + 0.5 * (here - there) * ratio)
-    first, second = incline * gap * gap, 0.25 * (root_far * near + root_near * far) * bend * ratio * near * far
+    first, second = (
+        incline * gap * gap,
+        0.25 * (root_far * near + root_near * far) * bend * ratio * near * far,
+    )
     part = 0.5 * period / (far * near * both if slanted else gap * line)
     value = part * (gap * direct if slanted else first + second)
     size = abs(value) if slanted else abs(part) * (abs(first) + abs(second))
@@ -333,9 +396,12 @@ def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, pe
 
 @inline
 def finish(work, size, drift, i, answers):
-    """Fill `answers` for the well of a body with A = `size`; GOOD stays 0 where it is left to the other kernels."""
+    """Fill `answers` for the well of a body with A = `size`; GOOD stays 0 where it is left to the
+    other kernels.
+    """
     middle, apart = 0.5 * (work[X + i] + work[Y + i]), 0.5 * (work[X + i] - work[Y + i])
-    period = 2.0 * pi / (middle - 0.25 * apart * apart / middle)  # the next mean, but for the fourth order
+    # the next mean, but for the fourth order
+    period = 2.0 * pi / (middle - 0.25 * apart * apart / middle)
     root_low, root_high, width = work[ROOT_LOW + i], work[ROOT_HIGH + i], work[WIDTH + i]
     incline, bend = work[INCLINE + i], 0.5 * work[K + i] * work[BEND + i] / work[ABOVE + i]
     minus, plus = work[MINUS + i], work[PLUS + i]
@@ -357,13 +423,20 @@ def finish(work, size, drift, i, answers):
     total = work[FINE_TOTAL + i] * period if exactly else total
     difference = work[FINE_DIFFERENCE + i] * period if exactly else difference
     error, rounding = (
-        (work[FINE + i] * rough, 12.0 * ROUNDOFF) if exactly else (25.0 * ROUNDOFF * rough, 2.0 * ROUNDOFF)
+        (work[FINE + i] * rough, 12.0 * ROUNDOFF)
+        if exactly
+        else (25.0 * ROUNDOFF * rough, 2.0 * ROUNDOFF)
     )
     turned = 2.0 * ROUNDOFF * pi
-    precession, spin = pi * (turns_down + turns_up) + total, pi * (turns_down - turns_up) + difference
+    precession, spin = (
+        pi * (turns_down + turns_up) + total,
+        pi * (turns_down - turns_up) + difference,
+    )
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
-    rest = 0.5 * (0.5 * work[ABOVE + i] - (work[SERIES + i] + 2.0 * work[WEIGHT + i] * apart * apart))
+    rest = 0.5 * (
+        0.5 * work[ABOVE + i] - (work[SERIES + i] + 2.0 * work[WEIGHT + i] * apart * apart)
+    )
     up, down = minus * (pi * turns_up + up), plus * (pi * turns_down + down)
     action = (period * (work[LEVEL + i] + rest) - up - down) / (2.0 * pi)
     rough = period * (abs(work[LEVEL + i]) + abs(rest))
@@ -376,13 +449,23 @@ def finish(work, size, drift, i, answers):
     period *= size
     error_period = 15.0 * ROUNDOFF * period
     turned = drift * period
-    answers[U_MIN + i], answers[U_MAX + i], answers[PERIOD + i] = work[LOW + i], work[HIGH + i], period
-    answers[PRECESSION + i], answers[SPIN + i], answers[ACTION + i] = precession, spin + turned, action
+    answers[U_MIN + i], answers[U_MAX + i], answers[PERIOD + i] = (
+        work[LOW + i],
+        work[HIGH + i],
+        period,
+    )
+    answers[PRECESSION + i], answers[SPIN + i], answers[ACTION + i] = (
+        precession,
+        spin + turned,
+        action,
+    )
     answers[U_MIN_BAR + i] = work[BAR_W + i] + ROUNDOFF * abs(work[LOW + i])
     answers[U_MAX_BAR + i] = work[BAR_V + i] + ROUNDOFF * abs(work[HIGH + i])
     answers[PERIOD_BAR + i], answers[PRECESSION_BAR + i] = error_period, error_precession
     answers[ACTION_BAR + i] = error_action
-    answers[SPIN_BAR + i] = error_spin + 23.0 * ROUNDOFF * abs(turned) + ROUNDOFF * abs(spin + turned)
+    answers[SPIN_BAR + i] = (
+        error_spin + 23.0 * ROUNDOFF * abs(turned) + ROUNDOFF * abs(spin + turned)
+    )
     work[GOOD + i] = 0.0 if not sure else 1.0 if cancelled & (not fine) else 2.0
 
 
@@ -391,7 +474,9 @@ def add_node(work, cosine, i):
     """A node of (S15)."""
     up, down, width = 0.5 * (1.0 + cosine), 0.5 * (1.0 - cosine), work[WIDTH + i]
     q = work[Q_LOW + i] * down + work[Q_HIGH + i] * up - work[K + i] * width * width * up * down
-    rest = (work[V_LOW + i] * down + work[V_HIGH + i] * up) * (work[W_LOW + i] * down + work[W_HIGH + i] * up)
+    rest = (work[V_LOW + i] * down + work[V_HIGH + i] * up) * (
+        work[W_LOW + i] * down + work[W_HIGH + i] * up
+    )
     work[SMALL_ACTION + i] += up * down * sqrt(q) / rest
 
 
@@ -426,7 +511,9 @@ def begin(work, i, v, w):
 
 @kernel
 def inside(work):
-    """The start from U, between the turning points, where P is HERE: nearly there at once if they nearly coincide."""
+    """The start from U, between the turning points, where P is HERE: nearly there at once if they
+    nearly coincide.
+    """
     for i in range(TILE):
         k, u, here = work[K + i], work[U + i], work[HERE + i]
         slope = 2.0 * (work[A + i] * work[B + i] + u * (k * (1.0 - 2.0 * u * u) - work[L + i]))
@@ -453,7 +540,12 @@ def approach(work, steps):
     for i in range(TILE):
         step(halley, work, UP, i)
         step(halley, work, DOWN, i)
-        begin(work, i, work[UP + i] + work[UP + 4 * TILE + i], work[DOWN + i] + work[DOWN + 4 * TILE + i])
+        begin(
+            work,
+            i,
+            work[UP + i] + work[UP + 4 * TILE + i],
+            work[DOWN + i] + work[DOWN + 4 * TILE + i],
+        )
         choose(work, i)
 
 

@@ -32,7 +32,8 @@ from survey.kernels.nutation.lanes import (
 FURTHER = 2  # means that double-double takes more than float64
 LAST = 1e-30
 FINEST = 2.0**-96
-# rows of the tile that follow those of `lanes`: pairs x, y; 1 - e, weight, total of both poles; complementary?
+# rows of the tile that follow those of `lanes`: pairs x, y; 1 - e, weight, total of both poles;
+# complementary?
 X, Y, UP, DOWN, LOW_UP, LOW_DOWN = (TILE * (ROWS + n) for n in (0, 2, 4, 10, 16, 17))
 REST, WEIGHT, TOTAL = 0, 2 * TILE, 4 * TILE
 # pairs: the roots of Q at the turning points, h and k - h^2 of (S11), l at both poles
@@ -55,7 +56,11 @@ def prepare(work, i):
     k, near, far = pair(work, K, i), pair(work, Q_HIGH, i), pair(work, Q_LOW, i)
     high, low = dd.positive_root(near), dd.positive_root(far)
     g = dd.mul(high, low)
-    above, middle, bend = dd.loose(pair(work, MIDDLE, i), g), pair(work, MIDDLE, i), pair(work, BEND, i)
+    above, middle, bend = (
+        dd.loose(pair(work, MIDDLE, i), g),
+        pair(work, MIDDLE, i),
+        pair(work, BEND, i),
+    )
     if middle[0] < 0.0:  # (S10)
         width = dd.sub(pair(work, V_LOW, i), pair(work, V_HIGH, i))
         below = dd.scaled(dd.loose(g, dd.neg(middle)), 4.0)
@@ -84,11 +89,20 @@ def prepare(work, i):
 @inline
 def add_term(work, row, low_row, middle, root, i):
     """Add a term to the sum R (S12), see `lanes.take_mean`."""
-    rest, weight, total = pair(work, row + REST, i), pair(work, row + WEIGHT, i), pair(work, row + TOTAL, i)
+    rest, weight, total = (
+        pair(work, row + REST, i),
+        pair(work, row + WEIGHT, i),
+        pair(work, row + TOTAL, i),
+    )
     lower, e = dd.neg(rest), dd.shifted(dd.neg(rest), 1.0)
     term = dd.mul(weight, rest)
     low = work[low_row + i] == 1.0
-    store(work, row + TOTAL, i, dd.loose(total, (term[0] if low else weight[0], term[1] if low else weight[1])))
+    store(
+        work,
+        row + TOTAL,
+        i,
+        dd.loose(total, (term[0] if low else weight[0], term[1] if low else weight[1])),
+    )
     store(work, row + WEIGHT, i, dd.scaled(dd.mul(weight, e), 0.5))
     part = dd.mul(middle, dd.mul(dd.shifted(lower, 2.0), rest))
     store(work, row + REST, i, dd.ratio(dd.scaled(part, 2.0), dd.loose(root, part)))
@@ -118,13 +132,22 @@ def noise(work, i):
     bar_v, bar_w, size_k = work[BAR_V + i], work[BAR_W + i], abs(work[K + i])
     error = 8.0 * (size_k * (bar_v + bar_w) + PAIR_SUM_ROUNDOFF * (abs(work[L + i]) + 8.0 * size_k))
     total = error / work[Q_LOW + i] + error / work[Q_HIGH + i] + FINEST
-    total += error / abs(work[BEND + i]) + 2.0 * (bar_v + bar_w) / work[WIDTH + i] if work[MIDDLE + i] < 0.0 else 0.0
+    total += (
+        error / abs(work[BEND + i]) + 2.0 * (bar_v + bar_w) / work[WIDTH + i]
+        if work[MIDDLE + i] < 0.0
+        else 0.0
+    )
     return 4.0 * total + bar_v / work[V_HIGH + i] + bar_w / work[W_LOW + i]
 
 
 @inline
 def finish(work, i):
-    high, low, incline, bow = (pair(work, HIGH, i), pair(work, LOW, i), pair(work, INCLINE, i), pair(work, BOW, i))
+    high, low, incline, bow = (
+        pair(work, HIGH, i),
+        pair(work, LOW, i),
+        pair(work, INCLINE, i),
+        pair(work, BOW, i),
+    )
     up = part(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, low, incline, bow,
               pair(work, LINE_UP, i), pair(work, UP + TOTAL, i))  # fmt: skip
     down = part(pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i), low, high, dd.neg(incline), bow,

@@ -1,7 +1,8 @@
-"""u, psi and phi of a nutation at given times: u by an elliptic function, the angles by R_J (S7), (S16).
+"""u, psi and phi of a nutation at given times: u by an elliptic function, the angles by R_J (S7),
+(S16).
 
-u = (ul wl + uh wh)/(wl + wh), wl = sqrt Q(uh) (1 + c)/2, wh = sqrt Q(ul) (1 - c)/2, c = cn(sqrt g t/A), with 1 - m =
-(s + g)/(2 g), of any size (S17): real roots and conjugate ones are one case.
+u = (ul wl + uh wh)/(wl + wh), wl = sqrt Q(uh) (1 + c)/2, wh = sqrt Q(ul) (1 - c)/2, c = cn(sqrt g
+t/A), with 1 - m = (s + g)/(2 g), of any size (S17): real roots and conjugate ones are one case.
 """
 
 from math import hypot, sqrt
@@ -33,7 +34,9 @@ def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
     if ratio < 1e-290:
         return 0.0
     x = q_origin * rest / ratio
-    third = rj_spread(x, middle, sqrt(q_origin) * root / ratio, spread, q_origin * near / (ratio * far))
+    third = rj_spread(
+        x, middle, sqrt(q_origin) * root / ratio, spread, q_origin * near / (ratio * far)
+    )
     return 2.0 * width * q_origin / (3.0 * far * far) * third
 
 
@@ -41,7 +44,8 @@ def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
 def locate(row, low, high, c, roots, kc, out):
     """From (1 + c)/2, (1 - c)/2 and c, each with all its digits.
 
-    out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh), X0 + s of (S16) from ul and uh.
+    out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh), X0 + s of (S16)
+    from ul and uh.
     """
     left, right = roots[1] * low, roots[0] * high
     total = left + right
@@ -58,16 +62,22 @@ def locate(row, low, high, c, roots, kc, out):
 
 @inline
 def angles(row, tau, half, down, at):
-    """(b - a) G- / 2 and (b + a) G+ / 2 at the time tau in [0, half] since u = ul; `down` is the latter at `half`."""
+    """(b - a) G- / 2 and (b + a) G+ / 2 at the time tau in [0, half] since u = ul; `down` is the
+    latter at `half`.
+    """
     width, spread = row[nu.WIDTH], nu.spread(row)
     first = second = 0.0
     if row[nu.MINUS] != 0.0:
         far = row[nu.LOW_PLUS]
-        rest = tau / far + since(far, at[1], at[6], spread, at[3], at[4], row[nu.Q_LOW], at[5], width)
+        rest = tau / far + since(
+            far, at[1], at[6], spread, at[3], at[4], row[nu.Q_LOW], at[5], width
+        )
         first = 0.5 * row[nu.MINUS] * rest
     if row[nu.PLUS] != 0.0:
         far = row[nu.HIGH_MINUS]
-        rest = (half - tau) / far + since(far, at[2], at[7], spread, at[4], at[3], row[nu.Q_HIGH], at[5], width)
+        rest = (half - tau) / far + since(
+            far, at[2], at[7], spread, at[4], at[3], row[nu.Q_HIGH], at[5], width
+        )
         second = down - 0.5 * row[nu.PLUS] * rest
     return first, second
 
@@ -91,7 +101,8 @@ def cosine_by_means(z, kc, quarter, pairs, last):
 
 @inline
 def motion(cosine, row, start, period, times, out):
-    """Fill `out` (m, MOTION) at `times` (m) in units of A, from the `start` and the `period` (columns of `records`).
+    """Fill `out` (m, MOTION) at `times` (m) in units of A, from the `start` and the `period`
+    (columns of `records`).
 
     cosine(z, kc, quarter, pairs, last) gives (1 + c)/2, (1 - c)/2 and c for z in [0, 2 K].
     """
@@ -113,12 +124,14 @@ def motion(cosine, row, start, period, times, out):
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[rc.DIRECTION] * first, start[rc.DIRECTION] * second
     start_delay = start[rc.START_BAR] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
-    first_up, first_down = rates(row, at)  # an error of the initial phase shifts the start and what follows equally
+    # an error of the initial phase shifts the start and what follows equally
+    first_up, first_down = rates(row, at)
     z0 *= start[rc.DIRECTION]
     relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
     for j in range(len(times)):
         z = z0 + rate * times[j]
-        n = np.floor(z / turn + 0.5)  # a float, since the number of periods may exceed any integer type
+        # a float, since the number of periods may exceed any integer type
+        n = np.floor(z / turn + 0.5)
         # whole periods are subtracted in time, where the period is known best
         z = z0 + rate * (times[j] - n * period[rc.PERIOD])
         side = 1.0 if z >= 0.0 else -1.0
@@ -128,13 +141,18 @@ def motion(cosine, row, start, period, times, out):
         first, second = angles(row, z / rate, half, down, at)
         first, second = side * first - base_up, side * second - base_down
         all_up, all_down = first + 2.0 * n * up, second + 2.0 * n * down
-        delay = (relative + 4.0 * ROUNDOFF) * abs(times[j]) + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
+        delay = (relative + 4.0 * ROUNDOFF) * abs(times[j]) + (16.0 * ROUNDOFF + relative) * (
+            1.0 + quarter
+        ) / rate
         rate_up, rate_down = rates(row, at)
         change = abs(rate_up - first_up) + abs(rate_down - first_down)
         moved = (abs(rate_up) + abs(rate_down)) * delay + change * start_delay
         delay += start_delay
         speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
-        bend = row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH]) + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
+        bend = (
+            row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH])
+            + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
+        )
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * ROUNDOFF * row[nu.WIDTH]
         out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = at[0], all_up + all_down, all_down - all_up
         out[j, rc.U_BAR] = speed * delay + bend * delay * delay + rounding

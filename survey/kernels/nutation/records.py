@@ -1,7 +1,8 @@
-"""The columns of the rows that kernels and methods of the family "nutation" fill, and its measures read.
+"""The columns of the rows that kernels and methods of the family "nutation" fill, and its measures
+read.
 
-Angles are in radians; a name with _BAR is the error bound of the value named before it. The columns of a well
-are those of `wells` beside this file.
+Angles are in radians; a name with _BAR is the error bound of the value named before it. The columns
+of a well are those of `wells` beside this file.
 """
 
 # A nutation: T / A, the precession, the spin less a (1/C - 1/A) T, the action.

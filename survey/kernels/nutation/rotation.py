@@ -1,7 +1,9 @@
-"""The rotation of the body at given times: momenta across the line of nodes, and where a nutation has its origin.
+"""The rotation of the body at given times: momenta across the line of nodes, and where a nutation
+has its origin.
 
-p_theta = -A u'/s and X = (b - a u)/s with s = sin theta, signed: on motions that pass a pole exactly, psi and phi go
-without their jumps of pi there, and s changes its sign instead. Time from the lower turning point as in `motion`.
+p_theta = -A u'/s and X = (b - a u)/s with s = sin theta, signed: on motions that pass a pole
+exactly, psi and phi go without their jumps of pi there, and s changes its sign instead. Time from
+the lower turning point as in `motion`.
 """
 
 from math import floor, inf, sqrt
@@ -15,7 +17,8 @@ from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.kernels.nutation.motion import angles, cosine_by_means, first_kind, locate, rates
 
-# at a time: sin theta (signed), p_theta, X; of a start: time since u = ul, psi and phi since then, less drift
+# at a time: sin theta (signed), p_theta, X; of a start: time since u = ul, psi and phi since then,
+# less drift
 SINE, P_THETA, ACROSS = range(3)
 SINCE, PSI_SINCE, PHI_SINCE = range(3)
 PLACE = 3
@@ -38,7 +41,9 @@ def begin(row, start, period):
 
 @kernel
 def origins(rows, starts, periods, out):
-    """Fill `out` (n, 2, PLACE), values and bounds: SINCE in units of A, negative where u = ul comes after t = 0."""
+    """Fill `out` (n, 2, PLACE), values and bounds: SINCE in units of A, negative where u = ul comes
+    after t = 0.
+    """
     at = np.empty(8)
     for i in range(len(rows)):
         row, period = rows[i], periods[i]
@@ -48,12 +53,20 @@ def origins(rows, starts, periods, out):
         first, second = angles(row, z / rate, 0.5 * period[rc.PERIOD], down, at)
         side = starts[i, rc.DIRECTION]
         out[i, 0, SINCE] = side * z / rate
-        out[i, 0, PSI_SINCE], out[i, 0, PHI_SINCE] = side * (first + second), side * (second - first)
+        out[i, 0, PSI_SINCE], out[i, 0, PHI_SINCE] = (
+            side * (first + second),
+            side * (second - first),
+        )
         relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
         speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
-        delay = starts[i, rc.START_BAR] / max(speed, nu.TINY) + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
+        delay = (
+            starts[i, rc.START_BAR] / max(speed, nu.TINY)
+            + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
+        )
         up, down_rate = rates(row, at)
-        bar = (abs(up) + abs(down_rate)) * delay + (24.0 * ROUNDOFF + 2.0 * relative) * (abs(first) + abs(second))
+        bar = (abs(up) + abs(down_rate)) * delay + (24.0 * ROUNDOFF + 2.0 * relative) * (
+            abs(first) + abs(second)
+        )
         bar += period[rc.PRECESSION_BAR] + period[rc.SPIN_BAR] + 24.0 * ROUNDOFF * abs(down)
         out[i, 1, SINCE], out[i, 1, PSI_SINCE], out[i, 1, PHI_SINCE] = delay, bar, bar
         if delay * rate > FIRST_ORDER:
@@ -82,7 +95,8 @@ def places(rows, starts, periods, times, out):
             locate(row, low, high, c, roots, kc, at)
             delay = (relative + 4.0 * ROUNDOFF) * abs(times[i, j]) + start_delay
             delay += (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
-            # passages of u = ul since the motion's first lower turning point, and of u = uh: the sides of the poles
+            # passages of u = ul since the motion's first lower turning point, and of u = uh: the
+            # sides of the poles
             side = 1.0
             if row[nu.LOW_MINUS] == 0.0 and (n + (z < 0.0) - (z0 < 0.0)) % 2.0 != 0.0:
                 side = -1.0
@@ -95,7 +109,9 @@ def places(rows, starts, periods, times, out):
 
 @kernel
 def _place(row, at, rising, side, delay, out):
-    """Of one time, from the numbers `at` of `motion.locate`; an error of time, `delay`, moves them by their slopes."""
+    """Of one time, from the numbers `at` of `motion.locate`; an error of time, `delay`, moves them
+    by their slopes.
+    """
     width, near, far = row[nu.WIDTH], at[1], at[2]
     # P/(1 - u^2) = Q; a pole that is a turning point divides out
     height = (1.0 if row[nu.HIGH_PLUS] == 0.0 else width * at[4] / near) * (
@@ -106,10 +122,16 @@ def _place(row, at, rising, side, delay, out):
     two = 0.5 * row[nu.PLUS] * sqrt(near / far) if row[nu.PLUS] != 0.0 else 0.0
     across, least = one + two, max(sine, nu.TINY)
     slope = (two - one) / least if one != 0.0 or two != 0.0 else 0.0
-    out[0, SINE], out[0, P_THETA], out[0, ACROSS] = side * sine, -side * rising * p_theta, side * across
+    out[0, SINE], out[0, P_THETA], out[0, ACROSS] = (
+        side * sine,
+        -side * rising * p_theta,
+        side * across,
+    )
     noise = row[nu.NOISE_ENDS] + 16.0 * ROUNDOFF
     tilt = p_theta * delay + noise * min(near, far) / least
     out[1, SINE] = abs(at[0]) * tilt + 4.0 * ROUNDOFF * sine
     relative = 0.5 * (row[nu.NOISE_LOW] + row[nu.NOISE_HIGH]) + row[nu.NOISE_WIDTH] + noise
-    out[1, P_THETA] = (abs(row[nu.K] * at[0]) * sine + abs(across * slope)) * delay + relative * p_theta
+    out[1, P_THETA] = (
+        abs(row[nu.K] * at[0]) * sine + abs(across * slope)
+    ) * delay + relative * p_theta
     out[1, ACROSS] = abs(slope) * tilt + 8.0 * ROUNDOFF * (abs(one) + abs(two))

@@ -1,9 +1,10 @@
-"""Second derivatives of the action of a nutation, by quadratures without singular ends, and the twist they make.
+"""Second derivatives of the action of a nutation, by quadratures without singular ends, and the
+twist they make.
 
-2 pi J is the integral of sqrt P/(1 - u^2) along a closed path about [ul, uh]. As a function of E = L - a^2, b and a
-its second derivatives have no poles at u = +-1: they are the integrals of q(u)/P^(3/2), q of degree 4 at most (S26).
-In c of (S17), where 1/s^3 stands by parts, nothing is left that grows without limit in a narrow well (S27). Sums as in
-`action`.
+2 pi J is the integral of sqrt P/(1 - u^2) along a closed path about [ul, uh]. As a function of E =
+L - a^2, b and a its second derivatives have no poles at u = +-1: they are the integrals of
+q(u)/P^(3/2), q of degree 4 at most (S26). In c of (S17), where 1/s^3 stands by parts, nothing is
+left that grows without limit in a narrow well (S27). Sums as in `action`.
 """
 
 from math import pi, sqrt
@@ -26,7 +27,9 @@ _SUMS = 64.0 * ROUNDOFF
 
 @inline
 def sums(x2, y2):
-    """Integrals over [0, pi] of sin^2/R^3, cos^2/R^3 and cos^2/R^5, R^2 = x2 sin^2 + y2 cos^2, with bounds (S27)."""
+    """Integrals over [0, pi] of sin^2/R^3, cos^2/R^3 and cos^2/R^5, R^2 = x2 sin^2 + y2 cos^2, with
+    bounds (S27).
+    """
     first = second = third = 0.0
     for i in range(_C.size):
         s2 = _SQUARE[i]
@@ -67,7 +70,9 @@ def times_number(p, number):
 
 @inline
 def integral(p, q, parts, factor):
-    """Of p q/P^(3/2), two quadratic forms in c; factor = 4/(pi g^2), and 1/(2 pi) of it is a derivative of J."""
+    """Of p q/P^(3/2), two quadratic forms in c; factor = 4/(pi g^2), and 1/(2 pi) of it is a
+    derivative of J.
+    """
     x, width2, all_cubes, sine_cubes, fifths = parts
     zeroth, second, fourth = even_part(p, q)
     fourth = mul(width2, fourth)
@@ -98,14 +103,20 @@ def derivatives(row, out):
     width2 = width * width, 2.0 * (row[nu.NOISE_WIDTH] + ROUNDOFF) * width * width
     parts = x, width2, add(sines, cosines), sines, fifths
     # linear forms in c: W, u W, (1 - u) W, (1 + u) W, with c^1 over the width
-    both, total = add(low, high), (row[nu.SUM], row[nu.BAR_LOW] + row[nu.BAR_HIGH] + ROUNDOFF * abs(row[nu.SUM]))
+    both, total = (
+        add(low, high),
+        (row[nu.SUM], row[nu.BAR_LOW] + row[nu.BAR_HIGH] + ROUNDOFF * abs(row[nu.SUM])),
+    )
     slope = div(mul(k, total), both)
     tilt = sub(scaled(mul(slope, total), 0.5), scaled(both, 0.25))
     end_low, end_high = (row[nu.LOW], row[nu.BAR_LOW]), (row[nu.HIGH], row[nu.BAR_HIGH])
     w = scaled(both, 0.5), slope
     uw = scaled(add(mul(high, end_low), mul(low, end_high)), 0.5), tilt
     plus_low, plus_high = (row[nu.LOW_PLUS], row[nu.BAR_LOW]), (row[nu.HIGH_PLUS], row[nu.BAR_HIGH])
-    minus_low, minus_high = (row[nu.LOW_MINUS], row[nu.BAR_LOW]), (row[nu.HIGH_MINUS], row[nu.BAR_HIGH])
+    minus_low, minus_high = (
+        (row[nu.LOW_MINUS], row[nu.BAR_LOW]),
+        (row[nu.HIGH_MINUS], row[nu.BAR_HIGH]),
+    )
     near = scaled(add(mul(high, plus_low), mul(low, plus_high)), 0.5), sub(slope, tilt)
     far = scaled(add(mul(high, minus_low), mul(low, minus_high)), 0.5), add(slope, tilt)
     # (b - a u) W, and (E + k u^2) W^2
@@ -141,10 +152,12 @@ def minor(p, q, r):
 
 @kernel
 def twists(rows, bodies, out):
-    """Fill `out` (n, 2, TWISTS), values and bounds, of wells `rows` (n, SIZE) of `bodies` (n, 3): A, C, p_phi.
+    """Fill `out` (n, 2, TWISTS), values and bounds, of wells `rows` (n, SIZE) of `bodies` (n, 3):
+    A, C, p_phi.
 
-    With H in the actions J, p_phi (p_psi is kept) and J, p_psi, p_phi: determinants of the second derivatives, KAM and
-    KAM_3, and of these bordered by the frequencies, ISOENERGETIC and ISOENERGETIC_3. NaN where K of a row is NaN.
+    With H in the actions J, p_phi (p_psi is kept) and J, p_psi, p_phi: determinants of the second
+    derivatives, KAM and KAM_3, and of these bordered by the frequencies, ISOENERGETIC and
+    ISOENERGETIC_3. NaN where K of a row is NaN.
     """
     first = np.empty((2, DERIVATIVES))
     for i in range(len(rows)):

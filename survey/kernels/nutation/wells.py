@@ -1,8 +1,9 @@
 """The wells of A^2 u'^2 = P(u) = (1 - u^2)(L + k u^2) - (a^2 + b^2 - 2 a b u), |u| <= 1: their turning points.
 
-Everything that may cancel is done in double-double: the polynomial about u = 0 and about the poles, v = 1 - u and
-w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 + k S u + q0, S = ul + uh. A well's row
-then holds float64 numbers that are right to the last digits. Equation numbers: `scenes/brun.md`.
+Everything that may cancel is done in double-double: the polynomial about u = 0 and about the poles,
+v = 1 - u and w = 1 + u, its roots, and its factor Q where P = (u - ul)(uh - u) Q, Q = k u^2 + k S u
++ q0, S = ul + uh. A well's row then holds float64 numbers that are right to the last digits.
+Equation numbers: `scenes/brun.md`.
 """
 
 from math import copysign, inf, nan, sqrt
@@ -12,7 +13,8 @@ from survey.kernels.math import double as dd
 from survey.kernels.math.quartic import ROUGH, root, roughly, slope, slopes, value
 from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 
-# columns of a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b + a, the rest of P
+# columns of a row: turning points (1 - u and 1 + u of each), Q there and at the poles, b - a and b
+# + a, the rest of P
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
 Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
 K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
@@ -43,7 +45,9 @@ def about_equator(a, b, level, k):
 
 @inline
 def torque(u, a, b, k):
-    """F = (a - b u)(b - a u) + k u (1 - u^2)^2, which has the sign of -W', and F'. W is the effective potential."""
+    """F = (a - b u)(b - a u) + k u (1 - u^2)^2, which has the sign of -W', and F'. W is the
+    effective potential.
+    """
     rest = (1.0 - u) * (1.0 + u)
     value = (a - b * u) * (b - a * u) + k * u * rest * rest
     return value, -b * (b - a * u) - a * (a - b * u) + k * rest * (1.0 - 5.0 * u * u)
@@ -68,7 +72,8 @@ def saddle(a, b, k):
         return 0.0, 0.0, abs(u) < 0.4 and rise > -32.0 * ROUNDOFF * (a * a + b * b + k)
     before, least = u, abs(level)
     for _ in range(NEWTON):  # from there F is convex towards its zero, if it has one
-        if not rise > 0.0:  # beyond the least |F|, which is more than half of that at the step before
+        # beyond the least |F|, which is more than half of that at the step before
+        if not rise > 0.0:
             return 0.0, 0.0, abs(before) < 0.4 and least <= 4.0 * roughness(before, a, b, k)
         move, before, least = level / rise, u, abs(level)
         u -= move
@@ -91,7 +96,8 @@ def roughness(u, a, b, k):
 
 @kernel
 def lowest(square, product, k, most):
-    """The distance from the pole of the least W, between the pole and `most`: v^2 B(v) = (b - a)^2 (1 - v).
+    """The distance from the pole of the least W, between the pole and `most`: v^2 B(v) = (b - a)^2
+    (1 - v).
 
     B = a b + k (1 - v)(2 - v)^2; 0 where W is least at the pole itself.
     """
@@ -121,7 +127,8 @@ def lowest(square, product, k, most):
 
 @kernel
 def peak(c, y, at):
-    """(point, P, bound of its error) of the greatest P near y, which matters where it is next to nothing.
+    """(point, P, bound of its error) of the greatest P near y, which matters where it is next to
+    nothing.
 
     At a pole (y = 0) that the motion may reach P is 0, and half its slope `at` is used instead.
     """
@@ -139,10 +146,11 @@ def peak(c, y, at):
 
 @kernel
 def beyond(gap, at, inside, inside_far, near, far, equator):
-    """(distance from the pole, from the other pole, bar) of the turning point on that side of `inside`.
+    """(distance from the pole, from the other pole, bar) of the turning point on that side of
+    `inside`.
 
-    `near` and `far` are P about the pole and about the other one (`inside_far` from there), `gap` = b -+ a, `equator`
-    = P(0): the turning point is found from the pole of its own hemisphere.
+    `near` and `far` are P about the pole and about the other one (`inside_far` from there), `gap` =
+    b -+ a, `equator` = P(0): the turning point is found from the pole of its own hemisphere.
     """
     two = (2.0, 0.0)
     if inside > 1.0 and equator <= 0.0:
@@ -164,13 +172,17 @@ def inner(equatorial, loose, inside, outside):
 
 @inline
 def looseness(a, b, rough):
-    """The rounding of P(0) = L - a^2 - b^2, which may nearly cancel; `rough` times 2^-100 is that of L's terms."""
+    """The rounding of P(0) = L - a^2 - b^2, which may nearly cancel; `rough` times 2^-100 is that
+    of L's terms.
+    """
     return 0.25 * PAIR_SUM_ROUNDOFF * (a * a + b * b + rough)
 
 
 @inline
 def hill_at_pole(gap, product, k, at):
-    """L above W at a pole that the motion may reach (b -+ a = 0) and where W is greatest, and its bar; or NaN."""
+    """L above W at a pole that the motion may reach (b -+ a = 0) and where W is greatest, and its
+    bar; or NaN.
+    """
     if gap == 0.0 and product + 4.0 * k < 0.0:
         return at, 4.0 * PAIR_SUM_ROUNDOFF * (abs(product) + abs(k) + abs(at))
     return nan, 0.0
@@ -225,21 +237,31 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     if from_plus[0] > 0.0:
         q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), from_plus)
     if from_minus[0] > 0.0:
-        q_minus = dd.div(dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), from_minus)
-    store(row, Q_HIGH, beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh))
-    store(row, Q_LOW, beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w))
+        q_minus = dd.div(
+            dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), from_minus
+        )
+    store(
+        row,
+        Q_HIGH,
+        beside(q_plus, tilt_plus, k, v) if uh[0] >= 0.0 else beside(q_minus, tilt_minus, k, wh),
+    )
+    store(
+        row,
+        Q_LOW,
+        beside(q_plus, tilt_plus, k, vl) if ul[0] >= 0.0 else beside(q_minus, tilt_minus, k, w),
+    )
     row[Q_PLUS] = q_plus[0] if minus[0] == 0.0 else minus[0] * minus[0] / (v[0] * vl[0])
     row[Q_MINUS] = q_minus[0] if plus[0] == 0.0 else plus[0] * plus[0] / (w[0] * wh[0])
     # errors: of Q, what the pole's slope and the turning points leave
     bar = bar_v + bar_w
     moved = abs(k[0]) * (bar + 16.0 * PAIR_SUM_ROUNDOFF)
     near, far = from_plus[0], from_minus[0]
-    plus_side = (8.0 * PAIR_SUM_ROUNDOFF * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar) / max(
-        near, TINY
-    )
-    minus_side = (8.0 * PAIR_SUM_ROUNDOFF * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar) / max(
-        far, TINY
-    )
+    plus_side = (
+        8.0 * PAIR_SUM_ROUNDOFF * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar
+    ) / max(near, TINY)
+    minus_side = (
+        8.0 * PAIR_SUM_ROUNDOFF * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar
+    ) / max(far, TINY)
     plus_side, minus_side = plus_side + 8.0 * moved * near, minus_side + 8.0 * moved * far
     row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
     row[NOISE_LOW] = (plus_side if ul[0] >= 0.0 else minus_side) / max(row[Q_LOW], TINY)
@@ -247,9 +269,13 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     direct(k, dd.sub(level, k), square, ul, bar, row, Q_LOW, NOISE_LOW)
     beside_saddle(equatorial, uh, bar_v, -1.0, row, Q_HIGH, NOISE_HIGH)
     beside_saddle(equatorial, ul, bar_w, 1.0, row, Q_LOW, NOISE_LOW)
-    row[NOISE_ENDS] = max(bar_v / max(v[0], TINY), bar_w / max(w[0], TINY), bar_v / wh[0], bar_w / vl[0])
+    row[NOISE_ENDS] = max(
+        bar_v / max(v[0], TINY), bar_w / max(w[0], TINY), bar_v / wh[0], bar_w / vl[0]
+    )
     rough = 8.0 * (moved + PAIR_SUM_ROUNDOFF * (abs(level[0]) + abs(k[0])))
-    row[NOISE_ABOVE] = noise_above(row, rough, at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, rough, row))
+    row[NOISE_ABOVE] = noise_above(
+        row, rough, at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, rough, row)
+    )
 
 
 @inline
@@ -270,23 +296,29 @@ def beside(q, tilt, k, y):
 
 @kernel
 def beside_saddle(equatorial, u, bar, side, row, column, error):
-    """Q where digits of it were lost: P'/(uh - ul) at a turning point beside a saddle, from P about the equator."""
+    """Q where digits of it were lost: P'/(uh - ul) at a turning point beside a saddle, from P about
+    the equator.
+    """
     if row[error] < LOST_DIGITS or abs(u[0]) > 0.5 or row[WIDTH] < 1e-3:
         return
     steep = slope(equatorial, u)
     _first, second = slopes(equatorial, u[0])
-    terms = abs(equatorial[1][0]) + abs(u[0]) * (2.0 * abs(equatorial[2][0]) + 4.0 * abs(equatorial[4][0]) * u[0] ** 2)
+    terms = abs(equatorial[1][0]) + abs(u[0]) * (
+        2.0 * abs(equatorial[2][0]) + 4.0 * abs(equatorial[4][0]) * u[0] ** 2
+    )
     if side * steep[0] > 0.0:
         store(row, column, dd.over(steep, side * row[WIDTH]))
-        row[error] = (4.0 * PAIR_SUM_ROUNDOFF * terms + abs(second) * bar) / abs(steep[0]) + 2.0 * ROUNDOFF
+        row[error] = (4.0 * PAIR_SUM_ROUNDOFF * terms + abs(second) * bar) / abs(
+            steep[0]
+        ) + 2.0 * ROUNDOFF
 
 
 @kernel
 def still(gaps, k, level, ats, equatorial, loose, y, hum, chart, plus, row):
     """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1.
 
-    hum: the bar of P there, and chart: P about that pole. The well may be as high, and so wide, which changes all else
-    by its square.
+    hum: the bar of P there, and chart: P about that pole. The well may be as high, and so wide,
+    which changes all else by its square.
     """
     _first, second = slopes(chart, y)
     square = max(-second, TINY)
@@ -316,7 +348,9 @@ def above(row, g):
 
 @kernel
 def at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, bar, row):
-    """The error of BEND, `bar` or, where Q is least, better: there Q = P/((u - ul)(uh - u)) is next to BEND/4."""
+    """The error of BEND, `bar` or, where Q is least, better: there Q = P/((u - ul)(uh - u)) is next
+    to BEND/4.
+    """
     u = -0.5 * total[0]
     left, right = dd.add((u, 0.0), dd.neg(ul)), dd.add(uh, (-u, 0.0))
     if k[0] <= 0.0 or bar < LOST_DIGITS * abs(row[BEND]) or min(left[0], right[0]) <= 0.0:
@@ -327,7 +361,9 @@ def at_lowest(equatorial, loose, k, total, ul, uh, bar_w, bar_v, bar, row):
     better = dd.times(dd.sub(q, dd.mul(k, dd.mul(off, off))), 4.0)
     noise = bar_w / left[0] + bar_v / right[0] + 2.0 * ROUNDOFF
     error = 4.0 * (
-        (PAIR_SUM_ROUNDOFF * size + loose) / product[0] + abs(q[0]) * noise + k[0] * abs(off[0]) * (bar_w + bar_v)
+        (PAIR_SUM_ROUNDOFF * size + loose) / product[0]
+        + abs(q[0]) * noise
+        + k[0] * abs(off[0]) * (bar_w + bar_v)
     )
     if error < bar:
         store(row, BEND, better)
@@ -339,12 +375,15 @@ def noise_above(row, bar, bar_bend):
     """The relative error of `above`, `bar` that of s, `bar_bend` of BEND, besides 8 roundings."""
     s, g = row[MIDDLE], sqrt(row[Q_LOW]) * sqrt(row[Q_HIGH])
     noise = (bar + 0.5 * (row[NOISE_LOW] + row[NOISE_HIGH]) * g) / max(abs(s) + g, TINY)
-    return noise if s >= 0.0 else noise + bar_bend / max(abs(row[BEND]), TINY) + 2.0 * row[NOISE_WIDTH]
+    return (
+        noise if s >= 0.0 else noise + bar_bend / max(abs(row[BEND]), TINY) + 2.0 * row[NOISE_WIDTH]
+    )
 
 
 @kernel
 def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
-    """(L above the separatrix, its bar; u of the saddle and F' there); NaN where there is none at these a and b.
+    """(L above the separatrix, its bar; u of the saddle and F' there); NaN where there is none at
+    these a and b.
 
     The bar is infinite where that is in doubt.
     """
@@ -355,7 +394,8 @@ def barrier(a, b, k, equatorial, loose, at_plus, at_minus):
     if rise > 0.0:
         height, size = value(equatorial, (between, 0.0))
         rough = roughness(between, a, b, size_k)
-        bar = 4.0 * (PAIR_SUM_ROUNDOFF * size + loose) + rough**2 / rise  # the saddle's u is as good as F there
+        # the saddle's u is as good as F there
+        bar = 4.0 * (PAIR_SUM_ROUNDOFF * size + loose) + rough**2 / rise
         return height[0] / ((1.0 - between) * (1.0 + between)), bar, between, rise
     distance, bar = nan, 0.0
     if size_k < 0.0:
@@ -381,10 +421,12 @@ def cusp(a, b, k):
 
 @kernel
 def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
-    """Fill `rows` (2, SIZE) and `kinds` (2) with the wells, lower u first; returns (L above the separatrix, its bar).
+    """Fill `rows` (2, SIZE) and `kinds` (2) with the wells, lower u first; returns (L above the
+    separatrix, its bar).
 
-    NaN where there is no separatrix at these a and b. Kinds: NUTATION, PRECESSION (the turning points coincide),
-    PASSAGE (through a pole), SEPARATRIX (within the error), NONE. rough: see `looseness`.
+    NaN where there is no separatrix at these a and b. Kinds: NUTATION, PRECESSION (the turning
+    points coincide), PASSAGE (through a pole), SEPARATRIX (within the error), NONE. rough: see
+    `looseness`.
     """
     kinds[0] = kinds[1] = NONE
     gaps, ats = (dd.two_sum(b, -a), dd.two_sum(b, a)), (at_plus, at_minus)

@@ -1,8 +1,10 @@
-"""A whole gyrostat, six equations: its motions, and what the invariant set of its rotation about an axis holds.
+"""A whole gyrostat, six equations: its motions, and what the invariant set of its rotation about an
+axis holds.
 
-The reduced flow on the set is one on the cylinder, so a method of the family "body" offers what one of "cylinder" does,
-and the motions of the whole body besides. G (rows, 14, 3) holds the systems as in `kernels.cylinder.gyrostat`, in the
-body's own axes; the columns of `floats` are w, nu and their error bounds.
+The reduced flow on the set is one on the cylinder, so a method of the family "body" offers what one
+of "cylinder" does, and the motions of the whole body besides. G (rows, 14, 3) holds the systems as
+in `kernels.cylinder.gyrostat`, in the body's own axes; the columns of `floats` are w, nu and their
+error bounds.
 """
 
 from survey.contract import Function

@@ -1,4 +1,5 @@
-"""Clebsch's case: closed forms of the permanent rotations and of the critical motions, with error bars.
+"""Clebsch's case: closed forms of the permanent rotations and of the critical motions, with error
+bars.
 
 M' = M x w + epsilon nu x (I nu), nu' = nu x w, M = I w, I = diag(A1, A2, A3), |nu| = 1, with the integrals
 
@@ -20,13 +21,18 @@ def integrals(inertia, epsilon, w, nu):
     """H, F2, F3 (Bounded) from three Bounded each."""
     M = [A * p for A, p in zip(inertia, w, strict=True)]
     squares, momenta = [x * x for x in nu], [m * m for m in M]
-    H = 0.5 * (_sum(m * p for m, p in zip(M, w, strict=True)) + epsilon * _sum(map(_times, inertia, squares)))
+    H = 0.5 * (
+        _sum(m * p for m, p in zip(M, w, strict=True))
+        + epsilon * _sum(map(_times, inertia, squares))
+    )
     F2 = _sum(momenta) - epsilon * _sum(map(_times, _adjugate(inertia), squares))
     return {"H": H, "F2": F2, "F3": _sum(map(_times, M, nu))}
 
 
 def rotation(inertia, epsilon, rate):
-    """Of the rotation by `rate` about the vertical axis of the first moment: {name: Bounded or codes}, (4)-(7)."""
+    """Of the rotation by `rate` about the vertical axis of the first moment: {name: Bounded or
+    codes}, (4)-(7).
+    """
     A1, A2, A3 = (bounded.of(A) for A in inertia)
     e, square = bounded.of(epsilon), bounded.of(rate) * bounded.of(rate)
     over, other = A1 - A2, A1 - A3
@@ -35,16 +41,24 @@ def rotation(inertia, epsilon, rate):
     b = A2 * two + A3 * three + square * (free * free)
     place = np.where(over.sign() == other.sign(), over.sign(), 0.0)
     middle = over.sign() * other.sign() < 0.0
-    # (6): the rotation about the least axis with epsilon < 0, or the largest with epsilon > 0, must be fast enough
+    # (6): the rotation about the least axis with epsilon < 0, or the largest with epsilon > 0, must
+    # be fast enough
     needs = place * e.value > 0.0
     least = Bounded(abs(e.value)).sqrt() * roots(A1, A2, A3, place) / A1
     beyond = (bounded.of(abs(np.asarray(rate, dtype=float))) - least).sign()
     free_top = (e.value == 0.0) & (square.value == 0.0)
     verdict = np.where(middle, np.where(kappa.sign() != 0.0, UNSTABLE, UNDECIDED), UNDECIDED)
     verdict = np.where((place != 0.0) & ~needs & ~free_top, STABLE, verdict)
-    verdict = np.where((place != 0.0) & needs, np.select([beyond > 0.0, beyond < 0.0], [STABLE, UNSTABLE], -1), verdict)
-    growth, slow, fast = _modes(A2 * A3, b, two * three, _discriminant(A1, A2, A3, e, square, free), verdict)
-    verdict = np.where((verdict == UNDECIDED) & (growth.value > growth.bar), UNSTABLE, verdict)  # two equal moments
+    verdict = np.where(
+        (place != 0.0) & needs,
+        np.select([beyond > 0.0, beyond < 0.0], [STABLE, UNSTABLE], -1),
+        verdict,
+    )
+    growth, slow, fast = _modes(
+        A2 * A3, b, two * three, _discriminant(A1, A2, A3, e, square, free), verdict
+    )
+    # two equal moments
+    verdict = np.where((verdict == UNDECIDED) & (growth.value > growth.bar), UNSTABLE, verdict)
     zero, one = np.zeros_like(A1.value), np.ones_like(A1.value)
     known = integrals((A1, A2, A3), e, [bounded.of(x) for x in (np.asarray(rate, float) + zero, zero, zero)],
                       [bounded.of(x) for x in (one, zero, zero)])  # fmt: skip
@@ -66,7 +80,9 @@ def roots(A1, A2, A3, side):
 
 def clipped(number):
     """The number, or 0 where it is negative."""
-    return Bounded(np.maximum(number.value, 0.0), np.clip(number.value + number.bar, 0.0, number.bar))
+    return Bounded(
+        np.maximum(number.value, 0.0), np.clip(number.value + number.bar, 0.0, number.bar)
+    )
 
 
 def _discriminant(A1, A2, A3, e, square, free):
@@ -77,14 +93,19 @@ def _discriminant(A1, A2, A3, e, square, free):
 
 
 def _modes(a, b, c, d, verdict):
-    """Largest real part, least and largest imaginary part of the roots of a x^4 + b x^2 + c, d = b^2 - 4 a c."""
+    """Largest real part, least and largest imaginary part of the roots of a x^4 + b x^2 + c, d =
+    b^2 - 4 a c.
+    """
     meets = abs(d.value) <= d.bar  # then the squares x may be equal, or a complex pair
     spread = np.where(meets, np.sqrt(abs(d.value) + d.bar), 0.0) / (2.0 * a.value)
-    real, doubt = meets | (d.value > 0.0), np.sqrt(spread * bounded.UP)  # |sqrt(x + y) - sqrt(x)| <= sqrt|y|
+    # |sqrt(x + y) - sqrt(x)| <= sqrt|y|
+    real, doubt = meets | (d.value > 0.0), np.sqrt(spread * bounded.UP)
     root = bounded.where(real & ~meets, d, 0.0).sqrt()
     outer = (b + np.where(b.value < 0.0, -1.0, 1.0) * root) / (-2.0 * a)  # without cancellation
     none = abs(outer.value) <= outer.bar
-    inner = bounded.where(none, Bounded(0.0 * outer.value, abs(outer.value) + outer.bar), c / (a * outer))
+    inner = bounded.where(
+        none, Bounded(0.0 * outer.value, abs(outer.value) + outer.bar), c / (a * outer)
+    )
     size, half = bounded.where(real, 1.0, c / a).sqrt(), b / (-2.0 * a)
     # sqrt(x) = p + i q of complex x: 2 p^2 = |x| + Re x, 2 q^2 = |x| - Re x
     p, q = ((0.5 * clipped(size + side * half)).sqrt() for side in (1.0, -1.0))
@@ -115,13 +136,20 @@ def critical(inertia, epsilon, sigma, area, sign):
     y = p / alpha
     low, middle, high, ranks = _sorted(D)
     # differences without cancellation: D_i - D_j = (A_i - A_j) / ((1 + sigma A_i)(1 + sigma A_j))
-    gap = {(i, j): (inertia[i] - inertia[j]) / (factors[i] * factors[j]) for i in range(3) for j in range(3) if i != j}
+    gap = {
+        (i, j): (inertia[i] - inertia[j]) / (factors[i] * factors[j])
+        for i in range(3)
+        for j in range(3)
+        if i != j
+    }
     upper, lower, all_ = (_picked(gap, ranks, *pair) for pair in ((2, 1), (1, 0), (2, 0)))
     above = (y - middle).sign()
     fast = bounded.where(above > 0.0, upper * (y - low), lower * (high - y))
     slow = bounded.where(above > 0.0, all_ * (y - middle), all_ * (middle - y))
     turn = alpha * s
-    period = 2.0 * np.pi / (Bounded(abs(turn.value), turn.bar) * bounded.mean(fast.sqrt(), slow.sqrt()))
+    period = (
+        2.0 * np.pi / (Bounded(abs(turn.value), turn.bar) * bounded.mean(fast.sqrt(), slow.sqrt()))
+    )
     period = Bounded(period.value, period.bar + 1.3e-16 * abs(period.value))  # of 2 pi
     rests = (above == 0.0) | (abs(turn.value) <= turn.bar)
     half = 0.5 * (D[0] + D[1] + D[2])

@@ -1,13 +1,16 @@
 """Where permanent rotations of Clebsch's case lose stability, along one parameter.
 
-A rotation about the vertical axis of the first moment is stable where both others are larger, or both smaller, and
+A rotation about the vertical axis of the first moment is stable where both others are larger, or
+both smaller, and
 
     Q = A1^2 Omega^2 - s epsilon (sqrt(A2 |A1 - A3|) + sqrt(A3 |A1 - A2|))^2 > 0,  s = sign(A1 - A2),
 
-(7) of `scenes/brun_triaxial.md`. Along Omega and epsilon the zeros of Q are closed forms. With the largest moment
-first, sqrt(1 - Q / (A1 Omega)^2) is sin(a + b), sin^2 a = A2 / A1, sin^2 b = A3 / A1, and a + b >= pi / 2 as no moment
-is larger than the sum of the others; with the least first it is sinh(a + b): either way Q is monotonic in each moment
-between values at which two moments are equal, so that it has one zero there, or none.
+(7) of `scenes/brun_triaxial.md`. Along Omega and epsilon the zeros of Q are closed forms. With the
+  largest moment
+first, sqrt(1 - Q / (A1 Omega)^2) is sin(a + b), sin^2 a = A2 / A1, sin^2 b = A3 / A1, and a + b >=
+pi / 2 as no moment is larger than the sum of the others; with the least first it is sinh(a + b):
+either way Q is monotonic in each moment between values at which two moments are equal, so that it
+has one zero there, or none.
 """
 
 from itertools import pairwise
@@ -17,7 +20,8 @@ import numpy as np
 from survey.measures import bounded
 from survey.measures.body import clebsch
 
-RATE, EQUAL = "critical_rate", "equal_moments"  # it is too slow, or its moment becomes the middle one
+# it is too slow, or its moment becomes the middle one
+RATE, EQUAL = "critical_rate", "equal_moments"
 MOMENTS = ("A", "B", "C")
 HALVINGS = 80
 
@@ -81,12 +85,17 @@ def _side(A1, A2, A3):
 
 def _excess(A1, A2, A3, side, fixed):
     """Q (Bounded): positive where the rotation is fast enough."""
-    roots, turn = clebsch.roots(*map(bounded.of, (A1, A2, A3)), side), bounded.of(A1) * fixed["Omega"]
+    roots, turn = (
+        clebsch.roots(*map(bounded.of, (A1, A2, A3)), side),
+        bounded.of(A1) * fixed["Omega"],
+    )
     return turn * turn - side * fixed["epsilon"] * (roots * roots)
 
 
 def _root(function, low, high):
-    """(zero, bar) of a monotonic function between low and high; () if there is none, None if that is not certain."""
+    """(zero, bar) of a monotonic function between low and high; () if there is none, None if that
+    is not certain.
+    """
     signs = [float(function(x).sign()) for x in (low, high)]
     if signs[0] * signs[1] > 0.0:
         return ()
@@ -98,7 +107,10 @@ def _root(function, low, high):
         a, b = (middle, b) if np.sign(function(middle).value) == signs[0] else (a, middle)
     x, width = 0.5 * (a + b), 2.0 * np.spacing(max(abs(a), abs(b)))
     while low < x - width and x + width < high:
-        if float(function(x - width).sign()) == signs[0] and float(function(x + width).sign()) == signs[1]:
+        if (
+            float(function(x - width).sign()) == signs[0]
+            and float(function(x + width).sign()) == signs[1]
+        ):
             return x, width
         width *= 2.0
     return x, high - low

@@ -1,15 +1,16 @@
-"""The boundaries of Clebsch's case on maps of the scene brun_triaxial: where a rotation, or a critical motion, becomes
-stable.
+"""The boundaries of Clebsch's case on maps of the scene brun_triaxial: where a rotation, or a
+critical motion, becomes stable.
 
-With the moment A1 of the axis, A2 and A3 the others, and s the sign that A1 - A2 and A1 - A3 share, a rotation about
-the axis of the least or the largest moment is stable where
+With the moment A1 of the axis, A2 and A3 the others, and s the sign that A1 - A2 and A1 - A3 share,
+a rotation about the axis of the least or the largest moment is stable where
 
     Omega^2 - s epsilon (sin(a + b))^2 > 0,  A1 sin(a + b) = sqrt(s A2 (A1 - A3)) + sqrt(s A3 (A1 - A2))        (7),
 
-and that about the middle one is not: where two moments are equal it changes if (7) holds. Critical motions are stable
-where the product in (12) is positive. Equation numbers: `scenes/brun_triaxial.md`. The curves are searched for on LINES
-lines of the map each way; every point is bracketed on its line by certain signs. Along one parameter alone those of
-rotations are known in closed form, see `critical_rates`.
+and that about the middle one is not: where two moments are equal it changes if (7) holds. Critical
+motions are stable where the product in (12) is positive. Equation numbers:
+`scenes/brun_triaxial.md`. The curves are searched for on LINES lines of the map each way; every
+point is bracketed on its line by certain signs. Along one parameter alone those of rotations are
+known in closed form, see `critical_rates`.
 """
 
 import numpy as np
@@ -21,7 +22,10 @@ from survey.measures.sampled import joined
 CLASSES = {"critical_rate": 0, "equal_moments": 1, "critical_motion": 2}
 TITLE = "where the rotation becomes stable (at its critical rate, or as two moments are equal), or the critical motion"
 MOMENTS = critical_rates.MOMENTS
-AXES = {"rotation": (*MOMENTS, "epsilon", "Omega"), "critical": (*MOMENTS, "epsilon", "sigma", "p_psi")}
+AXES = {
+    "rotation": (*MOMENTS, "epsilon", "Omega"),
+    "critical": (*MOMENTS, "epsilon", "sigma", "p_psi"),
+}
 ALONG = ()
 LINES = 129
 
@@ -37,7 +41,9 @@ def refusal(axes, scene, options=None):
         return f"question = {options['question']} has no verdict ({' and '.join(AXES)} have)"
     if len(axes) in (1, 2, 3) and any(set(axes) <= set(own) for own in AXES.values()):
         return None
-    known = " or of ".join(f"{', '.join(own)} (question {question})" for question, own in AXES.items())
+    known = " or of ".join(
+        f"{', '.join(own)} (question {question})" for question, own in AXES.items()
+    )
     return f"curves are known on up to three axes of {known}, not on {', '.join(axes) or 'none'}"
 
 
@@ -49,7 +55,11 @@ def closed(square, axes, fixed, options):
     first = options.get("axis", "A")  # of critical motions it does not matter
     one, other = (name for name in MOMENTS if name != first)
     functions = {
-        "rotation": (("critical_rate", rate, one), ("equal_moments", equal, one), ("equal_moments", equal, other)),
+        "rotation": (
+            ("critical_rate", rate, one),
+            ("equal_moments", equal, one),
+            ("equal_moments", equal, other),
+        ),
         "critical": (("critical_motion", motion, one),),
     }[options["question"]]
     found = []
@@ -59,7 +69,9 @@ def closed(square, axes, fixed, options):
             here = fixed | dict(zip(axes, square.parameters(x).T, strict=True))
             order = first, second, other if second == one else one
             with np.errstate(all="ignore"):
-                value = function([bounded.of(here[key] + np.zeros(len(x))) for key in order], here | sense)
+                value = function(
+                    [bounded.of(here[key] + np.zeros(len(x))) for key in order], here | sense
+                )
             return value.value, value.bar + np.zeros(len(x))
 
         lines = contours.lines(on_map, square, LINES)

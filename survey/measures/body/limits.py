@@ -1,7 +1,9 @@
-"""What the invariant set of a whole body holds, and whether it can be observed there: limits of motions, and portraits.
+"""What the invariant set of a whole body holds, and whether it can be observed there: limits of
+motions, and portraits.
 
-A limit of the reduced flow is stable on the set where the flow attracts (or, in an integrable stratum, keeps what is
-beside it); it is observable where deviations from the set do not grow along it either.
+A limit of the reduced flow is stable on the set where the flow attracts (or, in an integrable
+stratum, keeps what is beside it); it is observable where deviations from the set do not grow along
+it either.
 """
 
 import math
@@ -18,8 +20,10 @@ from survey.measures.body.transversal import NOTHING, STABLE, UNDECIDED, UNSTABL
 from survey.measures.cylinder import fate, portrait
 from survey.status import OK
 
-VERDICT = {(STABLE, STABLE): 2, (STABLE, UNSTABLE): 1}  # of (reduced, observable); a limit unstable on the set: 0
-UNIFORM = 10  # the fate of a steady rotation about the vertical, beside those of `kernels.cylinder.fate`
+# of (reduced, observable); a limit unstable on the set: 0
+VERDICT = {(STABLE, STABLE): 2, (STABLE, UNSTABLE): 1}
+# the fate of a steady rotation about the vertical, beside those of `kernels.cylinder.fate`
+UNIFORM = 10
 _KEPT = (kf.PERIODIC_ROTATION, kf.PERIODIC_LIBRATION)
 
 
@@ -29,7 +33,8 @@ def verdict(reduced, beside):
 
 
 def of_fate(method, placed, rtol):
-    """The fate of the reduced motion of a Placed (not OFF), as in `measures.cylinder.fate`; its transversal stability.
+    """The fate of the reduced motion of a Placed (not OFF), as in `measures.cylinder.fate`; its
+    transversal stability.
 
     (result {name: array (1)}, reduced stability, Beside).
     """
@@ -49,7 +54,11 @@ def of_fate(method, placed, rtol):
     if code in (kf.SPIN_UP_PLUS, kf.SPIN_UP_MINUS):
         return result, STABLE, replace(NOTHING, stable=transversal.fast(placed))
     if code in _KEPT:
-        return result, STABLE, transversal.along(placed, (*start[0], 0.0, 0.0), code == kf.PERIODIC_ROTATION)
+        return (
+            result,
+            STABLE,
+            transversal.along(placed, (*start[0], 0.0, 0.0), code == kf.PERIODIC_ROTATION),
+        )
     if code == kf.LIBRATION:
         row = _row(s.librations, result["limit_phi"][0])
     elif code in (kf.ROTATION_PLUS, kf.ROTATION_MINUS):
@@ -76,7 +85,9 @@ def _along(placed, s, row, code):
     x, bar = row[rt.CYCLE_X], row[rt.CYCLE_BAR] * placed.widening
     if code == kf.LIBRATION:
         return transversal.along(placed, (x, 0.0, bar, 0.0), False)
-    return transversal.along(placed, (s.section, x if code == kf.ROTATION_PLUS else -x, 0.0, bar), True)
+    return transversal.along(
+        placed, (s.section, x if code == kf.ROTATION_PLUS else -x, 0.0, bar), True
+    )
 
 
 def _rest_of(s, phi, bar):
@@ -108,10 +119,11 @@ def reduced_exponents(row):
 
 
 def of_portrait(method, placed, rtol):
-    """({name: array} of `measures.cylinder.portrait` for one system, equilibria and cycles with what is beside them).
+    """({name: array} of `measures.cylinder.portrait` for one system, equilibria and cycles with
+    what is beside them).
 
-    Equilibria and cycles are lists of (reduced stability, Beside), in the order of the portrait's; for an equilibrium
-    its reduced exponents and their bars come before.
+    Equilibria and cycles are lists of (reduced stability, Beside), in the order of the portrait's;
+    for an equilibrium its reduced exponents and their bars come before.
     """
     result = portrait.solve(method, placed.six[None], rtol)
     for name in ("equilibrium_phi", "cycle_w", "cycle_multiplier", "cycle_period"):
@@ -125,8 +137,16 @@ def of_portrait(method, placed, rtol):
     cycles = []
     if (result["cycle_kind"] != portrait.NONE).any():
         s = fate.remembered(method, placed.six)
-        tables = ((kf.ROTATION_PLUS, s.plus), (kf.ROTATION_MINUS, s.minus), (kf.LIBRATION, s.librations))
-        cycles = [(_of_cycle(row), _along(placed, s, row, code)) for code, table in tables for row in table]
+        tables = (
+            (kf.ROTATION_PLUS, s.plus),
+            (kf.ROTATION_MINUS, s.minus),
+            (kf.LIBRATION, s.librations),
+        )
+        cycles = [
+            (_of_cycle(row), _along(placed, s, row, code))
+            for code, table in tables
+            for row in table
+        ]
     return result, at_rest, cycles[: portrait.CYCLES]
 
 
@@ -136,7 +156,10 @@ def at_rests(placed):
     if found is None:
         return None
     rows = zip(*found, strict=True)
-    return [(nu, bar, transversal.steady(placed.system, np.zeros(3), nu, 20.0 * bar)) for nu, bar in rows]
+    return [
+        (nu, bar, transversal.steady(placed.system, np.zeros(3), nu, 20.0 * bar))
+        for nu, bar in rows
+    ]
 
 
 def has_portrait(placed):

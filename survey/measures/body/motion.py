@@ -1,7 +1,7 @@
 """Motions of a whole body: (w, nu) at given times with error bars, by the steps of a method.
 
-A row that misses the asked accuracy is solved again with smaller steps, and the better answer is kept. Motions into the
-past are those of the reversed body: (B, lambda, w, t) -> -(B, lambda, w, t).
+A row that misses the asked accuracy is solved again with smaller steps, and the better answer is
+kept. Motions into the past are those of the reversed body: (B, lambda, w, t) -> -(B, lambda, w, t).
 """
 
 import numpy as np
@@ -25,7 +25,9 @@ def trajectories(method, G, starts, times, rtol):
         systems, first = G[picked], starts[picked]
         if back:
             systems, first = systems * _REVERSED, first * np.repeat([-1.0, 1.0], 3)
-        part, ends = _ahead(method, systems, first, np.where(mine, np.abs(times), np.inf)[picked], rtol)
+        part, ends = _ahead(
+            method, systems, first, np.where(mine, np.abs(times), np.inf)[picked], rtol
+        )
         if back:
             part[..., :3] *= -1.0
         for result, new in ((floats, part), (status, ends)):
@@ -41,7 +43,10 @@ def _ahead(method, G, starts, times, rtol):
     floats, status = np.full((*times.shape, FLOATS), np.nan), np.full(times.shape, -1)
     left = np.arange(len(G))
     for tolerance in attempts(method, rtol):
-        new, ends = np.full((len(left), times.shape[1], FLOATS), np.nan), np.zeros(len(left), np.int64)
+        new, ends = (
+            np.full((len(left), times.shape[1], FLOATS), np.nan),
+            np.zeros(len(left), np.int64),
+        )
         method.body_trajectories(
             np.ascontiguousarray(G[left]), np.ascontiguousarray(starts[left]), np.ascontiguousarray(ascending[left]),
             tolerance, STEPS * min(method.FLOW_WORK, 10), new, ends,

@@ -18,7 +18,9 @@ MOST = 6
 
 
 def find(system):
-    """(positions nu (n, 3), their bars (n)); None where they fill a curve, or rounding leaves their number open."""
+    """(positions nu (n, 3), their bars (n)); None where they fill a curve, or rounding leaves their
+    number open.
+    """
     c, axes = np.linalg.eigh(system.C)
     s = axes.T @ system.s
     size = np.abs(c).max() + np.abs(s).max()

@@ -1,7 +1,8 @@
-"""A body and its initial state in numbers, turned into the frame of its axis of rotation, and its case in the paper.
+"""A body and its initial state in numbers, turned into the frame of its axis of rotation, and its
+case in the paper.
 
-In that frame w = (w, 0, 0) and nu = (cos theta, sin theta sin phi, sin theta cos phi). The set w2 = w3 = 0,
-nu1 = cos theta is invariant if and only if on it, for all phi and w,
+In that frame w = (w, 0, 0) and nu = (cos theta, sin theta sin phi, sin theta cos phi). The set w2 =
+w3 = 0, nu1 = cos theta is invariant if and only if on it, for all phi and w,
 
     A12 w' = torque_2,  A31 w' = torque_3,  A11 w' = torque_1,
 
@@ -13,9 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-ROUNDING = 8e-15  # 72 roundings: what turning a body into another frame may leave of a number that is 0
+# 72 roundings: what turning a body into another frame may leave of a number that is 0
+ROUNDING = 8e-15
 OFF, VERTICAL, CASE_A, CASE_B = range(4)
-# In units of A11 and of the body's times; each is 0 on the set. sin theta and cos theta are those of the initial state.
+# In units of A11 and of the body's times; each is 0 on the set. sin theta and cos theta are those
+# of the initial state.
 CONDITIONS = (
     "A12",
     "A31",
@@ -63,7 +66,10 @@ class System:
     def turned(self, Q):
         """The same in the axes that are the columns of Q."""
         tensors = (Q.T @ tensor @ Q for tensor in (self.A, self.B, self.C))
-        return System(*(0.5 * (t + t.T) for t in tensors), *(Q.T @ v for v in (self.moment, self.s, self.w, self.nu)))
+        return System(
+            *(0.5 * (t + t.T) for t in tensors),
+            *(Q.T @ v for v in (self.moment, self.s, self.w, self.nu)),
+        )
 
     def jacobian(self, w, nu):
         """d(w', nu') / d(w, nu) at a state, (6, 6)."""
@@ -90,7 +96,9 @@ def read(numbers):
         for entry, (i, j) in ENTRIES.items():
             matrix[i, j] = matrix[j, i] = entries[f"{tensor}{entry}"]
         tensors.append(matrix)
-    vectors = [np.array([entries[f"{v}{i}"] for i in (1, 2, 3)]) for v in ("lambda", "s", "omega", "gamma")]
+    vectors = [
+        np.array([entries[f"{v}{i}"] for i in (1, 2, 3)]) for v in ("lambda", "s", "omega", "gamma")
+    ]
     length = math.hypot(*vectors[3])
     if not 0.0 < length < math.inf or not _positive(tensors[0]):
         return None
@@ -106,7 +114,8 @@ def _positive(matrix):
 
 @dataclass(frozen=True)
 class Placed:
-    """A System turned so that its axis of rotation is axis 1, and what the paper's conditions say of it.
+    """A System turned so that its axis of rotation is axis 1, and what the paper's conditions say
+    of it.
 
     On the set (`case` not OFF) the numbers that vanish there are exactly 0 in `system`.
     """
@@ -133,15 +142,25 @@ class Placed:
 
         Each step of the flow counts four roundings of |f| |w| + |g|.
         """
-        b, c = np.hypot(*self.six[:2]), np.hypot(0.5 * self.six[2], self.six[3]) + np.hypot(*self.six[4:])
-        shares = [np.sum(bars) / size for bars, size in ((self.six_bars[:2], b), (self.six_bars[2:], c)) if size > 0.0]
+        b, c = (
+            np.hypot(*self.six[:2]),
+            np.hypot(0.5 * self.six[2], self.six[3]) + np.hypot(*self.six[4:]),
+        )
+        shares = [
+            np.sum(bars) / size
+            for bars, size in ((self.six_bars[:2], b), (self.six_bars[2:], c))
+            if size > 0.0
+        ]
         return 1.0 + max(shares, default=0.0) / (4.0 * 2.0**-53)
 
 
 def place(system):
-    """The Placed of a System: of its possible axes of rotation, the one on which it misses the set by least."""
+    """The Placed of a System: of its possible axes of rotation, the one on which it misses the set
+    by least.
+    """
     return min(
-        (_placed(system, axis) for axis in _axes(system)), key=lambda p: (p.case == OFF, p.residuals @ p.residuals)
+        (_placed(system, axis) for axis in _axes(system)),
+        key=lambda p: (p.case == OFF, p.residuals @ p.residuals),
     )
 
 
@@ -157,9 +176,11 @@ def _axes(system):
 
 
 def frame(axis):
-    """An orthogonal matrix whose first column is the axis, its sign such that the largest component is positive.
+    """An orthogonal matrix whose first column is the axis, its sign such that the largest component
+    is positive.
 
-    An axis of the body's own frame leaves its tensors as they are, but for a cyclic change of their indices.
+    An axis of the body's own frame leaves its tensors as they are, but for a cyclic change of their
+    indices.
     """
     n = axis / np.abs(axis).max()
     n = n / math.sqrt(n @ n)
@@ -191,7 +212,22 @@ def _placed(system, axis):
     A_norm, B_norm, C_norm, moment_norm, s_norm = norms
     torque = moment_norm + B_norm * abs(cos)
     couple = (s_norm + 2.0 * C_norm * abs(cos)) * abs(cos)
-    sizes = np.array([A_norm, A_norm, B_norm, torque, torque, *[C_norm] * 4, s_norm + 2.0 * C_norm, couple, couple]) / a
+    sizes = (
+        np.array(
+            [
+                A_norm,
+                A_norm,
+                B_norm,
+                torque,
+                torque,
+                *[C_norm] * 4,
+                s_norm + 2.0 * C_norm,
+                couple,
+                couple,
+            ]
+        )
+        / a
+    )
     bars = ROUNDING * sizes
     case = OFF
     if (np.abs(residuals) <= bars).all():
@@ -202,7 +238,17 @@ def _placed(system, axis):
     turned = np.count_nonzero(Q) > 3  # else nothing but the division by A11 is rounded
     rounding = ROUNDING if turned else 4.0 * 2.0**-53
     scales = (
-        np.array([B_norm, B_norm, 2.0 * C_norm, C_norm, s_norm + C_norm * abs(cos), s_norm + C_norm * abs(cos)]) / a
+        np.array(
+            [
+                B_norm,
+                B_norm,
+                2.0 * C_norm,
+                C_norm,
+                s_norm + C_norm * abs(cos),
+                s_norm + C_norm * abs(cos),
+            ]
+        )
+        / a
     )
     six_bars = rounding * (scales if turned else np.abs(six))
     six[np.abs(six) <= six_bars] = 0.0

@@ -1,4 +1,5 @@
-"""Do deviations from the invariant set grow along a limit of the reduced motion? Transversal exponents and multipliers.
+"""Do deviations from the invariant set grow along a limit of the reduced motion? Transversal
+exponents and multipliers.
 
 The set carries (phi, w). Beside it, at |nu| = 1, lie w2, w3 and eta = nu1 / sin theta: to first order three linear
 equations with coefficients in w, sin phi and cos phi. In case B the integral k (7) is 0 on the set and
@@ -6,8 +7,9 @@ its gradient is transversal: one exponent is 0, one multiplier 1, which only lea
 taken out, and two remain, with the sum and the product of two. In case A k varies along the set, and all three count.
 About the vertical the set is a line of steady rotations: beside it, at the same k, are w2, w3, nu2, nu3.
 
-In case B the divergence is (B12, B31) S^-1 (-cos phi, sin phi), S the block of A in axes 2 and 3, whatever the other
-parameters. For S = a 1 it is -(A11 / a) f, so that no attracting limit of the reduced flow is observable.
+In case B the divergence is (B12, B31) S^-1 (-cos phi, sin phi), S the block of A in axes 2 and 3,
+whatever the other parameters. For S = a 1 it is -(A11 / a) f, so that no attracting limit of the
+reduced flow is observable.
 """
 
 import math
@@ -26,7 +28,9 @@ EPS = 2.0**-52
 
 @dataclass(frozen=True)
 class Beside:
-    """Of a limit: exponents or, over a period, multipliers (complex), the largest rate of growth; is that below 0?"""
+    """Of a limit: exponents or, over a period, multipliers (complex), the largest rate of growth;
+    is that below 0?
+    """
 
     values: np.ndarray
     bars: np.ndarray
@@ -42,7 +46,9 @@ NOTHING = Beside(np.zeros(0, complex), np.zeros(0), np.nan, np.nan, UNDECIDED)
 
 @dataclass(frozen=True)
 class Linear:
-    """z' = (M[0] + w M[1] + sin phi M[2] + cos phi M[3]) z for z = (w2, w3, eta) over their units; w is 1 / time."""
+    """z' = (M[0] + w M[1] + sin phi M[2] + cos phi M[3]) z for z = (w2, w3, eta) over their units;
+    w is 1 / time.
+    """
 
     M: np.ndarray
     slip: float  # what rounding leaves of M, relative
@@ -53,7 +59,10 @@ class Linear:
 
     def size(self, w):
         """Bound of the norm at any phi."""
-        return sum(np.linalg.norm(m, np.inf) * s for m, s in zip(self.M, (1.0, abs(w), 1.0, 1.0), strict=True))
+        return sum(
+            np.linalg.norm(m, np.inf) * s
+            for m, s in zip(self.M, (1.0, abs(w), 1.0, 1.0), strict=True)
+        )
 
 
 def linear(placed):
@@ -70,7 +79,12 @@ def linear(placed):
         rows = (J @ columns)[1:4]
         return rows / np.array([unit, unit, sin])[:, None]
 
-    up, down, side, fast = matrix(0.0, 0.0, 1.0), matrix(0.0, 0.0, -1.0), matrix(0.0, 1.0, 0.0), matrix(unit, 0.0, 1.0)
+    up, down, side, fast = (
+        matrix(0.0, 0.0, 1.0),
+        matrix(0.0, 0.0, -1.0),
+        matrix(0.0, 1.0, 0.0),
+        matrix(unit, 0.0, 1.0),
+    )
     constant = 0.5 * (up + down)
     M = np.ascontiguousarray([constant, (fast - up) / unit, side - constant, up - constant])
     slip = 4.0 * ROUNDING * np.linalg.cond(b.A)
@@ -87,17 +101,23 @@ def at_rest(placed, phi, bar):
     """Of the equilibrium at phi, known within its bar."""
     beside = linear(placed)
     matrix = beside.at(phi, 0.0)
-    off = beside.slip * beside.size(0.0) + bar * sum(np.linalg.norm(m, np.inf) for m in beside.M[2:])
+    off = beside.slip * beside.size(0.0) + bar * sum(
+        np.linalg.norm(m, np.inf) for m in beside.M[2:]
+    )
     if placed.case == CASE_A:
         return of_matrix(matrix, off)
     trace, minors = np.trace(matrix), _minors(matrix)
     size = np.linalg.norm(matrix, np.inf)
     trace, trace_bar = (0.0, 0.0) if beside.free else (trace, 3.0 * (off + 4.0 * EPS * size))
-    roots, bars = quadratic(trace, minors, trace_bar, minors_bar := 6.0 * (off + 4.0 * EPS * size) * size)
+    roots, bars = quadratic(
+        trace, minors, trace_bar, minors_bar := 6.0 * (off + 4.0 * EPS * size) * size
+    )
     order = np.argsort(-roots.real, kind="stable")
     roots, bars = roots[order], bars[order]
     stable = _negative([trace, -minors], [trace_bar, minors_bar], beside.free)
-    growth = 0.5 * trace if minors - minors_bar > (0.5 * abs(trace) + trace_bar) ** 2 else roots[0].real
+    growth = (
+        0.5 * trace if minors - minors_bar > (0.5 * abs(trace) + trace_bar) ** 2 else roots[0].real
+    )
     growth_bar = 0.5 * trace_bar if growth == 0.5 * trace else bars[0]
     return Beside(roots, bars, float(growth), float(growth_bar), stable)
 
@@ -108,7 +128,9 @@ def _minors(matrix):
 
 
 def _negative(numbers, bars, neutral):
-    """Are all numbers negative? The first may be exactly 0 where that is `neutral`: nothing grows or decays."""
+    """Are all numbers negative? The first may be exactly 0 where that is `neutral`: nothing grows
+    or decays.
+    """
     pairs = list(zip(numbers, bars, strict=True))
     if any(x - bar > 0.0 for x, bar in pairs):
         return UNSTABLE
@@ -128,13 +150,17 @@ def quadratic(total, product, total_bar, product_bar):
         off = 1.1 * (abs(x) * total_bar + product_bar) + total_bar * total_bar
         rest = gap * gap - 4.0 * off
         bars.append(
-            2.0 * off / (gap + math.sqrt(rest)) if rest > 0.0 else 0.5 * gap + math.sqrt(0.25 * gap * gap + off)
+            2.0 * off / (gap + math.sqrt(rest))
+            if rest > 0.0
+            else 0.5 * gap + math.sqrt(0.25 * gap * gap + off)
         )
     return roots, 1.01 * np.array(bars) + 4.0 * EPS * np.abs(roots)
 
 
 def of_matrix(matrix, off):
-    """Eigenvalues of a real matrix known within `off` (a norm), as exponents; near a defective one with wide bars."""
+    """Eigenvalues of a real matrix known within `off` (a norm), as exponents; near a defective one
+    with wide bars.
+    """
     if not np.isfinite(matrix).all():
         return NOTHING
     values, vectors = np.linalg.eig(matrix)
@@ -146,9 +172,12 @@ def of_matrix(matrix, off):
             condition = np.linalg.norm(left, axis=1) * np.linalg.norm(vectors, axis=0)
         except np.linalg.LinAlgError:
             condition = np.full(n, np.inf)
-    apart = np.array([min([abs(x - y) for j, y in enumerate(values) if j != i]) for i, x in enumerate(values)])
+    apart = np.array(
+        [min([abs(x - y) for j, y in enumerate(values) if j != i]) for i, x in enumerate(values)]
+    )
     first = 2.0 * condition * off
-    wide = 2.0 * (2.0 * size + off) ** (1.0 - 1.0 / n) * off ** (1.0 / n)  # Elsner's bound, for any matrix
+    # Elsner's bound, for any matrix
+    wide = 2.0 * (2.0 * size + off) ** (1.0 - 1.0 / n) * off ** (1.0 / n)
     bars = np.where(first < 0.1 * apart, first, np.minimum(np.maximum(first, apart), wide))
     bars = np.where(np.isfinite(bars), bars, wide)
     order = np.lexsort((values.imag, -values.real))
@@ -160,22 +189,28 @@ def of_matrix(matrix, off):
 
 
 def along(placed, start, rotates):
-    """Of the periodic motion from `start` (phi, w and their bars): multipliers over a period; growth per unit time.
+    """Of the periodic motion from `start` (phi, w and their bars): multipliers over a period;
+    growth per unit time.
 
     Where the motion does not close within the bars, NOTHING.
     """
     beside, p = linear(placed), np.ascontiguousarray(coefficients(*placed.six))
     start, bars = np.array(start[:2], float), np.array(start[2:], float)
     found = [
-        _monodromy(beside, p, start + side * bars, rotates) for side in ((0.0, 1.0, -1.0) if bars.any() else (0.0,))
+        _monodromy(beside, p, start + side * bars, rotates)
+        for side in ((0.0, 1.0, -1.0) if bars.any() else (0.0,))
     ]
     if any(one is None for one in found):
         return NOTHING
     matrix, (period, period_bar, log_det, log_bar, off) = found[0]
     for other, notes in found[1:]:  # what the start is off
         off = max(off, found[0][1][kernel.MATRIX_BAR] + 1.2 * np.abs(other - matrix).max())
-        period_bar = max(period_bar, found[0][1][kernel.PERIOD_BAR] + 1.2 * abs(notes[kernel.PERIOD] - period))
-        log_bar = max(log_bar, found[0][1][kernel.LOG_DET_BAR] + 1.2 * abs(notes[kernel.LOG_DET] - log_det))
+        period_bar = max(
+            period_bar, found[0][1][kernel.PERIOD_BAR] + 1.2 * abs(notes[kernel.PERIOD] - period)
+        )
+        log_bar = max(
+            log_bar, found[0][1][kernel.LOG_DET_BAR] + 1.2 * abs(notes[kernel.LOG_DET] - log_det)
+        )
     if not (log_bar < 1.0 and period_bar < 0.1 * period):
         return NOTHING
     lasting = {"period": period, "period_bar": period_bar}
@@ -197,9 +232,12 @@ def along(placed, start, rotates):
         beside.free,
     )  # fmt: skip
     found = _timed(values[order], bars[order], stable, lasting)
-    if 4.0 * (product - product_bar) > (abs(total) + total_bar) ** 2:  # a pair of complex multipliers
+    # a pair of complex multipliers
+    if 4.0 * (product - product_bar) > (abs(total) + total_bar) ** 2:
         growth, bar = 0.5 * log_det / period, 0.5 * log_bar / period
-        return replace(found, growth=growth, growth_bar=bar + abs(growth) * (1.1 * period_bar / period + EPS))
+        return replace(
+            found, growth=growth, growth_bar=bar + abs(growth) * (1.1 * period_bar / period + EPS)
+        )
     return found
 
 
@@ -207,7 +245,11 @@ def _monodromy(beside, p, start, rotates):
     """The matrix over a period and what the kernel notes of it; None where the motion does not close."""
     matrix, notes = np.empty((kernel.SIZE, kernel.SIZE)), np.zeros(5)
     closed = kernel.monodromy(p, beside.M, beside.slip, start, bool(rotates), matrix, notes)
-    return (matrix, notes) if closed and np.isfinite(matrix).all() and np.isfinite(notes).all() else None
+    return (
+        (matrix, notes)
+        if closed and np.isfinite(matrix).all() and np.isfinite(notes).all()
+        else None
+    )
 
 
 def _timed(values, bars, stable, lasting):
@@ -219,13 +261,22 @@ def _timed(values, bars, stable, lasting):
         return Beside(values, bars, np.nan, np.nan, stable, **lasting)
     growth = math.log(middle) / period
     bar = max(math.log(high / middle), math.log(middle / low)) / period
-    return Beside(values, bars, growth, bar + abs(growth) * (1.1 * period_bar / period + EPS), stable, **lasting)
+    return Beside(
+        values,
+        bars,
+        growth,
+        bar + abs(growth) * (1.1 * period_bar / period + EPS),
+        stable,
+        **lasting,
+    )
 
 
 def fast(placed):
-    """Of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments, else undecided.
+    """Of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments,
+    else undecided.
 
-    To leading order d(w2, w3)/dt = w S^-1 J (S - A11) (w2, w3): the squares of its exponents are -det(S - A11)/det S.
+    To leading order d(w2, w3)/dt = w S^-1 J (S - A11) (w2, w3): the squares of its exponents are
+    -det(S - A11)/det S.
     """
     S, a = placed.system.A[1:, 1:], placed.system.A[0, 0]
     between = np.linalg.det(S - a * np.eye(2)) if placed.case != VERTICAL else 0.0
@@ -253,7 +304,11 @@ def steady(system, w, nu, off=0.0):
     unit = math.sqrt(max(np.abs(matrix[:2, 2:]).max(), 1e-300))
     scale = np.array([unit, unit, 1.0, 1.0]) if unit > 1e-100 else np.ones(4)
     matrix = matrix * scale[None, :] / scale[:, None]
-    slip = (ROUNDING + off) * np.linalg.cond(system.A) * max(np.abs(matrix).max(), size * min(1.0, unit))
+    slip = (
+        (ROUNDING + off)
+        * np.linalg.cond(system.A)
+        * max(np.abs(matrix).max(), size * min(1.0, unit))
+    )
     return of_matrix(matrix, slip)
 
 

@@ -1,9 +1,9 @@
 """Flows on the cylinder, phi' = w, w' = f(phi) w + g(phi): solutions, fates, portraits.
 
-METHODS lists what a method that serves the family "cylinder" (the gyrostat) or "abel" (a user's f and g) offers; one
-that answers only some questions says so in WHEN, and leaves out what the others need. A method that has one step is
-made complete by `survey.kernels.cylinder`: `steps`, `returns` and `fate` take its `flow_setting`, `flow_begin` and
-`flow_at`.
+METHODS lists what a method that serves the family "cylinder" (the gyrostat) or "abel" (a user's f
+and g) offers; one that answers only some questions says so in WHEN, and leaves out what the others
+need. A method that has one step is made complete by `survey.kernels.cylinder`: `steps`, `returns`
+and `fate` take its `flow_setting`, `flow_begin` and `flow_at`.
 
 P (rows, 10) holds the columns B12 to BOUND_DDG of `survey.kernels.cylinder.flow`, p is one row of it; `starts`
 (rows, 2) holds phi0 and w0. `tolerance` bounds the truncation error of one step (of phi, and of w relative to 1 + |w|),
@@ -17,7 +17,9 @@ from survey.contract import Function, Value
 METHODS = {
     "cylinder": {
         "FLOW_FINEST": Value("the least tolerance of one step that is of use", float, needed=True),
-        "FLOW_WORK": Value("how many steps it takes where Taylor's method of order 20 takes one", int, needed=True),
+        "FLOW_WORK": Value(
+            "how many steps it takes where Taylor's method of order 20 takes one", int, needed=True
+        ),
         "flow_trajectories": Function(
             "fill floats (rows, n, STATE: PHI to W_BAR), turnings (rows, n; UNDETERMINED if unknown) and status (rows) "
             "at ascending times (rows, n) >= 0, a row of which may end in infinities",
@@ -46,11 +48,36 @@ METHODS = {
         ),
         "flow_cycles": Function(
             "append the fixed points of a return map to `cycles`, see `kernels.cylinder.returns.fixed_points`",
-            ("kind", "p", "eqs", "count", "anchor", "interval", "xs", "tolerance", "cycles", "found", "edges"),
+            (
+                "kind",
+                "p",
+                "eqs",
+                "count",
+                "anchor",
+                "interval",
+                "xs",
+                "tolerance",
+                "cycles",
+                "found",
+                "edges",
+            ),
         ),
         "flow_fates": Function(
             "fill out (rows, FATE) for initial states, see `kernels.cylinder.fate.fates`",
-            ("p", "section", "ends", "sizes", "eqs", "plus", "minus", "lib", "starts", "tolerance", "limit", "out"),
+            (
+                "p",
+                "section",
+                "ends",
+                "sizes",
+                "eqs",
+                "plus",
+                "minus",
+                "lib",
+                "starts",
+                "tolerance",
+                "limit",
+                "out",
+            ),
         ),
         "flow_line": Function(
             "fill out (m, POINT) with the points of a branch or a cycle in a window, see `kernels.cylinder.lines.line`",
@@ -78,16 +105,20 @@ METHODS = {
             "fill out (rows, 4, 2, ROW) with branches of the saddles, see `kernels.cylinder.connections.connections`",
             ("P", "wanted", "tolerance", "out"),
         ),
-        "flow_setting": Function("what controls the steps of one solution", ("p", "w", "tolerance")),
+        "flow_setting": Function(
+            "what controls the steps of one solution", ("p", "w", "tolerance")
+        ),
         "flow_begin": Function(
             "expand at (phi, w) into the table T of `kernels.cylinder.flow`, controlled by `flow_setting`; returns the "
             "length of the step",
             None,
         ),
         "flow_at": Function(
-            "(phi, w, integral of f, integral of g) at dt after the start of the step in T", ("p", "T", "dt")
+            "(phi, w, integral of f, integral of g) at dt after the start of the step in T",
+            ("p", "T", "dt"),
         ),
     }
 }
-# Flows of one's own, whose rows of P go on (see `survey.kernels.cylinder.program`), take the same from a method.
+# Flows of one's own, whose rows of P go on (see `survey.kernels.cylinder.program`), take the same
+# from a method.
 METHODS["abel"] = METHODS["cylinder"]

@@ -1,7 +1,8 @@
-"""What a process of its own compiles at the first use of a question (see `survey.sweep.compile_ahead`).
+"""What a process of its own compiles at the first use of a question (see
+`survey.sweep.compile_ahead`).
 
-The kernels are called on nothing. They are those that come after the cycles of fates and portraits, or one of the two
-of Abel's equation.
+The kernels are called on nothing. They are those that come after the cycles of fates and portraits,
+or one of the two of Abel's equation.
 """
 
 import numpy as np

@@ -1,12 +1,14 @@
-"""Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits, point by point.
+"""Method "auto" for flows on the cylinder: closed forms where they apply and keep their digits,
+point by point.
 
-The rule is read off the true errors that `survey failures gyrostat` maps (rtol = 1e-10). Of all initial states of
-a system with b = 0 a closed form serves every one on that plane, with a median error of 4e-16 against 9e-15 of the
-Taylor series and at a cost free of t. Next to double and triple roots (separatrices, folds) it serves 38 % of the
-plane, the series 84 %; on (61), from conservative to stiff, 87 % and 100 %. The error bounds show where: so `method`,
-the Taylor series, is asked where no closed form answers or its bound misses rtol, and its answer is taken where its
-bound is no wider. dop853, rk4 or full alone serve 5 points of 4776. What still misses rtol is solved in double-double
-arithmetic.
+The rule is read off the true errors that `survey failures gyrostat` maps (rtol = 1e-10). Of all
+initial states of a system with b = 0 a closed form serves every one on that plane, with a median
+error of 4e-16 against 9e-15 of the Taylor series and at a cost free of t. Next to double and triple
+roots (separatrices, folds) it serves 38 % of the plane, the series 84 %; on (61), from conservative
+to stiff, 87 % and 100 %. The error bounds show where: so `method`, the Taylor series, is asked
+where no closed form answers or its bound misses rtol, and its answer is taken where its bound is no
+wider. dop853, rk4 or full alone serve 5 points of 4776. What still misses rtol is solved in
+double-double arithmetic.
 """
 
 from functools import partial
@@ -15,7 +17,14 @@ import numpy as np
 
 from survey.kernels.cylinder import closed as forms
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    TURNING,
+    UNDETERMINED,
+)
 from survey.measures.cylinder import solution
 from survey.methods import closed
 
@@ -24,7 +33,9 @@ FINEST = 3e-16  # no float64 can be known better
 
 
 def trajectories(method, rows, times, rtol):
-    """As `solution.trajectories`: in closed form, and by `method` where that has no answer or too wide a bound."""
+    """As `solution.trajectories`: in closed form, and by `method` where that has no answer or too
+    wide a bound.
+    """
     return _by_rows(rows, times, partial(_trajectories, method, rtol))
 
 
@@ -35,12 +46,16 @@ def abel(method, rows, targets, rtol, before=False):
 
 def _by_rows(rows, columns, solve):
     """`solve(rows, columns, served)` for those that a closed form serves and for the others."""
-    if _served(rows[:: 1 + len(rows) // SAMPLE]).all():  # the few others, if any, are solved as what it misses
+    # the few others, if any, are solved as what it misses
+    if _served(rows[:: 1 + len(rows) // SAMPLE]).all():
         return solve(rows, columns, True)
     served = _served(rows)
     if not served.any():
         return solve(rows, columns, False)
-    parts = [solve(rows[pick], columns[pick], known) for pick, known in ((served, True), (~served, False))]
+    parts = [
+        solve(rows[pick], columns[pick], known)
+        for pick, known in ((served, True), (~served, False))
+    ]
     results = tuple(np.empty((len(rows), *result.shape[1:]), result.dtype) for result in parts[0])
     for pick, part in zip((served, ~served), parts, strict=True):
         for result, new in zip(results, part, strict=True):
@@ -59,7 +74,9 @@ def _trajectories(method, rtol, rows, times, served):
     solve = partial(solution.trajectories, rtol=rtol)
     if not served:
         results = solve(method, rows, times)
-        return _completed(results, _left_open(results, rtol), partial(solve, taylor_double), rows, times)
+        return _completed(
+            results, _left_open(results, rtol), partial(solve, taylor_double), rows, times
+        )
     results = solve(closed, rows, times)
     missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
     if uncounted.any():
@@ -73,14 +90,18 @@ def _abel(method, rtol, before, rows, targets, served):
     solve = partial(solution.abel, rtol=rtol, before=before)
     if not served:
         results = solve(method, rows, targets)
-        return _completed(results, _left_open(results, rtol), partial(solve, taylor_double), rows, targets)
+        return _completed(
+            results, _left_open(results, rtol), partial(solve, taylor_double), rows, targets
+        )
     results = solve(closed, rows, targets)
     missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
     return _further(solve, method, rtol, results, missed, rows, targets)
 
 
 def _further(solve, method, rtol, results, missed, rows, columns):
-    """`results` of closed forms; where they are missed those of `method`, and then of double-double arithmetic."""
+    """`results` of closed forms; where they are missed those of `method`, and then of double-double
+    arithmetic.
+    """
     some = missed.any(axis=1)
     if not some.any():
         return results
@@ -93,12 +114,17 @@ def _further(solve, method, rtol, results, missed, rows, columns):
 
 
 def _left_open(results, rtol):
-    """What double-double arithmetic may still answer: what misses rtol, unless by too many steps or an overflow, and
-    what has turned an undetermined number of times.
+    """What double-double arithmetic may still answer: what misses rtol, unless by too many steps or
+    an overflow, and what has turned an undetermined number of times.
     """
     status, missed = results[-1], solution.missed(results, max(rtol, FINEST))
     if missed.any():
-        missed &= (status == OK) | (status == TURNING) | (status == NO_CONVERGENCE) | (status == SEPARATRIX)
+        missed &= (
+            (status == OK)
+            | (status == TURNING)
+            | (status == NO_CONVERGENCE)
+            | (status == SEPARATRIX)
+        )
     if len(results) == 3:
         missed |= (results[1] == UNDETERMINED) & (status == OK)
     return missed

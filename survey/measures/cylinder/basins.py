@@ -1,10 +1,12 @@
-"""Fates of many initial states of one system, by the side of the curves between basins on which they lie.
+"""Fates of many initial states of one system, by the side of the curves between basins on which
+they lie.
 
-The curves are found once, and so are the regions between them: in a region all motions end alike, with as many turning
-points as those which they pass on their way through it. Each region is followed from two starts, as `fate` follows
-every start; then a start takes what holds in its region. Followed by themselves are the starts nearer to a curve than
-its error bar, and those of regions that a curve may part which was cut off: windings that come too near to one another,
-as on the way to an unstable cycle, or leave the range of the map.
+The curves are found once, and so are the regions between them: in a region all motions end alike,
+with as many turning points as those which they pass on their way through it. Each region is
+followed from two starts, as `fate` follows every start; then a start takes what holds in its
+region. Followed by themselves are the starts nearer to a curve than its error bar, and those of
+regions that a curve may part which was cut off: windings that come too near to one another, as on
+the way to an unstable cycle, or leave the range of the map.
 """
 
 import math
@@ -34,14 +36,17 @@ NARROWEST = 1e-9  # gaps, relative, in which fates are told
 BACK = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])  # S1, see `solution`
 SHARP = 1e-13  # error of a state that is no more than rounding beside the least bar of a piece
 FEWEST = 1_000  # starts of one system: fewer are followed
-SELDOM = 0.08  # share of the time for all cycles that the fates of few starts take, as most need none
+# share of the time for all cycles that the fates of few starts take, as most need none
+SELDOM = 0.08
 SYSTEMS = 8  # whose curves are kept: on maps of more, blocks would find them again
 _LOCK = threading.Lock()
 
 
 @dataclass(frozen=True)
 class Basins:
-    """The curves of one system, and the fates (VERDICT to STATUS of `records`) of the gaps between their pieces."""
+    """The curves of one system, and the fates (VERDICT to STATUS of `records`) of the gaps between
+    their pieces.
+    """
 
     p: np.ndarray
     breaks: np.ndarray
@@ -64,8 +69,12 @@ class Basins:
         return out, known
 
     def told(self, state):
-        """The fate of a state (PHI to W_BAR of `records`) if it is known far better than the curves; else None."""
-        if not state[rc.PHI_BAR] + state[rc.W_BAR] < SHARP * min(1.0, self.p[BOUND_F] + math.sqrt(self.p[BOUND_DG])):
+        """The fate of a state (PHI to W_BAR of `records`) if it is known far better than the
+        curves; else None.
+        """
+        if not state[rc.PHI_BAR] + state[rc.W_BAR] < SHARP * min(
+            1.0, self.p[BOUND_F] + math.sqrt(self.p[BOUND_DG])
+        ):
             return None
         out, known = self.of(np.ascontiguousarray(state[None, :2]))
         return out[0] if known[0] else None
@@ -73,17 +82,23 @@ class Basins:
 
 @dataclass(frozen=True)
 class Map:
-    """What of a whole survey decides how far curves are followed: the starts of one system, their largest |w|."""
+    """What of a whole survey decides how far curves are followed: the starts of one system, their
+    largest |w|.
+    """
 
     starts: int
     fastest: float
 
 
 def asked(request, names):
-    """The Map of a request for fates of systems with the parameters `names`; None if they are few, or not known."""
+    """The Map of a request for fates of systems with the parameters `names`; None if they are few,
+    or not known.
+    """
     own = [request.lines.get(name) for name in ("phi0", "w0")]
     shared = [request.ranges.get(name) for name in ("phi0", "w0")]
-    size = math.prod(line[0] for line in own if line) * max((line[0] for line in shared if line), default=1)
+    size = math.prod(line[0] for line in own if line) * max(
+        (line[0] for line in shared if line), default=1
+    )
     last = own[1] or shared[1]
     if not last or size < FEWEST:
         return None
@@ -106,7 +121,9 @@ def followed(method, six, s, starts, rtol, whole=None):
     basins = None
     if whole is not None and hasattr(method, "flow_pieces"):
         with _LOCK:  # threads that wait find it done
-            basins = _remembered(method.__name__, tuple(float(value) for value in six), float(rtol), whole)
+            basins = _remembered(
+                method.__name__, tuple(float(value) for value in six), float(rtol), whole
+            )
     if basins is None:
         return fate.followed(method, s, starts, rtol)
     out, known = basins.of(starts)
@@ -134,7 +151,10 @@ def found(method, s, rtol, whole):
     limits = _limits(s, scale)
     if limits is None:
         return None
-    top, most = min(max(whole.fastest, scale), 0.5 * limits.min()), min(max(2 * whole.starts, PIECES[0]), PIECES[1])
+    top, most = (
+        min(max(whole.fastest, scale), 0.5 * limits.min()),
+        min(max(2 * whole.starts, PIECES[0]), PIECES[1]),
+    )
     for cells in (COARSE, FINE):
         breaks, numbers, edges = _lattice(s, cells)
         falls = (_forces(s.p, 0.5 * (edges[1:] + edges[:-1])) < 0.0).astype(np.int64)
@@ -146,10 +166,16 @@ def found(method, s, rtol, whole):
     pieces = np.vstack([np.zeros((0, kb.PIECE)), *curves])
     ends = np.cumsum([0, *map(len, curves)])
     curve = np.repeat(np.stack([ends[:-1], ends[1:]], axis=1), np.diff(ends), axis=0)
-    order = np.lexsort((pieces[:, kb.OTHER], pieces[:, kb.REFERENCE], 2 * pieces[:, kb.CELL] + pieces[:, kb.SIDE]))
+    order = np.lexsort(
+        (pieces[:, kb.OTHER], pieces[:, kb.REFERENCE], 2 * pieces[:, kb.CELL] + pieces[:, kb.SIDE])
+    )
     pieces, curve = pieces[order], curve[order]
     keys = 2 * len(falls)
-    first, turning, resting = np.zeros(keys + 1, np.int64), np.zeros(keys, np.int64), np.zeros(keys, np.int64)
+    first, turning, resting = (
+        np.zeros(keys + 1, np.int64),
+        np.zeros(keys, np.int64),
+        np.zeros(keys, np.int64),
+    )
     if not kb.numbers(pieces, falls, first, turning, resting):
         return None
     gaps = len(pieces) + keys
@@ -157,7 +183,9 @@ def found(method, s, rtol, whole):
     size, cuts = kb.neighbours(pieces, order, curve, falls, first, turning, links, seeds)
     if size < 0:
         return None
-    parent, turns, counts, loops = (np.zeros(shape, np.int64) for shape in (gaps, gaps, gaps, (gaps, 2)))
+    parent, turns, counts, loops = (
+        np.zeros(shape, np.int64) for shape in (gaps, gaps, gaps, (gaps, 2))
+    )
     open_ = np.zeros(gaps, dtype=bool)
     kb.regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
     joined = Regions(parent, turns, counts, loops, open_)
@@ -179,7 +207,9 @@ class Lattice:
 
 @dataclass(frozen=True)
 class Regions:
-    """What gap each belongs to, and how its fates differ from those there; see `kernels.cylinder.basins.regions`."""
+    """What gap each belongs to, and how its fates differ from those there; see
+    `kernels.cylinder.basins.regions`.
+    """
 
     parent: np.ndarray
     turns: np.ndarray
@@ -200,7 +230,11 @@ def _limits(s, scale):
         for row in table:
             if row[rt.CYCLE_BAR] > LOOSE * scale and row[rt.CYCLE_X] > 20.0 * scale:
                 limits[side] = min(limits[side], 0.5 * row[rt.CYCLE_X])
-            elif row[rt.CYCLE_CLASS] < 0.0 or row[rt.CYCLE_BAR] > LOOSE * scale or row[rt.BELOW] == row[rt.ABOVE]:
+            elif (
+                row[rt.CYCLE_CLASS] < 0.0
+                or row[rt.CYCLE_BAR] > LOOSE * scale
+                or row[rt.BELOW] == row[rt.ABOVE]
+            ):
                 return None
     for row in s.librations:
         if row[rt.CYCLE_CLASS] < 0.0 or row[rt.CYCLE_BAR] > LOOSE or row[rt.BELOW] == row[rt.ABOVE]:
@@ -209,12 +243,17 @@ def _limits(s, scale):
 
 
 def _lattice(s, number):
-    """Breaks (equilibria and the section, over one turn), the numbers of the first cells after them, edges of cells."""
+    """Breaks (equilibria and the section, over one turn), the numbers of the first cells after
+    them, edges of cells.
+    """
     breaks = np.unique([*s.equilibria[:, eq.ANGLE], s.section % (2.0 * math.pi)])
     breaks = breaks[np.append(True, np.diff(breaks) > 1e-14)]
     breaks = np.append(breaks, breaks[0] + 2.0 * math.pi)
     cells = np.maximum(np.ceil(np.diff(breaks) * (number / (2.0 * math.pi))), 4).astype(np.int64)
-    edges = [low + (high - low) / n * np.arange(n) for low, high, n in zip(breaks[:-1], breaks[1:], cells, strict=True)]
+    edges = [
+        low + (high - low) / n * np.arange(n)
+        for low, high, n in zip(breaks[:-1], breaks[1:], cells, strict=True)
+    ]
     return breaks, np.append(0, np.cumsum(cells)), np.append(np.concatenate(edges), breaks[-1])
 
 
@@ -228,7 +267,19 @@ def _curves(method, s, edges, falls, scale, top, most):
     size = np.diff(edges)
 
     def followed(start, kind, cell):
-        given = p, start, edges, falls.astype(float), eqs, len(eqs), kind, cell, top, scale, TOLERANCE
+        given = (
+            p,
+            start,
+            edges,
+            falls.astype(float),
+            eqs,
+            len(eqs),
+            kind,
+            cell,
+            top,
+            scale,
+            TOLERANCE,
+        )
         count = method.flow_pieces(*given, most, out)
         whole = count and (kind == kb.BRANCH or out[count - 1, kb.ENDING] == kb.CLOSES)
         return out[:count].copy() if whole else None
@@ -259,7 +310,9 @@ def _curves(method, s, edges, falls, scale, top, most):
                 if row[rt.CYCLE_BAR] > LOOSE * scale:  # beyond the limits
                     continue
                 edge = int(np.argmin(np.abs(edges[:-1] - s.section % (2.0 * math.pi))))
-                start = np.array([edges[edge], -side * row[rt.CYCLE_X], 0.0, row[rt.CYCLE_BAR], 0.0, 0.0, 0.0])
+                start = np.array(
+                    [edges[edge], -side * row[rt.CYCLE_X], 0.0, row[rt.CYCLE_BAR], 0.0, 0.0, 0.0]
+                )
                 yield followed(start, kb.ROTATION, edge)
                 continue
             x = (row[rt.CYCLE_X] - edges[0]) % (2.0 * math.pi) + edges[0]
@@ -282,12 +335,16 @@ def _fates(method, s, rtol, lattice, regions):
         if len(members):
             others = members[key[members] % 2 != key[members[0]] % 2]
             regions_of.append(members)
-            pairs.append((members[0], others[0] if len(others) else members[min(1, len(members) - 1)]))
+            pairs.append(
+                (members[0], others[0] if len(others) else members[min(1, len(members) - 1)])
+            )
     if not pairs:
         return out
     pairs = np.array(pairs)
     rows = fate.followed(method, s, np.stack([phi[pairs], w[pairs]], axis=-1).reshape(-1, 2), rtol)
-    rows = _moved(rows, -regions.turns[pairs.ravel()], -regions.counts[pairs.ravel()]).reshape(-1, 2, rc.FATE)
+    rows = _moved(rows, -regions.turns[pairs.ravel()], -regions.counts[pairs.ravel()]).reshape(
+        -1, 2, rc.FATE
+    )
     for members, (one, two) in zip(regions_of, rows, strict=True):
         winds, counts = one[rc.NET_TURNS] != kf.NO_TURNS, one[rc.TURNINGS] >= 0
         loops = regions.loops[regions.parent[members[0]]]
@@ -295,7 +352,9 @@ def _fates(method, s, rtol, lattice, regions):
             continue
         if (counts and loops[1]) or one[rc.TURNINGS] == kf.UNDETERMINED:
             continue
-        out[members] = _moved(np.tile(one, (len(members), 1)), regions.turns[members], regions.counts[members])
+        out[members] = _moved(
+            np.tile(one, (len(members), 1)), regions.turns[members], regions.counts[members]
+        )
     return out
 
 
@@ -309,7 +368,12 @@ def _middles(lattice):
     high = np.where(rank < first[key + 1], u[np.minimum(rank, len(pieces))], low + lattice.scale)
     high = np.minimum(high, lattice.limits[key % 2])
     phi = lattice.edges[np.where(lattice.falls[key // 2] != 0, key // 2, key // 2 + 1)]
-    return phi, 0.5 * (low + high) * np.where(key % 2 == 0, 1.0, -1.0), (high - low) / (lattice.scale + low), key
+    return (
+        phi,
+        0.5 * (low + high) * np.where(key % 2 == 0, 1.0, -1.0),
+        (high - low) / (lattice.scale + low),
+        key,
+    )
 
 
 def _moved(rows, turns, counts):

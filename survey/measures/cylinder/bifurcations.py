@@ -1,13 +1,16 @@
-"""The curves on a map of two parameters at which a portrait changes: closed forms, `connections`, `cycle_folds`.
+"""The curves on a map of two parameters at which a portrait changes: closed forms, `connections`,
+`cycle_folds`.
 
-g is linear in d, c23, s2, s3, and f in b12, b31, so for each angle phi of an equilibrium the parameters of the map are:
+g is linear in d, c23, s2, s3, and f in b12, b31, so for each angle phi of an equilibrium the
+parameters of the map are:
 
     fold    g = g' = 0              two linear equations for two of d, c23, s2, s3; cusps where g'' = 0
     Hopf    f = g = 0, g' < 0       likewise; super- or subcritical as K < 0 or K > 0; it ends where g' = 0
     ends    K = 0, and L = 0 where K = 0 throughout: w -> +-inf attract on one side and repel on the other
 
-Where f = g = g' = 0 is a Bogdanov-Takens point. K = 0 on a Hopf curve implies L = 0: there the centre is a reversible
-one, and Hopf's theorem has no answer at any order. Sections 4 and 5 of `gyrostat.md`.
+Where f = g = g' = 0 is a Bogdanov-Takens point. K = 0 on a Hopf curve implies L = 0: there the
+centre is a reversible one, and Hopf's theorem has no answer at any order. Sections 4 and 5 of
+`gyrostat.md`.
 """
 
 import math
@@ -28,10 +31,12 @@ from survey.methods import taylor
 
 SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 FORCES = ("d", "c23", "s2", "s3")
-COUNTED, ASIDE = 5, 1e-4  # points of a curve beside which cycles are counted; how far beside, in units of the map
+# points of a curve beside which cycles are counted; how far beside, in units of the map
+COUNTED, ASIDE = 5, 1e-4
 TINY = 1e-300
 TURN = (0.0, 2.0 * math.pi)
-BARS = 32.0  # roundings, relative to the sizes of the terms, that the solution of two equations makes at most
+# roundings, relative to the sizes of the terms, that the solution of two equations makes at most
+BARS = 32.0
 LATTICE = 2048  # angles at which roots are looked for
 
 
@@ -98,14 +103,24 @@ def constant(system):
 
 
 def found(plane):
-    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves and points on the map."""
+    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves and points
+    on the map.
+    """
     with np.errstate(all="ignore"):
         hopfs = (row for curve in _hopfs(plane) for row in _hopf(plane, curve))
-        return [*_ends(plane), *connections.found(plane), *cycle_folds.found(plane), *_folds(plane), *hopfs]
+        return [
+            *_ends(plane),
+            *connections.found(plane),
+            *cycle_folds.found(plane),
+            *_folds(plane),
+            *hopfs,
+        ]
 
 
 def counted(plane, kind, xy, error, known):
-    """A row of `found` with the numbers of cycles to the left and to the right of some points of the curve."""
+    """A row of `found` with the numbers of cycles to the left and to the right of some points of
+    the curve.
+    """
     sides = np.full((2, len(xy)), np.nan)
     x = plane.positions(xy)
     for i in _spread(x) if len(xy) > 2 and plane.square.across is None else ():
@@ -119,18 +134,27 @@ def counted(plane, kind, xy, error, known):
             if s.stratum == G and s.conclusive and not s.folded and not s.unknown:
                 side[i] = len(s.plus) + len(s.minus) + len(s.librations)
     names = ("cycles_left", "cycles_right")
-    return kind, xy, error, known | {name: (side, 0.0 * side) for name, side in zip(names, sides, strict=True)}
+    return (
+        kind,
+        xy,
+        error,
+        known | {name: (side, 0.0 * side) for name, side in zip(names, sides, strict=True)},
+    )
 
 
 def _spread(x):
     """Numbers of COUNTED inner points that divide a curve, positions x (m, 2), evenly."""
     along = np.cumsum(np.hypot(*np.diff(x, axis=0).T))
-    return np.unique(np.clip(np.searchsorted(along, np.linspace(0.0, along[-1], COUNTED)), 1, len(x) - 2))
+    return np.unique(
+        np.clip(np.searchsorted(along, np.linspace(0.0, along[-1], COUNTED)), 1, len(x) - 2)
+    )
 
 
 @dataclass(frozen=True)
 class Curve:
-    """Parameters xy(t) (m, 2), low <= t <= high, their error bounds bar(t), and the angle phi(t) of the equilibrium."""
+    """Parameters xy(t) (m, 2), low <= t <= high, their error bounds bar(t), and the angle phi(t) of
+    the equilibrium.
+    """
 
     xy: object
     bar: object
@@ -159,7 +183,9 @@ def _straight(plane, a, b, c, noise, phi=None):
 
 
 def _run(plane, curve, kind, tests=()):
-    """The curve on the map, parted where one of the `tests` changes; kind(t of its middle) is its class, or None."""
+    """The curve on the map, parted where one of the `tests` changes; kind(t of its middle) is its
+    class, or None.
+    """
     for t in runs(lambda t: plane.positions(curve.xy(t)), curve.low, curve.high, tests):
         own = kind(t[[t.size // 2]] if t.size > 2 else np.array([0.5 * (t[0] + t[-1])]))
         if own:
@@ -169,7 +195,8 @@ def _run(plane, curve, kind, tests=()):
 def _drawn(plane, curve, kind, t):
     """One row of `found`."""
     xy, bar, known = curve.xy(t), curve.bar(t), {}
-    for border in (plane.square.low, plane.square.high):  # a point on the border to within its rounding is on it
+    # a point on the border to within its rounding is on it
+    for border in (plane.square.low, plane.square.high):
         xy = np.where(abs(xy - border) <= bar, border, xy)
     error = np.hypot(*(bar / np.maximum(plane.widths(xy), TINY)).T) + 4.0 * plane.square.grain
     if curve.phi is not None:
@@ -188,17 +215,29 @@ def _marks(plane, curve, kind, function):
         if _special(plane, curve.xy(t)) and abs(value[0]) <= 1e-6 * slope[0] + bar[0]:
             name, xy, error, known = _drawn(plane, curve, kind, t)
             late = 1.1 * (bar / np.maximum(slope, TINY) + 2.0 * np.spacing(abs(t) + 1.0))
-            speed = (curve.xy(t + late + step) - curve.xy(t - late - step)) / (2.0 * (late + step)) / plane.widths(xy)
+            speed = (
+                (curve.xy(t + late + step) - curve.xy(t - late - step))
+                / (2.0 * (late + step))
+                / plane.widths(xy)
+            )
             turned = abs(curve.phi(t + step) - curve.phi(t - step)) / (2.0 * step)
             angle, rough = known["equilibrium_phi"]
-            yield name, xy, error + late * np.hypot(*speed.T), {"equilibrium_phi": (angle, rough + late * turned)}
+            yield (
+                name,
+                xy,
+                error + late * np.hypot(*speed.T),
+                {"equilibrium_phi": (angle, rough + late * turned)},
+            )
 
 
 def _special(plane, xy):
     """Is a point on the map, with neither f nor g identically 0 there?"""
     system = plane.system(xy)
     least = 1e-9 * min(plane.square.high - plane.square.low)
-    return inside(plane.positions(xy))[0] and min(size(system), abs(system["b12"]) + abs(system["b31"])) > least
+    return (
+        inside(plane.positions(xy))[0]
+        and min(size(system), abs(system["b12"]) + abs(system["b31"])) > least
+    )
 
 
 def _rest(plane):
@@ -223,7 +262,9 @@ def _folds(plane):
 
 
 def _pair(plane, phi):
-    """(g0, g0', determinant, (a, a', b, b')) of the equations g0 + a x + b y = 0 and g0' + a' x + b' y = 0."""
+    """(g0, g0', determinant, (a, a', b, b')) of the equations g0 + a x + b y = 0 and g0' + a' x +
+    b' y = 0.
+    """
     g, dg, _ = force(_rest(plane), phi)
     (a, da, _), (b, db, _) = (parts(name, phi) for name in plane.axes)
     return g, dg, a * db - b * da, (a, da, b, db)
@@ -246,7 +287,9 @@ def _bend(plane, curve, phi):
 
 
 def _all_at(plane, phi):
-    """Where at an angle one equation is 0 = 0, as by symmetry, and the other is not: its solutions, a straight line."""
+    """Where at an angle one equation is 0 = 0, as by symmetry, and the other is not: its solutions,
+    a straight line.
+    """
     g, dg, _, (a, da, b, db) = _pair(plane, phi)
     noise, own = 8.0 * ROUNDOFF, size(_rest(plane))
     first, second = max(abs(a), abs(b)) > noise, max(abs(da), abs(db)) > noise
@@ -269,7 +312,8 @@ def _folds_of_one(plane, name):
         value = -(g * a + dg * da) / (a * a + da * da)
         sizes = size(rest | {name: value})
         slope = abs(mixed(phi + 1e-6) - mixed(phi - 1e-6)) / 2e-6
-        late = BARS * ROUNDOFF * sizes / max(slope, TINY)  # error of the angle; g'' moves the value with it
+        # error of the angle; g'' moves the value with it
+        late = BARS * ROUNDOFF * sizes / max(slope, TINY)
         bend = abs(force(rest | {name: value}, phi)[2]) + 4.0 * sizes * late
         bar = (BARS * ROUNDOFF * sizes + late * bend) / math.hypot(a, da)
         yield _straight(plane, 1.0 - at, 1.0 * at, -value, lambda xy, bar=bar: bar, phi)
@@ -304,7 +348,9 @@ def _hopf_of_both(plane, name, side):
     other = plane.axes[1 - at]
 
     def phi(t):
-        return np.arctan2(*((t, rest["b31"]) if name == "b12" else (rest["b12"] + 0.0 * t, t))) + side
+        return (
+            np.arctan2(*((t, rest["b31"]) if name == "b12" else (rest["b12"] + 0.0 * t, t))) + side
+        )
 
     def pair(t, value):
         return np.stack(np.broadcast_arrays(*((t, value) if at == 0 else (value, t))), axis=-1)
@@ -313,7 +359,9 @@ def _hopf_of_both(plane, name, side):
         return pair(t, -force(rest, phi(t))[0] / parts(other, phi(t))[0])
 
     def bar(t):
-        return pair(0.0 * t, BARS * ROUNDOFF * size(plane.system(xy(t))) / abs(parts(other, phi(t))[0]))
+        return pair(
+            0.0 * t, BARS * ROUNDOFF * size(plane.system(xy(t))) / abs(parts(other, phi(t))[0])
+        )
 
     return Curve(xy, bar, phi, plane.square.low[at], plane.square.high[at])
 
@@ -321,7 +369,9 @@ def _hopf_of_both(plane, name, side):
 def _hopfs_at_rest(plane):
     """Both axes in f: at each equilibrium a straight line through b = 0."""
     table = np.zeros((eq.MOST, 10))
-    p = np.ascontiguousarray(coefficients(*(_rest(plane)[name] for name in ("b12", "b31", *FORCES))))
+    p = np.ascontiguousarray(
+        coefficients(*(_rest(plane)[name] for name in ("b12", "b31", *FORCES)))
+    )
     for row in table[: eq.equilibria(p, table)[0]] if p[BOUND_G] > 0.0 else ():
         line = {"b12": math.cos(row[eq.ANGLE]), "b31": -math.sin(row[eq.ANGLE])}
         bar = row[eq.BAR] + 4.0 * ROUNDOFF
@@ -334,14 +384,16 @@ def _hopf(plane, curve):
 
     def slope(t):
         system = plane.system(curve.xy(t))
-        return force(system, curve.phi(t))[1] + 0.0 * t, BARS * ROUNDOFF * size(system) + 4.0 * curve.bar(t).sum(
-            axis=-1
-        )
+        return force(system, curve.phi(t))[1] + 0.0 * t, BARS * ROUNDOFF * size(
+            system
+        ) + 4.0 * curve.bar(t).sum(axis=-1)
 
     def ends(t):
         system = plane.system(curve.xy(t))
         terms = abs(system["b12"]) + abs(system["b31"]) + abs(system["s2"]) + abs(system["s3"])
-        return constant(system) + 0.0 * t, terms * (8.0 * ROUNDOFF * terms + curve.bar(t).sum(axis=-1))
+        return constant(system) + 0.0 * t, terms * (
+            8.0 * ROUNDOFF * terms + curve.bar(t).sum(axis=-1)
+        )
 
     def kind(t):
         (steep, _), (value, bar) = slope(t), ends(t)
@@ -364,7 +416,10 @@ def _ends(plane):
     rest = _rest(plane)
     slopes = {"b12": rest["s3"], "b31": -rest["s2"], "s3": rest["b12"], "s2": -rest["b31"]}
     a, b = (slopes.get(name, 0.0) for name in plane.axes)
-    both, c = {("b12", "s3"): 1.0, ("b31", "s2"): -1.0}.get(tuple(sorted(plane.axes)), 0.0), constant(rest)
+    both, c = (
+        {("b12", "s3"): 1.0, ("b31", "s2"): -1.0}.get(tuple(sorted(plane.axes)), 0.0),
+        constant(rest),
+    )
     if both:
         curves = _hyperbola(plane, both, c)
     elif a or b:
@@ -383,7 +438,10 @@ def _nothing(xy):
 def _hyperbola(plane, both, c):
     """both x y + c = 0."""
     if c == 0.0:
-        return [_straight(plane, 1.0, 0.0, 0.0, _nothing), _straight(plane, 0.0, 1.0, 0.0, _nothing)]
+        return [
+            _straight(plane, 1.0, 0.0, 0.0, _nothing),
+            _straight(plane, 0.0, 1.0, 0.0, _nothing),
+        ]
     ratio, found = -c / both, []
 
     def curve(side, low, high):
@@ -396,7 +454,10 @@ def _hyperbola(plane, both, c):
     for side in (1.0, -1.0):
         # log |x| where x has this sign, and where y has the sign that it has then, on the plane
         (x_low, x_high), (y_low, y_high) = _parts(plane, (side, math.copysign(side, side * ratio)))
-        low, high = max(x_low, math.log(abs(ratio)) - y_high), min(x_high, math.log(abs(ratio)) - y_low)
+        low, high = (
+            max(x_low, math.log(abs(ratio)) - y_high),
+            min(x_high, math.log(abs(ratio)) - y_low),
+        )
         if low < high:
             beyond = 0.5 * (high - low)  # so that the borders are crossed
             found.append(curve(side, low - beyond, high + beyond))
@@ -404,8 +465,8 @@ def _hyperbola(plane, both, c):
 
 
 def _parts(plane, signs):
-    """The logarithms (low, high) of the magnitudes of either coordinate where it has this sign on the plane; the lower
-    above the higher one where it never has.
+    """The logarithms (low, high) of the magnitudes of either coordinate where it has this sign on
+    the plane; the lower above the higher one where it never has.
     """
     parts = []
     for low, high, sign in zip(plane.square.low, plane.square.high, signs, strict=True):
@@ -425,7 +486,8 @@ def _next_ends(plane, rest):
         noise = lambda xy: 8.0 * ROUNDOFF * (abs(c) + abs(a * xy[..., 0]) + abs(b * xy[..., 1]))  # noqa: E731
         return [_straight(plane, a, b, c, noise)] if a or b else []
     if len(mine) == 2:
-        half = 0.5 * math.atan2(2.0 * c23, d) if c23 or d else None  # (b12, b31) = b (cos, sin) of it, or across
+        # (b12, b31) = b (cos, sin) of it, or across
+        half = 0.5 * math.atan2(2.0 * c23, d) if c23 or d else None
         if half is None:
             return []
         pairs = [{"b12": math.cos(x), "b31": math.sin(x)} for x in (half, half + 0.5 * math.pi)]

@@ -1,4 +1,6 @@
-"""Blocks as rows for the measures of this folder, and their results as outputs of a scene in the block's shape."""
+"""Blocks as rows for the measures of this folder, and their results as outputs of a scene in the
+block's shape.
+"""
 
 import numpy as np
 
@@ -11,7 +13,8 @@ MOST_TURNINGS = 2**31 - 1  # are kept as int32
 
 
 def dense(point, names, name):
-    """(rows of the numbers `names`, values of `name`, function that brings results back into the block's shape).
+    """(rows of the numbers `names`, values of `name`, function that brings results back into the
+    block's shape).
 
     The dimensions along which only `name` varies become columns: one solution serves them all.
     """
@@ -51,7 +54,9 @@ def trajectories(rows, times, back, measure, method, rtol):
 
 
 def at_times(results, good, back):
-    """The outputs of the question `trajectory`, from floats, turnings and status where the input is `good`."""
+    """The outputs of the question `trajectory`, from floats, turnings and status where the input is
+    `good`.
+    """
     floats, turnings, status = results
     status = np.where(good, status, INVALID_PARAMETERS)
     lost = status != OK
@@ -76,8 +81,12 @@ def at_angles(results, good, back):
     results = {"status": back(status)}
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), TURNING)):
         here = status == code
-        for name, value, bar in zip(names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True):
-            results[name], results[f"{name}_error"] = (back(_only(here, floats[..., at])) for at in (value, bar))
+        for name, value, bar in zip(
+            names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True
+        ):
+            results[name], results[f"{name}_error"] = (
+                back(_only(here, floats[..., at])) for at in (value, bar)
+            )
     return results
 
 
@@ -90,7 +99,9 @@ def _only(here, values):
 
 def _systems(point, names, flows):
     """`flows` of the parameters `names`, which it is given as rows, and their shape in the block."""
-    given = np.stack(np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in names)), axis=-1)
+    given = np.stack(
+        np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in names)), axis=-1
+    )
     return flows(given.reshape(-1, len(names))), given.shape[:-1]
 
 

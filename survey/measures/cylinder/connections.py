@@ -1,13 +1,17 @@
-"""Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable branch of a saddle.
+"""Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable
+branch of a saddle.
 
-Two kinds are looked for: those on which w keeps its sign, over at most a turn, and those with one turning point (a
-loop, or a way back to another saddle). Of either a function of the parameters says by how much both branches miss each
-other: the difference of w where they pass the same equilibrium, or of their turning points. It is continuous, and
-beyond the angle that a branch does not reach it is continued by how far from it the branch turns. Its zeros are found
-as those of `survey.measures.contours`, and followed on from where the lattice loses them, as where folds and points of
-codimension two are near (`survey.measures.tips`); connections with more turning points are not looked for.
+Two kinds are looked for: those on which w keeps its sign, over at most a turn, and those with one
+turning point (a loop, or a way back to another saddle). Of either a function of the parameters says
+by how much both branches miss each other: the difference of w where they pass the same equilibrium,
+or of their turning points. It is continuous, and beyond the angle that a branch does not reach it
+is continued by how far from it the branch turns. Its zeros are found as those of
+`survey.measures.contours`, and followed on from where the lattice loses them, as where folds and
+points of codimension two are near (`survey.measures.tips`); connections with more turning points
+are not looked for.
 
-Saddles are told apart by their V; where two have the same the labels change, and a jump there is no zero.
+Saddles are told apart by their V; where two have the same the labels change, and a jump there is no
+zero.
 """
 
 from collections.abc import Callable
@@ -47,7 +51,9 @@ def _every():
     for sides, one, two in product((UPPER, LOWER), (HIGH, LOW), (HIGH, LOW)):
         yield Connection(((sides[0], one), (sides[1], two)), partial(_passing, one == two))
     for sides, one, two, wall in product((RIGHT, LEFT), (HIGH, LOW), (HIGH, LOW), (HIGH, LOW)):
-        yield Connection(((sides[0], one), (sides[1], two)), partial(_turning, one == wall, two == wall))
+        yield Connection(
+            ((sides[0], one), (sides[1], two)), partial(_turning, one == wall, two == wall)
+        )
 
 
 def found(plane):
@@ -75,8 +81,14 @@ def curves(plane):
 
 
 def _continuous(function, pieces):
-    """The pieces [(positions (m, 2), errors (m))] of curves without what is a jump of the function, and no zero."""
-    return [(x[part], error[part]) for x, error in pieces for part in contours.runs(_smooth(function, x, error))]
+    """The pieces [(positions (m, 2), errors (m))] of curves without what is a jump of the function,
+    and no zero.
+    """
+    return [
+        (x[part], error[part])
+        for x, error in pieces
+        for part in contours.runs(_smooth(function, x, error))
+    ]
 
 
 def _traced(plane, x, wanted):
@@ -91,7 +103,9 @@ def _traced(plane, x, wanted):
 
 
 def missed(plane, connection, x):
-    """By how much both branches of a connection miss each other at positions x (m, 2), and its error bound."""
+    """By how much both branches of a connection miss each other at positions x (m, 2), and its
+    error bound.
+    """
     wanted = np.zeros((4, 2))
     for branch in connection.branches:
         wanted[branch] = 1.0
@@ -104,7 +118,14 @@ def _smooth(function, x, error):
     good = np.ones(len(x), bool)
     for axis in np.eye(2):
         near, beside = (
-            abs(np.subtract(*(function(np.clip(x + side * step * axis, 0.0, 1.0))[0] for side in (1.0, -1.0))))
+            abs(
+                np.subtract(
+                    *(
+                        function(np.clip(x + side * step * axis, 0.0, 1.0))[0]
+                        for side in (1.0, -1.0)
+                    )
+                )
+            )
             for step in (2.0 * error[:, None], BESIDE)
         )
         good &= ~(near > 0.5 * beside) | (error > 0.1 * BESIDE)
@@ -112,7 +133,9 @@ def _smooth(function, x, error):
 
 
 def _passing(same, one, two):
-    """Of two branches on which w keeps its sign: w at the centre between their saddles, or at the saddle between."""
+    """Of two branches on which w keeps its sign: w at the centre between their saddles, or at the
+    saddle between.
+    """
     pair = (one[:, cn.COLUMNS] == 4.0) & (two[:, cn.COLUMNS] == 4.0)
     single = (one[:, cn.COLUMNS] == 2.0) & (two[:, cn.COLUMNS] == 2.0)
     at = 1 if same else 0
@@ -134,19 +157,29 @@ def _level(row, column):
 
 
 def _turning(first_own, second_own, one, two):
-    """Of two branches that turn before the same saddle (their own, a turn further, if so): their turning points."""
+    """Of two branches that turn before the same saddle (their own, a turn further, if so): their
+    turning points.
+    """
     count = one[:, cn.COLUMNS]
-    (x, x_bar, x_in), (y, y_bar, y_in) = (_beside(row, own) for row, own in ((one, first_own), (two, second_own)))
-    good = (count == two[:, cn.COLUMNS]) & ((count == 4.0) | (first_own & second_own)) & (x_in | y_in)
+    (x, x_bar, x_in), (y, y_bar, y_in) = (
+        _beside(row, own) for row, own in ((one, first_own), (two, second_own))
+    )
+    good = (
+        (count == two[:, cn.COLUMNS]) & ((count == 4.0) | (first_own & second_own)) & (x_in | y_in)
+    )
     return np.where(good, x - y, np.nan), x_bar + y_bar
 
 
 def _beside(row, own):
-    """The turning point of a branch less the saddle behind it, or beyond that w there; its bar; does it turn before?"""
+    """The turning point of a branch less the saddle behind it, or beyond that w there; its bar;
+    does it turn before?
+    """
     column = np.where(own, row[:, cn.COLUMNS] - 1.0, 1.0)
     column = np.where(np.isfinite(column), column, 0.0).astype(int)
     rows = np.arange(len(row))
-    wall, w, bar = (row[rows, first + step * column] for first, step in ((cn.OFFSETS, 1), (0, 2), (1, 2)))
+    wall, w, bar = (
+        row[rows, first + step * column] for first, step in ((cn.OFFSETS, 1), (0, 2), (1, 2))
+    )
     turned = row[:, cn.PASSED] == column
     x = np.where(turned, row[:, cn.TURN] - wall, w)
     return x, np.where(turned, row[:, cn.TURN_BAR], bar), turned

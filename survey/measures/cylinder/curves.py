@@ -1,7 +1,7 @@
 """The curves that [boundaries] draws on maps of the flow phi' = w, w' = f w + g on the cylinder.
 
-On a map of initial states they part the fates: see `separatrices`. On a map of two parameters they part the portraits:
-see `bifurcations`.
+On a map of initial states they part the fates: see `separatrices`. On a map of two parameters they
+part the portraits: see `bifurcations`.
 """
 
 import numpy as np
@@ -18,7 +18,9 @@ CLASSES = {
     "cycle_fold": 16,
 }  # fmt: skip
 TITLE = "what the curve is"
-_COUNTED = "to some points of each curve on a map of two parameters, where the return maps are conclusive"
+_COUNTED = (
+    "to some points of each curve on a map of two parameters, where the return maps are conclusive"
+)
 STATE = ("phi0", "w0")
 ALONG = (
     Output("equilibrium_phi", "angle of the equilibrium, or of the saddle of a stable manifold", r"\varphi_e",
@@ -42,7 +44,11 @@ def refusal(axes, scene, options=None):
     if not {p.name for p in scene.PARAMETERS}.issuperset(SYSTEM):
         return "curves are known of the scene gyrostat, whose parameters the outputs reduced_NAME are; ask there"
     own = set(axes[:2])
-    if len(axes) in (2, 3) and (own == set(STATE) or own <= set(SYSTEM)) and set(axes[2:]) <= set(SYSTEM):
+    if (
+        len(axes) in (2, 3)
+        and (own == set(STATE) or own <= set(SYSTEM))
+        and set(axes[2:]) <= set(SYSTEM)
+    ):
         return None
     return (
         f"curves are known on two axes of {', '.join(SYSTEM)}, or on {', '.join(STATE)}, in either case with at most "
@@ -55,7 +61,9 @@ def _refusal_of_own(axes, scene):
     own = [p.name for p in scene.own]
     if scene.period is None:
         return "no curves are known: they are where f and g have the period 2 pi (PERIOD)"
-    if len(axes) in (2, 3) and (set(axes) <= set(own) or (set(axes[:2]) == set(STATE) and set(axes[2:]) <= set(own))):
+    if len(axes) in (2, 3) and (
+        set(axes) <= set(own) or (set(axes[:2]) == set(STATE) and set(axes[2:]) <= set(own))
+    ):
         return None
     return (
         f"curves are known on two axes of {', '.join(own)}, or three, or on {', '.join(STATE)} with at most one more "
@@ -80,18 +88,25 @@ def closed(square, axes, fixed, options):
     if set(axes) != set(STATE):
         plane = bifurcations.Plane(square, tuple(axes), fixed)
         return _of_parameters(plane, bifurcations.found(plane))
-    found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, [fixed[k] for k in SYSTEM])]
+    found = [
+        (CLASSES[kind], *rest)
+        for kind, *rest in separatrices.found(square, axes, [fixed[k] for k in SYSTEM])
+    ]
     return joined(found, [output.name for output in ALONG])
 
 
 def _of_parameters(plane, found):
-    """The Curves on a map of parameters, with the numbers of cycles beside them and those that are unexplained."""
+    """The Curves on a map of parameters, with the numbers of cycles beside them and those that are
+    unexplained.
+    """
     with np.errstate(all="ignore"):
         rows = [bifurcations.counted(plane, *row) for row in found]
         missed = None
         if plane.square.across is None:
             missed = cycle_counts.unexplained(plane, rows, cycle_counts.on_lattice(plane))
-    curves = joined([(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG])
+    curves = joined(
+        [(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG]
+    )
     curves.unexplained = missed
     return curves
 

@@ -1,9 +1,11 @@
-"""Folds of cycles on a map of two parameters: where a return map touches the identity, and two cycles are one.
+"""Folds of cycles on a map of two parameters: where a return map touches the identity, and two
+cycles are one.
 
-There the change D of the map has an extremum on which it is 0: a multiplier passes +1. Extrema are looked for on a
-lattice of the map, by the signs of the map's slope less 1 among SCANNED points, and where the extremal D changes its
-sign from one node to the next a fold is followed (`survey.measures.tracks`). What a fold does between lines of the
-lattice alone, and folds whose cycles nearly touch a saddle throughout, may be missed.
+There the change D of the map has an extremum on which it is 0: a multiplier passes +1. Extrema are
+looked for on a lattice of the map, by the signs of the map's slope less 1 among SCANNED points, and
+where the extremal D changes its sign from one node to the next a fold is followed
+(`survey.measures.tracks`). What a fold does between lines of the lattice alone, and folds whose
+cycles nearly touch a saddle throughout, may be missed.
 """
 
 import math
@@ -15,18 +17,29 @@ from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, values
 from survey.measures import tracks
-from survey.measures.cylinder.fate import FINE, MIRROR, G, flow_of, mirrored_equilibria, outline, signed
+from survey.measures.cylinder.fate import (
+    FINE,
+    MIRROR,
+    G,
+    flow_of,
+    mirrored_equilibria,
+    outline,
+    signed,
+)
 from survey.methods import taylor
 
 LINES, SCANNED = 33, 26
 BISECTIONS, APPROACHES = 18, 6  # of the border of a map, and points beside it
 ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(3)
-LEAST, FASTEST = 1e-3, 30.0  # slowest and fastest rotation that is looked at, in velocities of the system
+# slowest and fastest rotation that is looked at, in velocities of the system
+LEAST, FASTEST = 1e-3, 30.0
 TWO_PI = 2.0 * math.pi
 
 
 class Maps:
-    """The return maps at one parameter point: rows of `flow_image`, by the logarithm of w or by the turning point."""
+    """The return maps at one parameter point: rows of `flow_image`, by the logarithm of w or by the
+    turning point.
+    """
 
     def __init__(self, row):
         s = outline(row)

@@ -1,8 +1,9 @@
-"""Where the branches of the saddles go: for t -> +inf the unstable ones, for t -> -inf the stable ones.
+"""Where the branches of the saddles go: for t -> +inf the unstable ones, for t -> -inf the stable
+ones.
 
-A stable branch is an unstable one of the system that S1, (b, w, t) -> -(b, w, t), makes of it, whose cycles are those
-of the system itself with their maps inverted. Where b = 0 the branches are level curves of H: each comes back to its
-saddle, or runs into another of the same energy.
+A stable branch is an unstable one of the system that S1, (b, w, t) -> -(b, w, t), makes of it,
+whose cycles are those of the system itself with their maps inverted. Where b = 0 the branches are
+level curves of H: each comes back to its saddle, or runs into another of the same energy.
 """
 
 from dataclasses import replace
@@ -20,7 +21,16 @@ from survey.measures.cylinder.separatrices import TWO_PI, Level, far_end
 from survey.measures.cylinder.separatrix import symmetric
 
 BRANCHES = ("unstable_left", "unstable_right", "stable_left", "stable_right")
-UNDECIDED, NONE, EQUILIBRIUM, ROTATION_PLUS, ROTATION_MINUS, LIBRATION, PLUS_INFINITY, MINUS_INFINITY = range(-1, 7)
+(
+    UNDECIDED,
+    NONE,
+    EQUILIBRIUM,
+    ROTATION_PLUS,
+    ROTATION_MINUS,
+    LIBRATION,
+    PLUS_INFINITY,
+    MINUS_INFINITY,
+) = range(-1, 7)
 _OF_FATES = {
     kf.EQUILIBRIUM: EQUILIBRIUM, kf.ROTATION_PLUS: ROTATION_PLUS, kf.ROTATION_MINUS: ROTATION_MINUS,
     kf.LIBRATION: LIBRATION, kf.SPIN_UP_PLUS: PLUS_INFINITY, kf.SPIN_UP_MINUS: MINUS_INFINITY,
@@ -32,8 +42,8 @@ _BACKWARD = {ROTATION_PLUS: ROTATION_MINUS, ROTATION_MINUS: ROTATION_PLUS,
 def table(method, s, rtol):
     """(end, limit) of every branch, (equilibria, 4) each, of the Skeleton s.
 
-    limit: the number of the equilibrium, or of the cycle among those with w > 0, w < 0 and the librations, from 1; 0 if
-    there is none.
+    limit: the number of the equilibrium, or of the cycle among those with w > 0, w < 0 and the
+    librations, from 1; 0 if there is none.
     """
     end = np.full((len(s.equilibria), len(BRANCHES)), NONE)
     limit = np.zeros_like(end)
@@ -44,7 +54,9 @@ def table(method, s, rtol):
         for row in saddles:
             for at, side in enumerate((-1.0, 1.0)):
                 reached = level_end(s, row, side)
-                end[row, at::2], limit[row, at::2] = (EQUILIBRIUM, reached + 1) if reached >= 0 else (UNDECIDED, 0)
+                end[row, at::2], limit[row, at::2] = (
+                    (EQUILIBRIUM, reached + 1) if reached >= 0 else (UNDECIDED, 0)
+                )
         return end, limit
     for first, flow in ((0, s), (2, backward(s))):
         starts = np.zeros((2 * len(saddles), 4))
@@ -63,7 +75,9 @@ def backward(s):
     flipped[:2] *= -1.0
     turned = outline(flipped if len(s.p) > COLUMNS else flipped[:6])
     swapped = {PLUS: MINUS, MINUS: PLUS, LIBRATIONS: LIBRATIONS}
-    return replace(turned, search=lambda _turned, kind, _above=0.0: _inverted(s.cycles(swapped[kind])))
+    return replace(
+        turned, search=lambda _turned, kind, _above=0.0: _inverted(s.cycles(swapped[kind]))
+    )
 
 
 def _inverted(cycles):
@@ -71,18 +85,27 @@ def _inverted(cycles):
     table = cycles.table.copy()
     table[:, [rt.BELOW, rt.ABOVE]] *= -1.0
     table[:, rt.MULTIPLIER] = 1.0 / cycles.table[:, rt.MULTIPLIER]
-    table[:, rt.MULTIPLIER_BAR] = cycles.table[:, rt.MULTIPLIER_BAR] / cycles.table[:, rt.MULTIPLIER] ** 2
+    table[:, rt.MULTIPLIER_BAR] = (
+        cycles.table[:, rt.MULTIPLIER_BAR] / cycles.table[:, rt.MULTIPLIER] ** 2
+    )
     return Cycles(table, cycles.threshold[::-1], cycles.conclusive)
 
 
 def _number(s, end, index):
     """The number of a limit in the tables of the portrait."""
-    before = {EQUILIBRIUM: 0, ROTATION_PLUS: 0, ROTATION_MINUS: len(s.plus), LIBRATION: len(s.plus) + len(s.minus)}
+    before = {
+        EQUILIBRIUM: 0,
+        ROTATION_PLUS: 0,
+        ROTATION_MINUS: len(s.plus),
+        LIBRATION: len(s.plus) + len(s.minus),
+    }
     return before[end] + index + 1 if end in before and index >= 0 else 0
 
 
 def level_end(s, row, side):
-    """b = 0: the equilibrium that the branches on this side of the saddle `row` tend to, or -1 where that is open."""
+    """b = 0: the equilibrium that the branches on this side of the saddle `row` tend to, or -1
+    where that is open.
+    """
     level = Level(s.p, s.equilibria[row])
     far, turns = far_end(level, s, side)
     if turns or abs(far) >= TWO_PI:

@@ -1,12 +1,15 @@
-"""The ends w -> +-inf of a user's flow, phi' = w, w' = f(phi) w + g(phi), with f, g of the period 2 pi.
+"""The ends w -> +-inf of a user's flow, phi' = w, w' = f(phi) w + g(phi), with f, g of the period 2
+pi.
 
-With F' = f and y = w - F, y' = dy/dphi = g / (y + F): over a turn w grows by 2 pi mean(f), and where that is 0 by
+With F' = f and y = w - F, y' = dy/dphi = g / (y + F): over a turn w grows by 2 pi mean(f), and
+where that is 0 by
 
     2 pi mean(g) / w,  then  pi K / w^2, K = -(1/pi) int g F dphi,  then  L / w^3, L = int g F^2 dphi,
 
-each where those before it vanish (then K does not depend on the constant of F, nor L). On w < 0 a turn leads to smaller
-phi: so mean(f) and K let both ends attract where they are positive, mean(g) and L w -> +inf alone. For the gyrostat,
-whose f and g have mean 0, K and L are those of `gyrostat.md`.
+each where those before it vanish (then K does not depend on the constant of F, nor L). On w < 0 a
+turn leads to smaller phi: so mean(f) and K let both ends attract where they are positive, mean(g)
+and L w -> +inf alone. For the gyrostat, whose f and g have mean 0, K and L are those of
+`gyrostat.md`.
 """
 
 from dataclasses import dataclass
@@ -44,15 +47,23 @@ def of(row):
             if (missed <= ROUNDING * scale).all() or number == MOST:
                 break
         before, number = found, 2 * number
-    values = [0.0 if abs(value) <= bar else float(value) for value, bar in zip(found, bars, strict=True)]
+    values = [
+        0.0 if abs(value) <= bar else float(value) for value, bar in zip(found, bars, strict=True)
+    ]
     signs = np.sign(values)
     decides = next((i for i in range(4) if signs[i]), None)
-    attract = np.zeros(2) if decides is None else signs[decides] * np.array([[1, 1], [1, -1]])[decides % 2]
+    attract = (
+        np.zeros(2)
+        if decides is None
+        else signs[decides] * np.array([[1, 1], [1, -1]])[decides % 2]
+    )
     return Ends(*values, tuple(bars.tolist()), attract)
 
 
 def _integrals(row, number):
-    """mean(f), mean(g), K and L by the trapezoidal rule, which converges geometrically, F by its Fourier series."""
+    """mean(f), mean(g), K and L by the trapezoidal rule, which converges geometrically, F by its
+    Fourier series.
+    """
     f, g = np.empty(number), np.empty(number)
     pg.sample(row, f, g)
     k = np.fft.rfftfreq(number, 1 / number)

@@ -1,8 +1,10 @@
-"""A user's f(phi, p), g(phi, p) as a program of `kernels.cylinder.program`, one for each set of parameters.
+"""A user's f(phi, p), g(phi, p) as a program of `kernels.cylinder.program`, one for each set of
+parameters.
 
-Each function is run once at every set of parameters, as Python: phi is a record of operations, the parameters are
-numbers of 128 bits. So what depends on parameters alone may branch and loop; what depends on phi must be analytic:
-+ - * / ** and the functions in `FUNCTIONS`. Numbers in the code are taken as exact binary64 numbers.
+Each function is run once at every set of parameters, as Python: phi is a record of operations, the
+parameters are numbers of 128 bits. So what depends on parameters alone may branch and loop; what
+depends on phi must be analytic: + - * / ** and the functions in `FUNCTIONS`. Numbers in the code
+are taken as exact binary64 numbers.
 """
 
 from functools import lru_cache
@@ -62,19 +64,27 @@ class Angle:
         return self
 
     def _refused(self, *_others):
-        raise Unsupported("it compares phi, or an expression in phi: what it branches to is not analytic")
+        raise Unsupported(
+            "it compares phi, or an expression in phi: what it branches to is not analytic"
+        )
 
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused
     __hash__ = None
 
     def _rough(self, *_others):
-        raise Unsupported("it applies abs, int, float, // or % to an expression in phi, which is not analytic")
+        raise Unsupported(
+            "it applies abs, int, float, // or % to an expression in phi, which is not analytic"
+        )
 
-    __abs__ = __int__ = __float__ = __floordiv__ = __mod__ = __rmod__ = __rfloordiv__ = __index__ = _rough
+    __abs__ = __int__ = __float__ = __floordiv__ = __mod__ = __rmod__ = __rfloordiv__ = (
+        __index__
+    ) = _rough
 
 
 class Record:
-    """The operations on phi: a context for `multiprecision.lift`, with mpmath's functions where phi does not enter."""
+    """The operations on phi: a context for `multiprecision.lift`, with mpmath's functions where phi
+    does not enter.
+    """
 
     def __init__(self):
         self.mp = multiprecision.context()
@@ -85,7 +95,9 @@ class Record:
     def __getattr__(self, name):
         plain = getattr(self.mp, name)
         return lambda *given: (
-            self._call(name, plain, given) if any(isinstance(x, Angle) for x in given) else plain(*given)
+            self._call(name, plain, given)
+            if any(isinstance(x, Angle) for x in given)
+            else plain(*given)
         )
 
     def mpf(self, x):
@@ -216,7 +228,9 @@ class Record:
         y = Angle(self, place)
         if code == pg.MULTIPLY:
             a, b = Angle(self, first), Angle(self, second)
-            return self._total(self._times(self.slope(first), b), self._times(self.slope(second), a))
+            return self._total(
+                self._times(self.slope(first), b), self._times(self.slope(second), a)
+            )
         if code in (pg.DIVIDE, pg.OVER):
             b = Angle(self, second)
             upper = self.slope(first) if code == pg.DIVIDE else None
@@ -287,9 +301,11 @@ def recorded(function, name, record, p):
 
 @lru_cache(maxsize=4096)
 def program(f, g, point, on_circle):
-    """The row of a flow, less its initial state, for the parameters `point` (a tuple); see `kernels.cylinder.program`.
+    """The row of a flow, less its initial state, for the parameters `point` (a tuple); see
+    `kernels.cylinder.program`.
 
-    NaN where f or g has no value, or not the period 2 pi although `on_circle`. Raises Unsupported or Raised.
+    NaN where f or g has no value, or not the period 2 pi although `on_circle`. Raises Unsupported
+    or Raised.
     """
     with LOCK:
         record = Record()
@@ -315,7 +331,9 @@ def program(f, g, point, on_circle):
 
 
 def balls(row, phi):
-    """Middle and radius of the ball of every value at phi (SLOTS, 2): what is computed, and its rounding error."""
+    """Middle and radius of the ball of every value at phi (SLOTS, 2): what is computed, and its
+    rounding error.
+    """
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
     pg.ball(row, float(phi), 0.0, 1, out)
     return out[:, 0]
@@ -336,7 +354,9 @@ def flows(f, g, points, on_circle):
     """The programs (N, n) of the parameters (N, m), padded to one length; NaN where there is none."""
     own, where = np.unique(points, axis=0, return_inverse=True)
     found = [
-        program(f, g, tuple(point.tolist()), on_circle) if np.isfinite(point).all() else np.full(pg.OPERATIONS, np.nan)
+        program(f, g, tuple(point.tolist()), on_circle)
+        if np.isfinite(point).all()
+        else np.full(pg.OPERATIONS, np.nan)
         for point in own
     ]
     longest = max(map(len, found), default=pg.OPERATIONS)

@@ -1,7 +1,8 @@
-"""Fates of the flow phi' = w, w' = f w + g on the cylinder: the skeleton of a parameter point, then each initial state.
+"""Fates of the flow phi' = w, w' = f w + g on the cylinder: the skeleton of a parameter point, then
+each initial state.
 
-The skeleton holds what decides fates: stratum, ends, equilibria, cycles of the return maps. It depends on the six
-parameters alone and is computed once for all initial states.
+The skeleton holds what decides fates: stratum, ends, equilibria, cycles of the return maps. It
+depends on the six parameters alone and is computed once for all initial states.
 """
 
 import math
@@ -29,20 +30,28 @@ NO_TURNS = kf.NO_TURNS
 I0, I1, I2, G = 0, 1, 2, 3  # strata
 KINDS = PLUS, MINUS, LIBRATIONS = kf.NEEDS_PLUS, kf.NEEDS_MINUS, kf.NEEDS_LIBRATIONS  # of cycles
 _NONE = np.zeros((0, 10))
-FEW = 8  # starts of one system that are followed before its cycles are searched, which most may do without
+# starts of one system that are followed before its cycles are searched, which most may do without
+FEW = 8
 EXACT = 7e-16  # three ulp: K and L are 0 within the rounding of decimal parameters
 STEPS = 20_000  # budget of one fate: about 15 ms
 MORE = 10  # times the budget for those that use it up
 MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
-HANDED_OVER = np.geomspace(0.5, 2000.0, 28)  # times, in those of the system, at which float64 takes over again
+# times, in those of the system, at which float64 takes over again
+HANDED_OVER = np.geomspace(0.5, 2000.0, 28)
 SELDOM = 3  # every third time, where what is told at all of them was not enough
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # S2, see `solution`
 MOST_OF_PROGRAM = 16  # equilibria
 UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
-COARSEST = 1e-9  # rtol: with wider bars more fates stay open, and to decide these costs more than smaller steps
+# rtol: with wider bars more fates stay open, and to decide these costs more than smaller steps
+COARSEST = 1e-9
 LEAST = 1e-6  # slowest rotation of the lattice, in velocities of the system
-COLUMNS_OF = {"verdict": rc.VERDICT, "turnings": rc.TURNINGS, "net_turns": rc.NET_TURNS, "status": rc.STATUS}
+COLUMNS_OF = {
+    "verdict": rc.VERDICT,
+    "turnings": rc.TURNINGS,
+    "net_turns": rc.NET_TURNS,
+    "status": rc.STATUS,
+}
 LIMITS = [name + end for name in ("limit_phi", "limit_w", "multiplier") for end in ("", "_error")]
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
@@ -50,7 +59,12 @@ FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 def empty(size, status):
     """The outputs of `solve` for `size` states, filled with what does not apply."""
     result = {name: np.full(size, np.nan) for name in LIMITS}
-    for name, fill in (("verdict", -1), ("turnings", kf.UNDETERMINED), ("net_turns", NO_TURNS), ("status", status)):
+    for name, fill in (
+        ("verdict", -1),
+        ("turnings", kf.UNDETERMINED),
+        ("net_turns", NO_TURNS),
+        ("status", status),
+    ):
         result[name] = np.full(size, fill, dtype=np.int64)
     return result
 
@@ -92,7 +106,8 @@ def wind(s, out, angles, result, where):
 
 
 def followed(method, s, starts, rtol, told=None):
-    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are not decided.
+    """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are
+    not decided.
 
     `told` (see `basins`) gives the fate of a later state of the same motion, or None.
     """
@@ -111,7 +126,9 @@ def followed(method, s, starts, rtol, told=None):
 
 
 def _handed_over(method, s, start, tolerance, out, told=None):
-    """Follow one start in double-double past what float64 cannot decide, until its fate from there on is decided."""
+    """Follow one start in double-double past what float64 cannot decide, until its fate from there
+    on is decided.
+    """
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
     row, done = np.concatenate([s.p[:6], start])[None], 0
     ways = ([told] if told else []) + [lambda state: fates(method, s, state[None], tolerance)[0]]
@@ -119,12 +136,16 @@ def _handed_over(method, s, start, tolerance, out, told=None):
         for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
             floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
             states = list(zip(floats[0], turnings[0], status[0], strict=True))[done:]
-            for state, turned, code in states[SELDOM - 1 :: SELDOM] if told and later_of is not told else states:
+            for state, turned, code in (
+                states[SELDOM - 1 :: SELDOM] if told and later_of is not told else states
+            ):
                 later = later_of(state) if code == OK else None
                 if later is not None and later[rc.VERDICT] != kf.UNDECIDED:
                     out[:] = later
                     if later[rc.TURNINGS] >= 0:
-                        out[rc.TURNINGS] = later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
+                        out[rc.TURNINGS] = (
+                            later[rc.TURNINGS] + turned if turned >= 0 else kf.UNDETERMINED
+                        )
                     return
             done = last
         done = 0
@@ -148,7 +169,11 @@ def limits(s, row, result, i):
     verdict, index = int(row[rc.VERDICT]), int(row[rc.LIMIT])
     phi = w = cycle = None
     if verdict in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START):
-        angle, bar = (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR]) if index >= 0 else row[rc.LIMIT_PHI :]
+        angle, bar = (
+            (s.equilibria[index, eq.ANGLE], s.equilibria[index, eq.BAR])
+            if index >= 0
+            else row[rc.LIMIT_PHI :]
+        )
         phi = angle % (2.0 * math.pi), bar
     elif verdict == kf.LIBRATION:
         cycle = s.librations[index]
@@ -183,11 +208,14 @@ def forget():
 
 @dataclass(frozen=True)
 class Cycles:
-    """Cycles of one kind, in a table as in `kernels.cylinder.returns`, and (w_c, w_d) of their map if they rotate."""
+    """Cycles of one kind, in a table as in `kernels.cylinder.returns`, and (w_c, w_d) of their map
+    if they rotate.
+    """
 
     table: np.ndarray
     threshold: tuple = (math.nan, math.nan)  # NaN where every turn from w > 0 is completed
-    conclusive: bool = True  # do the signs of D fit together (so the parity law holds), and did every map answer?
+    # do the signs of D fit together (so the parity law holds), and did every map answer?
+    conclusive: bool = True
 
 
 def _no_cycles(s, kind, above=0.0):
@@ -196,7 +224,8 @@ def _no_cycles(s, kind, above=0.0):
 
 @dataclass(frozen=True)
 class Skeleton:
-    """What decides the fates at one parameter point; tables as in `kernels.cylinder.equilibria` and `returns`.
+    """What decides the fates at one parameter point; tables as in `kernels.cylinder.equilibria` and
+    `returns`.
 
     Cycles are searched when they are first asked for, as they take almost all of the time.
     """
@@ -208,7 +237,8 @@ class Skeleton:
     ends: np.ndarray  # 1 attracting, 0 neutral, -1 repelling, for w -> +inf and w -> -inf
     section: float
     equilibria: np.ndarray
-    folded: bool  # is an equilibrium degenerate, or so nearly that float64 hides it, and with it cycles?
+    # is an equilibrium degenerate, or so nearly that float64 hides it, and with it cycles?
+    folded: bool
     unknown: bool = False  # does that hide how many equilibria there are?
     search: Callable = _no_cycles  # of this skeleton and a kind, the Cycles; see `_searched`
     found: dict = field(default_factory=dict)  # the Cycles by kind, as far as they are known
@@ -280,7 +310,9 @@ def _searched(method, s, kind, above=0.0):
     if kind == PLUS:
         return _rotations(method, s.p, s.equilibria, s.section, s.ends[0], s.K, s.L, above)
     mirrored = flow_of(signed(s.p, MIRROR))
-    return _rotations(method, mirrored, mirrored_equilibria(s.equilibria), -s.section, s.ends[1], s.K, -s.L, above)
+    return _rotations(
+        method, mirrored, mirrored_equilibria(s.equilibria), -s.section, s.ends[1], s.K, -s.L, above
+    )
 
 
 def flow_of(six):
@@ -293,7 +325,9 @@ def signed(six, signs):
 
 
 def _outline_of_program(p):
-    """As `outline`: the strata in which no fate is decided are I0 for g = 0, I1 for f = 0, I2 for neutral ends."""
+    """As `outline`: the strata in which no fate is decided are I0 for g = 0, I1 for f = 0, I2 for
+    neutral ends.
+    """
     known = ends.of(p)
     p[MEAN] = known.mean_f
     f_is_0, g_is_0 = p[BOUND_F] == 0.0, p[BOUND_G] == 0.0
@@ -350,11 +384,18 @@ def _rotations(method, p, eqs, section, end, K, L, above):
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
     border, start, unknown = edges[:2].copy(), edges[4], edges[6]
     top, change, error, last = xs[-1], edges[2], edges[3], 0.0
-    while change * end < 0.0 and abs(change) > 4.0 * error and top < 1e5 * scale and found < len(table) - 1:
+    while (
+        change * end < 0.0
+        and abs(change) > 4.0 * error
+        and top < 1e5 * scale
+        and found < len(table) - 1
+    ):
         last = np.sign(change)
         xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
         before = found
-        found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges)
+        found = method.flow_cycles(
+            rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges
+        )
         unknown += edges[6]
         if found > before and (found - before) % 2:
             break
@@ -364,7 +405,8 @@ def _rotations(method, p, eqs, section, end, K, L, above):
     last = cycles[-1, rt.ABOVE] if found else last
     if last * end < 0.0 and K != 0.0:
         cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
-    # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d below it too
+    # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d
+    # below it too
     near = np.sign(border[1] - border[0]) if border[0] > 0.0 else np.sign(start)
     sure = border[0] > 0.0 or start > LEAST * scale
     sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
@@ -373,21 +415,41 @@ def _rotations(method, p, eqs, section, end, K, L, above):
 
 
 def _far_cycle(p, section, K, L, scale):
-    """The large cycle w(0) ~ -L/(pi K) where the return map does not show it (D = pi K/w^2 + ..., below rounding).
+    """The large cycle w(0) ~ -L/(pi K) where the return map does not show it (D = pi K/w^2 + ...,
+    below rounding).
 
-    The expansion leaves a shift of the size of the velocities of the system, which the error bound covers.
+    The expansion leaves a shift of the size of the velocities of the system, which the error bound
+    covers.
     """
     b12, b31 = p[0], p[1]
     w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
     w = max(w, 30.0 * scale)
     slope = math.pi * K / w**3
     side = np.sign(K)
-    return np.array([w, 1.0 + slope, 2 * math.pi / w, 10.0 * scale, abs(slope) + 1e-15, 0.0, 1.0, 0, -side, side])
+    return np.array(
+        [
+            w,
+            1.0 + slope,
+            2 * math.pi / w,
+            10.0 * scale,
+            abs(slope) + 1e-15,
+            0.0,
+            1.0,
+            0,
+            -side,
+            side,
+        ]
+    )
 
 
 def _librations(method, p, eqs, folded):
     """The Cycles of librations, by their right turning point, of every interval where g < 0."""
-    table, edges, fine, found = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST), 0
+    table, edges, fine, found = (
+        np.zeros((rt.MOST_CYCLES, 10)),
+        np.zeros(7),
+        max(FINE, method.FLOW_FINEST),
+        0,
+    )
     share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
@@ -395,17 +457,31 @@ def _librations(method, p, eqs, folded):
                 continue  # in float64 motions beside it stand still
             high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
             xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
-            found = method.flow_cycles(rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges)
-            against = row[eq.KIND] == eq.FOCUS and edges[4] * row[eq.STABLE] < 0.0 and abs(edges[4]) > edges[5]
+            found = method.flow_cycles(
+                rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges
+            )
+            against = (
+                row[eq.KIND] == eq.FOCUS
+                and edges[4] * row[eq.STABLE] < 0.0
+                and abs(edges[4]) > edges[5]
+            )
             sure = sure and not against and edges[6] == 0.0
     return Cycles(table[:found], conclusive=bool(sure and found < len(table) - 2))
 
 
 def fates(method, s, starts, tolerance, more=1):
-    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds) of the skeleton s."""
+    """The fates (VERDICT to STATUS of `records`) of starts phi0, w0 (and their error bounds) of the
+    skeleton s.
+    """
     if len(s.p) > COLUMNS and (s.stratum != G or s.unknown):
         out = np.zeros((len(starts), rc.FATE))
-        out[:] = kf.UNDECIDED, -1, kf.UNDETERMINED, kf.NO_TURNS, NO_ENDS if s.stratum != G else UNKNOWN
+        out[:] = (
+            kf.UNDECIDED,
+            -1,
+            kf.UNDETERMINED,
+            kf.NO_TURNS,
+            NO_ENDS if s.stratum != G else UNKNOWN,
+        )
         return out
     if s.stratum in (I0, I1):
         return (_free if s.stratum == I0 else _conservative)(s, starts)
@@ -429,21 +505,31 @@ def fates(method, s, starts, tolerance, more=1):
 
 def _needs(out):
     """The kind of cycles that would decide each fate, or 0."""
-    return np.where((out[:, rc.VERDICT] == kf.UNDECIDED) & (out[:, rc.LIMIT] < -1), out[:, rc.LIMIT], 0)
+    return np.where(
+        (out[:, rc.VERDICT] == kf.UNDECIDED) & (out[:, rc.LIMIT] < -1), out[:, rc.LIMIT], 0
+    )
 
 
 def _by_tables(method, s, tolerance, more, known, starts):
     """`fates` by the equilibria and the tables of the `known` kinds of cycles alone."""
     out = np.zeros((len(starts), rc.FATE))
     section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
-    tables = [np.ascontiguousarray(table) for table in (s.equilibria, *(known.get(kind, _NONE) for kind in KINDS))]
+    tables = [
+        np.ascontiguousarray(table)
+        for table in (s.equilibria, *(known.get(kind, _NONE) for kind in KINDS))
+    ]
     rows = [len(known[kind]) if kind in known else kf.NOT_KNOWN for kind in KINDS]
     stratum = kf.GENERIC if s.stratum == G else kf.REVERSIBLE
     sizes = np.array([len(s.equilibria), *rows, stratum, int(s.K < 0.0)])
-    size, limit = max(1, BATCH // (more * method.FLOW_WORK)), min(more * STEPS * method.FLOW_WORK, MOST)
+    size, limit = (
+        max(1, BATCH // (more * method.FLOW_WORK)),
+        min(more * STEPS * method.FLOW_WORK, MOST),
+    )
     for i in range(0, len(starts), size):
         part = np.ascontiguousarray(starts[i : i + size])
-        method.flow_fates(s.p, section, s.ends, sizes, *tables, part, tolerance, limit, out[i : i + size])
+        method.flow_fates(
+            s.p, section, s.ends, sizes, *tables, part, tolerance, limit, out[i : i + size]
+        )
     return out
 
 
@@ -463,27 +549,39 @@ def _free(s, starts):
             row[rc.VERDICT], row[rc.NET_TURNS] = kf.EQUILIBRIUM_START, 0
             row[rc.LIMIT_PHI], row[rc.LIMIT_PHI_BAR] = phi, 0.0
         elif abs(abs(y) - b) <= noise:
-            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = kf.UNDECIDED, kf.UNDETERMINED, SEPARATRIX
+            row[rc.VERDICT], row[rc.TURNINGS], row[rc.STATUS] = (
+                kf.UNDECIDED,
+                kf.UNDETERMINED,
+                SEPARATRIX,
+            )
         elif abs(y) > b:
             row[rc.VERDICT] = kf.PERIODIC_ROTATION
         else:  # the next root of y + b cos(phi - axis)
             half = math.acos(-y / b)
-            distances = [((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)]
+            distances = [
+                ((axis + side * half - phi) * np.sign(w)) % (2.0 * math.pi) for side in (1, -1)
+            ]
             row[rc.LIMIT_PHI] = phi + np.sign(w) * min(distances)
-            row[rc.LIMIT_PHI_BAR] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (1.0 + abs(row[rc.LIMIT_PHI]))
+            row[rc.LIMIT_PHI_BAR] = 2.0 * noise / math.sqrt(b * b - y * y) + 1e-15 * (
+                1.0 + abs(row[rc.LIMIT_PHI])
+            )
             row[rc.NET_TURNS] = math.trunc((row[rc.LIMIT_PHI] - phi) / (2.0 * math.pi))
     return out
 
 
 def _above(p, phi, w, row):
-    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its error bound reaches 0."""
+    """Sign of the energy less that of the equilibrium `row`, in double-double; 0 where its error
+    bound reaches 0.
+    """
     gap, bar = energy_beside(p, phi, w, row[eq.ANGLE])
     bar += 0.5 * p[BOUND_DG] * row[eq.BAR] ** 2  # V' = 0 at the equilibrium
     return 0 if abs(gap) <= bar else math.copysign(1.0, gap)
 
 
 def _conservative(s, starts):
-    """b = 0: H = w^2/2 + V is conserved; rotation above the highest V, libration below, but for separatrices."""
+    """b = 0: H = w^2/2 + V is conserved; rotation above the highest V, libration below, but for
+    separatrices.
+    """
     _b12, _b31, d, c23, s2, s3 = s.p[:6]
 
     def potential(phi):
@@ -492,9 +590,13 @@ def _conservative(s, starts):
 
     phi, w = starts.T
     energy = 0.5 * w * w + potential(phi)
-    rest = s.equilibria[(s.equilibria[:, eq.KIND] == eq.SADDLE) | (s.equilibria[:, eq.KIND] == eq.DEGENERATE)]
+    rest = s.equilibria[
+        (s.equilibria[:, eq.KIND] == eq.SADDLE) | (s.equilibria[:, eq.KIND] == eq.DEGENERATE)
+    ]
     levels = potential(rest[:, eq.ANGLE])
-    noise = 4e-16 * (np.abs(energy) + w * w + (abs(d) + abs(c23) + abs(s2) + abs(s3)) * (1.0 + np.abs(phi)))
+    noise = 4e-16 * (
+        np.abs(energy) + w * w + (abs(d) + abs(c23) + abs(s2) + abs(s3)) * (1.0 + np.abs(phi))
+    )
     near = (np.abs(energy[:, None] - levels) <= noise[:, None] + 1e-15).any(axis=1)
     rotates = energy > levels.max()
     for i in np.flatnonzero(near):
@@ -510,5 +612,11 @@ def _conservative(s, starts):
     for i in np.flatnonzero(w == 0.0):
         row = eq.resting(s.p, s.equilibria, len(s.equilibria), phi[i])
         if row >= 0:
-            out[i] = kf.EQUILIBRIUM_START, row, 0, round((phi[i] - s.equilibria[row, eq.ANGLE]) / (2 * math.pi)), 0
+            out[i] = (
+                kf.EQUILIBRIUM_START,
+                row,
+                0,
+                round((phi[i] - s.equilibria[row, eq.ANGLE]) / (2 * math.pi)),
+                0,
+            )
     return out

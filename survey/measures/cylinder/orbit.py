@@ -15,7 +15,10 @@ from survey.methods import taylor
 from survey.scene import Trajectory
 
 AROUND, POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001
-ON_CYLINDER, ON_PLANE = (("cylinder", "phi", "w"), ("lines", "t", "w")), (("plane", "phi", "w"), ("lines", "t", "w"))
+ON_CYLINDER, ON_PLANE = (
+    (("cylinder", "phi", "w"), ("lines", "t", "w")),
+    (("plane", "phi", "w"), ("lines", "t", "w")),
+)
 LINES = ("unstable_branch", "stable_branch", "unstable_cycle", "stable_cycle")
 ALONG = 601  # points of a branch or a cycle
 FURTHEST = 5.0 * np.pi  # rad, along a branch: what winds on would fill the picture
@@ -24,8 +27,8 @@ FURTHEST = 5.0 * np.pi  # rad, along a branch: what winds on would fill the pict
 def solve(trajectories, outputs, system, point, time=None, panels=ON_CYLINDER, flow=None):
     """The Trajectory from `phi0`, `w0` of `point`, whose other parameters `system` names.
 
-    `trajectories` gives {output: array} of a block, as a scene's `solve` does. With `flow`, six parameters or a
-    program, the data hold equilibria, cycles and branches too.
+    `trajectories` gives {output: array} of a block, as a scene's `solve` does. With `flow`, six
+    parameters or a program, the data hold equilibria, cycles and branches too.
     """
     time = 40.0 if time is None else float(time)
     own = point.get("phi0", 0.0), point.get("w0", 1.0)
@@ -38,7 +41,11 @@ def solve(trajectories, outputs, system, point, time=None, panels=ON_CYLINDER, f
         return trajectories(asked | {"phi0": states[:, :1], "w0": states[:, 1:2], "t": t})
 
     out = followed(starts, t[None])
-    named = {o.name: {"long_name": o.long_name, "symbol": o.symbol, "units": o.units} for o in outputs if o.name in out}
+    named = {
+        o.name: {"long_name": o.long_name, "symbol": o.symbol, "units": o.units}
+        for o in outputs
+        if o.name in out
+    }
     data = {"t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"})}
     for name in ("phi", "w"):
         data[name], data[f"{name}_error"] = (
@@ -46,7 +53,9 @@ def solve(trajectories, outputs, system, point, time=None, panels=ON_CYLINDER, f
             ("t", out[f"{name}_error"][0], named[name] | {"long_name": f"error bound of {name}"}),
         )
         data[f"{name}_nearby"] = (("start", "t"), out[name][1:], named[name])
-    return Trajectory(data if flow is None else data | _parting(flow, followed, 0.4 * time, named), panels)
+    return Trajectory(
+        data if flow is None else data | _parting(flow, followed, 0.4 * time, named), panels
+    )
 
 
 def _parting(flow, followed, time, named):
@@ -58,7 +67,11 @@ def _parting(flow, followed, time, named):
     if s.folded or s.unknown:
         return data
     s = remembered(taylor, flow)
-    lines = [(states, times, kind) for states, times, kind in (*_branches(s, time), cycles(s)) if len(states)]
+    lines = [
+        (states, times, kind)
+        for states, times, kind in (*_branches(s, time), cycles(s))
+        if len(states)
+    ]
     if not lines:
         return data
     found = [followed(states, times) for states, times, _ in lines]
@@ -75,7 +88,9 @@ def _parting(flow, followed, time, named):
 
 
 def _branches(s, time):
-    """(states, times, kind) of the unstable and of the stable branches, each from a point next to its saddle."""
+    """(states, times, kind) of the unstable and of the stable branches, each from a point next to
+    its saddle.
+    """
     for kind, flow, sign in ((0, s, 1.0), (1, backward(s), -1.0)):
         starts = np.zeros((2 * len(s.equilibria), 4))
         size = branches.unstable(flow.p, flow.equilibria, len(flow.equilibria), starts)
@@ -90,4 +105,8 @@ def cycles(s):
     rows += [(row[rt.CYCLE_X], 0.0, row) for row in s.librations]
     states = np.array([(phi, w) for phi, w, _ in rows]).reshape(-1, 2)
     times = np.array([row[rt.PERIOD] for *_, row in rows])[:, None] * np.linspace(0.0, 1.0, ALONG)
-    return states, times, np.array([2 + int(row[rt.MULTIPLIER] < 1.0) for *_, row in rows], dtype=int)
+    return (
+        states,
+        times,
+        np.array([2 + int(row[rt.MULTIPLIER] < 1.0) for *_, row in rows], dtype=int),
+    )

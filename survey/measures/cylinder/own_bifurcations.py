@@ -1,12 +1,14 @@
-"""The curves on a map of two parameters at which the portrait of a user's flow changes, f and g of period 2 pi.
+"""The curves on a map of two parameters at which the portrait of a user's flow changes, f and g of
+period 2 pi.
 
     ends    the first of mean(f), mean(g), K, L (see `ends`) that does not vanish all over the map is 0
     fold    g = g' = 0; cusps where g'' = 0
     Hopf    f = g = 0, g' < 0; with f, g in powers of the angle super- or subcritical as f2 - f1 g2 / g1 < 0 or > 0,
             generalised where that is 0; the curve ends in f = g = g' = 0, a Bogdanov-Takens point
 
-and saddle connections (`connections`) and folds of cycles (`cycle_folds`). Values of f and g are those of balls that
-hold every rounding. Points of codimension two lie on the curves that are followed (`survey.measures.tracks`).
+and saddle connections (`connections`) and folds of cycles (`cycle_folds`). Values of f and g are
+those of balls that hold every rounding. Points of codimension two lie on the curves that are
+followed (`survey.measures.tracks`).
 
 Source: Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory (2004), chapters 3 and 8.
 """
@@ -67,7 +69,9 @@ def series(row, phi):
 
 
 def found(plane):
-    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves and points on the map."""
+    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves and points
+    on the map.
+    """
     yield from _ends(plane)
     yield from connections.found(plane)
     yield from cycle_folds.found(plane)
@@ -121,7 +125,12 @@ def _rests(plane, position):
 
 def _curve(plane, kind, part):
     angle = part.place % TWO_PI
-    return kind, plane.square.parameters(part.x), part.error, {"equilibrium_phi": (angle, part.place_error)}
+    return (
+        kind,
+        plane.square.parameters(part.x),
+        part.error,
+        {"equilibrium_phi": (angle, part.place_error)},
+    )
 
 
 def _folds(plane, part):
@@ -141,7 +150,9 @@ def bend(s):
 
 def _hopfs(plane, part):
     """The parts of a curve f = g = 0 where g' < 0, with the points at their ends."""
-    slopes, bends = (list(_marks(plane, part, _hopf, third)) for third in (lambda s: (s[G1, 0], s[G1, 1]), bend))
+    slopes, bends = (
+        list(_marks(plane, part, _hopf, third)) for third in (lambda s: (s[G1, 0], s[G1, 1]), bend)
+    )
     for _place, mark in slopes:
         yield _curve(plane, "bogdanov_takens", mark)
     bends = [(place, mark) for place, mark in bends if _series(plane, mark, 0)[G1, 0] < 0.0]
@@ -153,7 +164,9 @@ def _hopfs(plane, part):
     cuts = [0, *(place + i for i, place in enumerate(places)), len(whole.x) - 1]
     for low, high in pairwise(cuts):
         if high > low:
-            s = _series(plane, whole, (low + high + 1) // 2 if high > low + 1 else low + (low in cuts[1:]))
+            s = _series(
+                plane, whole, (low + high + 1) // 2 if high > low + 1 else low + (low in cuts[1:])
+            )
             if s[G1, 0] < 0.0:
                 kind = "supercritical_hopf" if bend(s)[0] > 0.0 else "subcritical_hopf"
                 yield _curve(plane, kind, tracks.part_of(whole, slice(low, high + 1)))
@@ -165,7 +178,8 @@ def _series(plane, track, i):
 
 
 def _marks(plane, part, function, third):
-    """(number of the point after it, Track of it) where third(series) -> (value, bar) passes 0 on a curve.
+    """(number of the point after it, Track of it) where third(series) -> (value, bar) passes 0 on a
+    curve.
 
     The errors are those that the bars of its three equations leave.
     """
@@ -184,7 +198,10 @@ def _marks(plane, part, function, third):
         u = points[i] + (points[i + 1] - points[i]) * values[i] / (values[i] - values[i + 1])
         step = now = slopes = np.full((3, 3), np.nan)
         for _ in range(20):
-            ends_of = [[equations(u + side * tracks.STEP * axis)[:, 0] for side in (1.0, -1.0)] for axis in np.eye(3)]
+            ends_of = [
+                [equations(u + side * tracks.STEP * axis)[:, 0] for side in (1.0, -1.0)]
+                for axis in np.eye(3)
+            ]
             slopes = np.array([(high - low) / (2.0 * tracks.STEP) for high, low in ends_of]).T
             now = equations(u)
             if not np.isfinite(slopes).all() or abs(np.linalg.det(slopes)) < bifurcations.TINY:
@@ -195,7 +212,10 @@ def _marks(plane, part, function, third):
                 break
         near = abs(u - points[i]).max() < 2.0 * abs(points[i + 1] - points[i]).max()
         if near and abs(step).max() < 1e-9 and tracks.inside(u[None, 1:])[0]:
-            bars = 2.0 * abs(np.linalg.inv(slopes)) @ (abs(now[:, 0]) + now[:, 1]) + 4.0 * plane.square.grain
+            bars = (
+                2.0 * abs(np.linalg.inv(slopes)) @ (abs(now[:, 0]) + now[:, 1])
+                + 4.0 * plane.square.grain
+            )
             error = np.array([np.hypot(*bars[1:])])
             yield i + 1, tracks.Track(u[None, 1:], error, u[:1], bars[:1], np.array([True]))
 
@@ -205,12 +225,17 @@ def _ends(plane):
 
     def known(x, number):
         rows = [ends.of(row) if np.isfinite(row).all() else None for row in plane.flows(x)]
-        values = [(getattr(row, number), row.bars[NUMBERS.index(number)]) if row else (np.nan, np.nan) for row in rows]
+        values = [
+            (getattr(row, number), row.bars[NUMBERS.index(number)]) if row else (np.nan, np.nan)
+            for row in rows
+        ]
         return tuple(np.array(values).T)
 
     for number in NUMBERS:
         values, bars = known(contours.lattice(LINES, plane.square.across), number)
         if (abs(values) > bars).any():
-            for x, error in contours.lines(partial(known, number=number), plane.square, LINES, values):
+            for x, error in contours.lines(
+                partial(known, number=number), plane.square, LINES, values
+            ):
                 yield "ends", plane.square.parameters(x), error, {}
             return

@@ -1,8 +1,9 @@
-"""Portraits of the flow phi' = w, w' = f w + g on the cylinder: what does not depend on the initial state, in numbers.
+"""Portraits of the flow phi' = w, w' = f w + g on the cylinder: what does not depend on the initial
+state, in numbers.
 
-Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`). Here each cycle is
-followed again for its period, and the branches of the saddles are followed to their ends (`destinations`): where no
-unstable one ends in a saddle there is no saddle connection.
+Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`). Here each
+cycle is followed again for its period, and the branches of the saddles are followed to their ends
+(`destinations`): where no unstable one ends in a saddle there is no saddle connection.
 """
 
 import math
@@ -17,7 +18,16 @@ from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import TURNING
 from survey.measures.cylinder import destinations, ends, solution
-from survey.measures.cylinder.fate import EXACT, I0, MOST_OF_PROGRAM, NO_ENDS, G, outline, remembered, sizes
+from survey.measures.cylinder.fate import (
+    EXACT,
+    I0,
+    MOST_OF_PROGRAM,
+    NO_ENDS,
+    G,
+    outline,
+    remembered,
+    sizes,
+)
 from survey.status import NO_CONVERGENCE, OK
 
 # Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
@@ -36,9 +46,15 @@ def empty(count, status, columns=0):
     own = columns > COLUMNS
     equilibria = MOST_OF_PROGRAM if own else EQUILIBRIA
     branches = equilibria, len(destinations.BRANCHES)
-    floats = {"K": (), "L": (), "equilibrium_phi": (equilibria,)} | (dict.fromkeys(MEANS, ()) if own else {})
+    floats = {"K": (), "L": (), "equilibrium_phi": (equilibria,)} | (
+        dict.fromkeys(MEANS, ()) if own else {}
+    )
     floats |= {f"cycle_{name}": (CYCLES,) for name in ("w", "multiplier", "period")}
-    result = {name + end: np.full((count, *extra), np.nan) for name, extra in floats.items() for end in ("", "_error")}
+    result = {
+        name + end: np.full((count, *extra), np.nan)
+        for name, extra in floats.items()
+        for end in ("", "_error")
+    }
     for name in ("stratum", "end_plus", "end_minus", *COUNTS, "verdict"):
         result[name] = np.full(count, -1, dtype=np.int64)
     for name, size in (("equilibrium_type", (equilibria,)), ("cycle_kind", (CYCLES,)), ("branch_end", branches),
@@ -49,7 +65,9 @@ def empty(count, status, columns=0):
 
 
 def solve(method, systems, rtol):
-    """Every output for rows of six finite parameters, or of programs, for which K and L are those of `ends`."""
+    """Every output for rows of six finite parameters, or of programs, for which K and L are those
+    of `ends`.
+    """
     own = systems.shape[1] > COLUMNS
     result, listed = empty(len(systems), OK, systems.shape[1]), []
     for i, six in enumerate(systems):
@@ -70,11 +88,18 @@ def solve(method, systems, rtol):
         result["verdict"][i] = _verdict(s, end)
         for name, table in zip(COUNTS[2:], (s.plus, s.minus, s.librations), strict=True):
             result[name][i] = len(table)
-        cycles = [(kind, row) for kind, table in enumerate((s.plus, s.minus, s.librations), 1) for row in table]
+        cycles = [
+            (kind, row)
+            for kind, table in enumerate((s.plus, s.minus, s.librations), 1)
+            for row in table
+        ]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
         listed += [(i, at, kind, row, s, six) for at, (kind, row) in enumerate(cycles[:CYCLES])]
-    for kinds, timed in (((ROTATION_PLUS, ROTATION_MINUS), _rotations), ((LIBRATION,), _librations)):
+    for kinds, timed in (
+        ((ROTATION_PLUS, ROTATION_MINUS), _rotations),
+        ((LIBRATION,), _librations),
+    ):
         some = [cycle for cycle in listed if cycle[2] in kinds]
         if some:
             _write(some, timed(method, some, rtol), result)
@@ -105,7 +130,10 @@ def _rests(s, result, i):
     """Equilibria with their types, and their numbers, of point i; in the stratum I0 every angle is one."""
     kinds = s.equilibria[:, eq.KIND]
     if s.stratum != I0:
-        result["equilibria"][i], result["saddles"][i] = len(kinds), np.count_nonzero(kinds == eq.SADDLE)
+        result["equilibria"][i], result["saddles"][i] = (
+            len(kinds),
+            np.count_nonzero(kinds == eq.SADDLE),
+        )
     for at, row in enumerate(s.equilibria):
         result["equilibrium_phi"][i, at] = row[eq.ANGLE]
         result["equilibrium_phi_error"][i, at] = row[eq.BAR] + 1e-15
@@ -113,7 +141,9 @@ def _rests(s, result, i):
 
 
 def _type(row):
-    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the error bound), repelling; 8 degenerate."""
+    """1 saddle, 2 to 7 node or focus: attracting, weak (f = 0 within the error bound), repelling; 8
+    degenerate.
+    """
     kind = int(row[eq.KIND])
     if kind in (eq.NODE, eq.FOCUS):
         return 3 + int(row[eq.STABLE]) + 3 * (kind == eq.FOCUS)
@@ -127,12 +157,17 @@ def _verdict(s, ends_of_branches):
     doubtful = [row for row in s.librations if not _hyperbolic(row)]
     for cycles in (s.plus, s.minus):
         doubtful += [row for row in cycles if not (_hyperbolic(row) or _far(row, s.K, scale))]
-    if s.stratum != G or neutral or any(abs(row[rt.MULTIPLIER] - 1.0) <= row[rt.MULTIPLIER_BAR] for row in doubtful):
+    if (
+        s.stratum != G
+        or neutral
+        or any(abs(row[rt.MULTIPLIER] - 1.0) <= row[rt.MULTIPLIER_BAR] for row in doubtful)
+    ):
         return DEGENERATE
     saddles = np.count_nonzero(s.equilibria[:, eq.KIND] == eq.SADDLE)
     if doubtful or not s.conclusive or 2 * saddles != len(s.equilibria):
         return UNDECIDED
-    # where a branch's end is open, a cycle beside it may have been lost: a stable one's in reversed time
+    # where a branch's end is open, a cycle beside it may have been lost: a stable one's in reversed
+    # time
     return UNDECIDED if (ends_of_branches == destinations.UNDECIDED).any() else STABLE
 
 
@@ -153,16 +188,23 @@ def _hyperbolic(row):
 
 
 def _far(row, K, scale):
-    """Is a rotation so fast that D = pi K/w^2 + C3/w^3 + C4/w^4 shows it to be hyperbolic: D' = pi K/w^3?
+    """Is a rotation so fast that D = pi K/w^2 + C3/w^3 + C4/w^4 shows it to be hyperbolic: D' = pi
+    K/w^3?
 
     On 600 random systems |C4| < 0.21 scale^5.
     """
     w = row[rt.CYCLE_X]
-    return row[rt.CYCLE_CLASS] >= 0.0 and w > 30.0 * scale and math.pi * abs(K) * w * w > 10.0 * scale**5
+    return (
+        row[rt.CYCLE_CLASS] >= 0.0
+        and w > 30.0 * scale
+        and math.pi * abs(K) * w * w > 10.0 * scale**5
+    )
 
 
 def _rotations(method, cycles, rtol):
-    """|w|, its bound, period, its bound of rotation cycles, in columns: w on the section, the period by one turn."""
+    """|w|, its bound, period, its bound of rotation cycles, in columns: w on the section, the
+    period by one turn.
+    """
     w, bar = np.array([[row[rt.CYCLE_X], row[rt.CYCLE_BAR]] for _, _, _, row, _, _ in cycles]).T
     side = np.array([1.0 if kind == ROTATION_PLUS else -1.0 for _, _, kind, _, _, _ in cycles])
     section = np.array([s.section for _, _, _, _, s, _ in cycles])
@@ -170,16 +212,22 @@ def _rotations(method, cycles, rtol):
 
     def period(x):
         rows = solution.rows(six, section, side * np.maximum(x, 0.0))
-        floats, status = solution.abel(method, rows, (section + 2.0 * math.pi * side)[:, None], rtol, by_row=True)
-        return np.where(status[:, 0] == OK, floats[:, 0, rc.TIME], np.nan), floats[:, 0, rc.TIME_BAR]
+        floats, status = solution.abel(
+            method, rows, (section + 2.0 * math.pi * side)[:, None], rtol, by_row=True
+        )
+        return np.where(status[:, 0] == OK, floats[:, 0, rc.TIME], np.nan), floats[
+            :, 0, rc.TIME_BAR
+        ]
 
     return np.column_stack([side * w, bar, *_within(period, w, bar)])
 
 
 def _librations(method, cycles, rtol):
-    """w > 0 at the equilibrium to the left of the right turning point, error bound, period, error bound, in columns.
+    """w > 0 at the equilibrium to the left of the right turning point, error bound, period, error
+    bound, in columns.
 
-    From the right turning point the cycle is followed to the left one forward in time, and backward (S1: b -> -b).
+    From the right turning point the cycle is followed to the left one forward in time, and backward
+    (S1: b -> -b).
     """
     x, bar = np.array([[row[rt.CYCLE_X], row[rt.CYCLE_BAR]] for _, _, _, row, _, _ in cycles]).T
     rests = np.array([s.equilibria[int(row[rt.INTERVAL])] for _, _, _, row, s, _ in cycles])
@@ -189,17 +237,23 @@ def _librations(method, cycles, rtol):
     def half(x, b):
         rows = solution.rows(six, x, np.zeros(len(x)))
         rows[:, :2] *= b
-        floats, status = solution.abel(method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol, by_row=True)
+        floats, status = solution.abel(
+            method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol, by_row=True
+        )
         met = (status[:, 0] == OK) & (status[:, 1] == TURNING)
         return np.where(met[:, None, None], floats, np.nan)
 
     def period(x):
         one, two = half(x, 1.0), half(x, -1.0)
-        return one[:, 1, rc.TIME] + two[:, 1, rc.TIME], one[:, 1, rc.TIME_BAR] + two[:, 1, rc.TIME_BAR]
+        return one[:, 1, rc.TIME] + two[:, 1, rc.TIME], one[:, 1, rc.TIME_BAR] + two[
+            :, 1, rc.TIME_BAR
+        ]
 
     def passage(x):
         back = half(x, -1.0)
-        return -back[:, 0, rc.VALUE], back[:, 0, rc.VALUE_BAR] + np.abs(rests[:, eq.F]) * rests[:, eq.BAR]
+        return -back[:, 0, rc.VALUE], back[:, 0, rc.VALUE_BAR] + np.abs(rests[:, eq.F]) * rests[
+            :, eq.BAR
+        ]
 
     return np.column_stack([*_within(passage, x, bar), *_within(period, x, bar)])
 
@@ -212,7 +266,9 @@ def _within(function, x, bar):
 
 def _write(cycles, columns, result):
     """Write |w|, period and multiplier of cycles; a cycle that could not be followed has no answer."""
-    for (i, at, kind, row, _s, _six), (w, w_bar, period, period_bar) in zip(cycles, columns, strict=True):
+    for (i, at, kind, row, _s, _six), (w, w_bar, period, period_bar) in zip(
+        cycles, columns, strict=True
+    ):
         result["cycle_kind"][i, at] = kind
         if kind == LIBRATION:
             result["cycle_inside"][i, at] = abs(row[rt.CYCLE_CLASS])

@@ -17,7 +17,12 @@ BINOMIALS = np.array([1.0, 4.0, 6.0, 4.0, 1.0])
 
 def square_of_w(d, c23, s2, s3, phi):
     """w^2 - n at phi, of (63), and the sum of its terms' sizes."""
-    terms = 0.5 * d * np.cos(2 * phi), -c23 * np.sin(2 * phi), 2 * s2 * np.sin(phi), 2 * s3 * np.cos(phi)
+    terms = (
+        0.5 * d * np.cos(2 * phi),
+        -c23 * np.sin(2 * phi),
+        2 * s2 * np.sin(phi),
+        2 * s3 * np.cos(phi),
+    )
     return sum(terms), sum(np.abs(term) for term in terms) + np.abs(phi) * 0.0
 
 
@@ -42,10 +47,23 @@ def invariants(a, bars):
     a0, a1, a2, a3, a4 = a.T
     b0, b1, b2, b3, b4 = bars.T
     sizes = np.abs(a).T
-    g2, g3 = a0 * a4 - 4 * a1 * a3 + 3 * a2**2, a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2**3 - a4 * a1**2 - a0 * a3**2
+    g2, g3 = (
+        a0 * a4 - 4 * a1 * a3 + 3 * a2**2,
+        a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2**3 - a4 * a1**2 - a0 * a3**2,
+    )
     s0, s1, s2, s3, s4 = sizes
-    d2 = b0 * s4 + s0 * b4 + 4 * (b1 * s3 + s1 * b3) + 6 * s2 * b2 + 4 * ROUNDING * (s0 * s4 + 4 * s1 * s3 + 3 * s2**2)
-    d3 = (s2 * s4 + s3**2) * b0 + 2 * (s2 * s3 + s4 * s1) * b1 + (s0 * s4 + 2 * s1 * s3 + 3 * s2**2) * b2
+    d2 = (
+        b0 * s4
+        + s0 * b4
+        + 4 * (b1 * s3 + s1 * b3)
+        + 6 * s2 * b2
+        + 4 * ROUNDING * (s0 * s4 + 4 * s1 * s3 + 3 * s2**2)
+    )
+    d3 = (
+        (s2 * s4 + s3**2) * b0
+        + 2 * (s2 * s3 + s4 * s1) * b1
+        + (s0 * s4 + 2 * s1 * s3 + 3 * s2**2) * b2
+    )
     d3 = d3 + 2 * (s1 * s2 + s0 * s3) * b3 + (s0 * s2 + s1**2) * b4
     d3 = d3 + 5 * ROUNDING * (s0 * s2 * s4 + 2 * s1 * s2 * s3 + s2**3 + s4 * s1**2 + s0 * s3**2)
     G = g2**3 - 27 * g3**2
@@ -54,7 +72,8 @@ def invariants(a, bars):
 
 
 def roots(a, bars):
-    """Finite roots (rows, 4), real ones first and ascending, NaN where there are fewer, and the radii of their discs.
+    """Finite roots (rows, 4), real ones first and ascending, NaN where there are fewer, and the
+    radii of their discs.
 
     The discs |z - z_k| <= 4 |P(z_k)| / |a0 prod (z_k - z_j)| hold all roots, each isolated one its own (B. T. Smith,
     Journal of the ACM 17 (1970) 661-674); P(z_k) by its value and what that may be off.
@@ -65,17 +84,25 @@ def roots(a, bars):
     leading, trailing = some.argmax(axis=1), some[:, ::-1].argmax(axis=1)
     for first in range(4):
         for last in range(5 - first):
-            alike = np.isfinite(rows).all(axis=1) & some.any(axis=1) & (leading == first) & (trailing == last)
+            alike = (
+                np.isfinite(rows).all(axis=1)
+                & some.any(axis=1)
+                & (leading == first)
+                & (trailing == last)
+            )
             if alike.any():
                 own = slice(0, 4 - first)
-                found[alike, own], radii[alike, own] = _discs(rows[alike, first:], bars[alike, first:], last)
+                found[alike, own], radii[alike, own] = _discs(
+                    rows[alike, first:], bars[alike, first:], last
+                )
     unknown = ~np.isfinite(radii)
     found[unknown], radii[unknown] = complex(np.nan, np.nan), np.nan
     return found, radii
 
 
 def _discs(rows, bars, zeros):
-    """The roots of polynomials, the highest power's coefficients first and not 0, the last `zeros` 0; and their radii.
+    """The roots of polynomials, the highest power's coefficients first and not 0, the last `zeros`
+    0; and their radii.
 
     The bounds of the coefficients are `bars`.
     """
@@ -87,12 +114,16 @@ def _discs(rows, bars, zeros):
     z[:, : degree - zeros] = np.linalg.eigvals(companion)
     for _ in range(2):  # Weierstrass's simultaneous iteration refines all roots but double ones
         with np.errstate(all="ignore"):
-            move = _value(rows, z) / (rows[:, :1] * np.prod(z[:, :, None] - z[:, None] + one, axis=2))
+            move = _value(rows, z) / (
+                rows[:, :1] * np.prod(z[:, :, None] - z[:, None] + one, axis=2)
+            )
         z = np.where(np.isfinite(move) & (np.abs(move) < 0.1 * (1 + np.abs(z))), z - move, z)
     gaps = z[:, :, None] - z[:, None] + one
     blur = _value(np.abs(rows) * 4 * (degree + 1) * ROUNDING + bars, np.abs(z))
     with np.errstate(all="ignore"):
-        radius = degree * (np.abs(_value(rows, z)) + blur) / np.abs(rows[:, :1] * np.prod(gaps, axis=2))
+        radius = (
+            degree * (np.abs(_value(rows, z)) + blur) / np.abs(rows[:, :1] * np.prod(gaps, axis=2))
+        )
     share = np.maximum(1.0 - bars[:, :1] / np.abs(rows[:, :1]), 0.1)
     radius = np.where(np.isfinite(radius), radius * 1.1 / share, np.inf)
     # a disc on the real axis that meets no other holds a real root
@@ -120,6 +151,8 @@ def is_degenerate(a):
 
 
 def at_zero(d, c23, s2, s3, w0):
-    """a0 to a4 of the motion through phi0 = 0, w0, of Fractions: no other angle of binary64 has a rational sine."""
+    """a0 to a4 of the motion through phi0 = 0, w0, of Fractions: no other angle of binary64 has a
+    rational sine.
+    """
     n = w0 * w0 - d / 2 - 2 * s3
     return d / 2 + n - 2 * s3, s2 + c23, n / 3 - d / 2, s2 - c23, d / 2 + n + 2 * s3

@@ -30,9 +30,11 @@ TWO_PI = 2.0 * math.pi
 
 
 def found(square, axes, flow):
-    """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the curves and the equilibria on the map.
+    """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the curves and the
+    equilibria on the map.
 
-    `flow`: the six parameters of SYSTEM, or a program (see `equation`), of which no closed form is known.
+    `flow`: the six parameters of SYSTEM, or a program (see `equation`), of which no closed form is
+    known.
     """
     window = Window(square, axes.index("phi0"))
     s = outline(flow)
@@ -53,7 +55,10 @@ class Window:
         self.square, self.at = square, at
         self.low, self.high = (np.roll(end, -at) for end in (square.low, square.high))
         self.log = np.roll(square.log, -at)
-        low, high = (np.where(self.log, np.log(np.where(self.log, end, 1.0)), end) for end in (self.low, self.high))
+        low, high = (
+            np.where(self.log, np.log(np.where(self.log, end, 1.0)), end)
+            for end in (self.low, self.high)
+        )
         self.size = high - low
 
     def for_lines(self, side):
@@ -69,13 +74,20 @@ class Window:
         return self.square.positions(np.where(self.square.log, np.maximum(pair, TINY), pair))
 
     def error(self, phi, w, by_phi, by_w, across):
-        """Position errors of points whose gradient (by_phi, by_w) times the distance from the curve is `across`."""
-        a, c = (np.where(log, abs(x), 1.0) * size for x, log, size in zip((phi, w), self.log, self.size, strict=True))
+        """Position errors of points whose gradient (by_phi, by_w) times the distance from the curve
+        is `across`.
+        """
+        a, c = (
+            np.where(log, abs(x), 1.0) * size
+            for x, log, size in zip((phi, w), self.log, self.size, strict=True)
+        )
         return across / np.maximum(np.hypot(by_phi * a, by_w * c), TINY)
 
     def copies(self, low, high):
         """The numbers of turns that bring something from low to high into the map."""
-        return range(math.ceil((self.low[0] - high) / TWO_PI), math.floor((self.high[0] - low) / TWO_PI) + 1)
+        return range(
+            math.ceil((self.low[0] - high) / TWO_PI), math.floor((self.high[0] - low) / TWO_PI) + 1
+        )
 
 
 def _flipped(p):
@@ -89,15 +101,22 @@ def _branches(window, s):
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
     if not len(saddles):
         return
-    steepest = max(0.5 * (abs(row[eq.F]) + math.sqrt(row[eq.F] ** 2 + 4.0 * row[eq.DG])) for row in saddles)
-    reach = min(0.1, FURTHEST * min(window.high[0] - window.low[0], (window.high[1] - window.low[1]) / steepest))
+    steepest = max(
+        0.5 * (abs(row[eq.F]) + math.sqrt(row[eq.F] ** 2 + 4.0 * row[eq.DG])) for row in saddles
+    )
+    reach = min(
+        0.1,
+        FURTHEST * min(window.high[0] - window.low[0], (window.high[1] - window.low[1]) / steepest),
+    )
     size = unstable(p, s.equilibria, len(s.equilibria), starts, reach)
     for i, start in enumerate(starts[:size]):
         saddle = saddles[i // 2]
         known = {"equilibrium_phi": (saddle[eq.ANGLE], saddle[eq.BAR])}
         points = _followed(window, -1.0, p, start, s, lines.BRANCH)
         bar = math.hypot(*(saddle[eq.BAR] / window.size))
-        first = np.array([[saddle[eq.ANGLE] - TWO_PI * (saddle[eq.ANGLE] > math.pi), 0.0, 0.0, 0.0, bar]])
+        first = np.array(
+            [[saddle[eq.ANGLE] - TWO_PI * (saddle[eq.ANGLE] > math.pi), 0.0, 0.0, 0.0, bar]]
+        )
         off = start[rc.START_PHI] - saddle[eq.ANGLE]
         shift = round((start[rc.START_PHI] - first[0, 0] - off) / TWO_PI)
         first[0, lines.TURNS] = shift
@@ -119,7 +138,9 @@ def _cycles(window, s):
             kind = lines.ROTATION if side else lines.LIBRATION
             points = _followed(window, sign, s.p if stable else _flipped(s.p), start, s, kind)
             known = {"multiplier": (row[rt.MULTIPLIER], row[rt.MULTIPLIER_BAR])}
-            yield from _copied(window, points, "stable_cycle" if stable else "unstable_cycle", known)
+            yield from _copied(
+                window, points, "stable_cycle" if stable else "unstable_cycle", known
+            )
 
 
 def _followed(window, side, p, start, s, kind):
@@ -129,7 +150,9 @@ def _followed(window, side, p, start, s, kind):
     out = out[: taylor.flow_line(p, start, *given, TOLERANCE, out)]
     out[:, lines.VELOCITY] *= side
     if side < 0.0:
-        flipped = np.array([lines.INSIDE, lines.AT_PHI_LOW, lines.AT_PHI_HIGH, lines.AT_W_HIGH, lines.AT_W_LOW])
+        flipped = np.array(
+            [lines.INSIDE, lines.AT_PHI_LOW, lines.AT_PHI_HIGH, lines.AT_W_HIGH, lines.AT_W_LOW]
+        )
         known = np.isfinite(out[:, lines.BORDER])
         out[known, lines.BORDER] = flipped[out[known, lines.BORDER].astype(int)]
     return out
@@ -152,7 +175,12 @@ def _copied(window, points, kind, known):
         ):
             own = (border == mark) & ((abs(x - end) < loose) if axis == 0 else True)
             (x, v)[axis][own] = end
-        good = (x >= window.low[0]) & (x <= window.high[0]) & (v >= window.low[1]) & (v <= window.high[1])
+        good = (
+            (x >= window.low[0])
+            & (x <= window.high[0])
+            & (v >= window.low[1])
+            & (v <= window.high[1])
+        )
         for part in np.split(np.arange(x.size), 1 + np.flatnonzero(np.diff(good))):
             if part.size > 1 and good[part[0]]:
                 shift = ROUNDOFF * (abs(x[part]) + TWO_PI) / window.size[0]
@@ -164,7 +192,11 @@ def _equilibria(window, s):
     for row in s.equilibria:
         if row[eq.KIND] == eq.DEGENERATE:
             continue
-        kind = "saddle" if row[eq.KIND] == eq.SADDLE else ("sink", "centre", "source")[1 + int(row[eq.STABLE])]
+        kind = (
+            "saddle"
+            if row[eq.KIND] == eq.SADDLE
+            else ("sink", "centre", "source")[1 + int(row[eq.STABLE])]
+        )
         known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
         for k in window.copies(row[eq.ANGLE], row[eq.ANGLE]):
             phi = np.array([row[eq.ANGLE] + TWO_PI * k])
@@ -185,7 +217,12 @@ def _free(window, six):
         for phi in runs(lambda t, w=w: window.positions(t, w(t)), window.low[0], window.high[0]):
             slope = b12 * np.cos(phi) - b31 * np.sin(phi)
             across = 4.0 * ROUNDOFF * b * (2.0 + abs(phi))
-            yield "stable_manifold", window.parameters(phi, w(phi)), window.error(phi, w(phi), slope, 1.0, across), {}
+            yield (
+                "stable_manifold",
+                window.parameters(phi, w(phi)),
+                window.error(phi, w(phi), slope, 1.0, across),
+                {},
+            )
 
 
 def _levels(window, s):
@@ -213,11 +250,17 @@ def _levels(window, s):
                     for t in runs(position, 0.0, 1.0 if branch else 2.0):
                         x, w = point(t)
                         phi = level.angle + x + TWO_PI * k
-                        across = level.error(x) + 4.0 * ROUNDOFF * w * w + abs(level.slope(x)) * ROUNDOFF * abs(phi)
+                        across = (
+                            level.error(x)
+                            + 4.0 * ROUNDOFF * w * w
+                            + abs(level.slope(x)) * ROUNDOFF * abs(phi)
+                        )
                         error = window.error(phi, w, level.slope(x), w, across)
                         error[x == 0.0] = row[eq.BAR] / window.size[0] + ROUNDOFF
                         if not turns:  # a saddle of the same level, within rounding
-                            error[x == far] = math.hypot(*(np.sqrt(level.error(far) * level.reach()) / window.size))
+                            error[x == far] = math.hypot(
+                                *(np.sqrt(level.error(far) * level.reach()) / window.size)
+                            )
                         yield "stable_manifold", window.parameters(phi, w), error, known
 
 
@@ -242,10 +285,17 @@ class Level:
         """V' there."""
         phi = self.angle + np.asarray(x, float)
         d, c23, s2, s3 = self.p[2:6]
-        return 0.5 * d * np.sin(2.0 * phi) + c23 * np.cos(2.0 * phi) - s2 * np.cos(phi) + s3 * np.sin(phi)
+        return (
+            0.5 * d * np.sin(2.0 * phi)
+            + c23 * np.cos(2.0 * phi)
+            - s2 * np.cos(phi)
+            + s3 * np.sin(phi)
+        )
 
     def reach(self):
-        """Squares of how far from a saddle H = V(saddle) + 1 is, along phi and along w, with a margin of 2."""
+        """Squares of how far from a saddle H = V(saddle) + 1 is, along phi and along w, with a
+        margin of 2.
+        """
         return np.array([8.0 / self.steep, 8.0])
 
     def error(self, x):
@@ -263,7 +313,9 @@ def far_end(level, s, side):
         if abs(reach) <= 4.0 * level.error(x) + ROUNDOFF * level.size:
             return x, False
         if reach < 0.0:
-            before = max((y for y in [0.5 * x, *others] if abs(y) < abs(x) and level.depth(y) > 0.0), key=abs)
+            before = max(
+                (y for y in [0.5 * x, *others] if abs(y) < abs(x) and level.depth(y) > 0.0), key=abs
+            )
             return _zero(level, before, x), True
     return side * TWO_PI, False
 

@@ -1,11 +1,14 @@
-"""Solutions on a separatrix: the stable and unstable branches of the saddles, as exactly as their parameters are given.
+"""Solutions on a separatrix: the stable and unstable branches of the saddles, as exactly as their
+parameters are given.
 
-A start is a row of eight numbers: the six parameters, phi0, and the number of the saddle, by its angle in [0, 2 pi).
-The branch is that of the saddle next to phi0: on its right side phi0 - 2 pi < phi_s < phi0, on its left phi0 < phi_s <
-phi0 + 2 pi, and phi0 lies between the saddle and the first turning point of the branch, if it turns. There t = 0.
+A start is a row of eight numbers: the six parameters, phi0, and the number of the saddle, by its
+angle in [0, 2 pi). The branch is that of the saddle next to phi0: on its right side phi0 - 2 pi <
+phi_s < phi0, on its left phi0 < phi_s < phi0 + 2 pi, and phi0 lies between the saddle and the first
+turning point of the branch, if it turns. There t = 0.
 
-Where b = 0 in closed form (`kernels.cylinder.separatrix`), else by the power series at the saddle and Taylor series in
-double-double arithmetic (`kernels.cylinder.branch_double`); by any other method from the state on the branch at phi0.
+Where b = 0 in closed form (`kernels.cylinder.separatrix`), else by the power series at the saddle
+and Taylor series in double-double arithmetic (`kernels.cylinder.branch_double`); by any other
+method from the state on the branch at phi0.
 """
 
 from fractions import Fraction
@@ -15,7 +18,14 @@ import numpy as np
 from survey.kernels.cylinder import branch_double, separatrix
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, MULTIPLICITY, SLIP
-from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, UNDETERMINED
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    TRUST,
+    TURNING,
+    UNDETERMINED,
+)
 from survey.measures.cylinder import quartic, solution
 from survey.methods import closed
 from survey.status import INVALID_PARAMETERS
@@ -72,10 +82,15 @@ def abel(method, rows, targets, rtol, stable, left):
 
 
 class Starts:
-    """The branches on which rows start, as branches that leave a saddle to the right; their status and HEADS."""
+    """The branches on which rows start, as branches that leave a saddle to the right; their status
+    and HEADS.
+    """
 
     def __init__(self, method, rows, stable, left):
-        self.heads, self.status = np.full((len(rows), HEADS), np.nan), np.full(len(rows), INVALID_PARAMETERS)
+        self.heads, self.status = (
+            np.full((len(rows), HEADS), np.nan),
+            np.full(len(rows), INVALID_PARAMETERS),
+        )
         plain, _starts = solution.split(rows)
         turned = solution.reverse(rows) if stable else rows
         turned = solution.mirror(turned) if left else turned
@@ -122,14 +137,22 @@ class Starts:
 
     def at(self, i, times):
         """floats, turnings, and the status where there are none, at ascending times of row i."""
-        floats, turnings = np.full((len(times), rc.STATE), np.nan), np.full(len(times), UNDETERMINED)
+        floats, turnings = (
+            np.full((len(times), rc.STATE), np.nan),
+            np.full(len(times), UNDETERMINED),
+        )
         first, a, branch = self.branches[i]
         if a is not None:
-            status = branch_double.trajectory(self.P[i], first, a, branch, self.phi0[i], times, floats, turnings)
+            status = branch_double.trajectory(
+                self.P[i], first, a, branch, self.phi0[i], times, floats, turnings
+            )
             return floats, turnings, status
         for j, t in enumerate(times):
             turnings[j] = separatrix.at(self.P[i], first, self.phi0[i], t, floats[j])
-        lost = ~((floats[:, rc.PHI_BAR] < TRUST) & (floats[:, rc.W_BAR] < TRUST * (1.0 + np.abs(floats[:, rc.W]))))
+        lost = ~(
+            (floats[:, rc.PHI_BAR] < TRUST)
+            & (floats[:, rc.W_BAR] < TRUST * (1.0 + np.abs(floats[:, rc.W])))
+        )
         floats[lost] = np.nan
         return floats, turnings, NO_CONVERGENCE
 
@@ -146,12 +169,16 @@ class Starts:
 
 
 def _by_steps(starts, rows, solve):
-    """The results of `solve` from the states at phi0, whose rounding two states next to each add to the bars."""
+    """The results of `solve` from the states at phi0, whose rounding two states next to each add to
+    the bars.
+    """
     good = starts.status == OK
     given = rows.copy()
     given[:, rc.W0] = np.where(good, starts.heads[:, START], 0.0)
     results, beside = solve(given), given.copy()
-    beside[:, rc.W0] += np.where(good, starts.heads[:, START_BAR] + _ULP * np.abs(given[:, rc.W0]), 0.0)
+    beside[:, rc.W0] += np.where(
+        good, starts.heads[:, START_BAR] + _ULP * np.abs(given[:, rc.W0]), 0.0
+    )
     others, bars = solve(beside), rc.STATE // 2
     floats = results[0]
     with np.errstate(invalid="ignore"):
@@ -160,20 +187,26 @@ def _by_steps(starts, rows, solve):
     lost &= (results[-1] == OK) | (results[-1] == TURNING)
     floats[lost], results[-1][lost] = np.nan, NO_CONVERGENCE
     if len(results) == 3:
-        results[1][(results[1] != others[1]) | (np.abs(floats[..., rc.W]) <= floats[..., rc.W_BAR])] = UNDETERMINED
+        results[1][
+            (results[1] != others[1]) | (np.abs(floats[..., rc.W]) <= floats[..., rc.W_BAR])
+        ] = UNDETERMINED
     results[-1][~good] = starts.status[~good, None]
     floats[~good] = np.nan
     return results
 
 
 def symmetric(row):
-    """Is V exactly even about the direction of s, or s = 0? Then saddles on both sides of it have the same energy."""
+    """Is V exactly even about the direction of s, or s = 0? Then saddles on both sides of it have
+    the same energy.
+    """
     d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
     return d * s2 * s3 + c23 * (s3 * s3 - s2 * s2) == 0
 
 
 def _multiple(row, many):
-    """Has g exactly a root of this multiplicity? By the invariants of its quartic in tan(phi/2): I^3 = 27 J^2."""
+    """Has g exactly a root of this multiplicity? By the invariants of its quartic in tan(phi/2):
+    I^3 = 27 J^2.
+    """
     d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
     a, b, c, e, f = -c23 - s2, (d - s3) / 2, c23, -(d + s3) / 2, s2 - c23
     first = a * f - 4 * b * e + 3 * c * c
@@ -184,10 +217,11 @@ def _multiple(row, many):
 
 
 def branch_of(row):
-    """(number of the saddle, stable?, left?) of the branch on which a motion without Barnett-London effect starts.
+    """(number of the saddle, stable?, left?) of the branch on which a motion without Barnett-London
+    effect starts.
 
-    `row` holds six parameters, phi0 and w0 != 0, of which it is known that H(phi0, w0) is exactly that of a saddle.
-    None if that saddle is not found, or phi0 is not reached from it.
+    `row` holds six parameters, phi0 and w0 != 0, of which it is known that H(phi0, w0) is exactly
+    that of a saddle. None if that saddle is not found, or phi0 is not reached from it.
     """
     p, place = solution.split(np.array([row]))[0][0], np.zeros(separatrix.SADDLE)
     d, c23, s2, s3, phi0, w0 = row[2:8]
@@ -195,18 +229,25 @@ def branch_of(row):
     missed = []
     for number in range(1, 5):
         if separatrix.saddle(p, float(number), place):
-            missed.append((abs(level + quartic.square_of_w(d, c23, s2, s3, place[ANGLE])[0]), number))
+            missed.append(
+                (abs(level + quartic.square_of_w(d, c23, s2, s3, place[ANGLE])[0]), number)
+            )
     size = w0 * w0 + abs(d) + abs(c23) + abs(s2) + abs(s3)
     for off, number in sorted(missed):
         for stable in (False, True):
             left = (w0 < 0.0) != stable
-            if off < 1e-9 * size and Starts(closed, np.array([[*row[:7], number]]), stable, left).status[0] == OK:
+            if (
+                off < 1e-9 * size
+                and Starts(closed, np.array([[*row[:7], number]]), stable, left).status[0] == OK
+            ):
                 return number, stable, left
     return None
 
 
 def through(rows, columns, rtol, branches, measure=trajectories):
-    """As `solution.trajectories` (or `abel`) of rows that start on the `branches` (of `branch_of`) of saddles."""
+    """As `solution.trajectories` (or `abel`) of rows that start on the `branches` (of `branch_of`)
+    of saddles.
+    """
     found = []
     for i, (number, stable, left) in enumerate(branches):
         given = np.array([[*rows[i, :7], number]])
@@ -217,8 +258,8 @@ def through(rows, columns, rtol, branches, measure=trajectories):
 def exact_starts(rows):
     """{row: its branch, of `branch_of`} of those that start exactly on a separatrix, b = 0.
 
-    phi0 is 0 there: of any other angle of binary64 sine and cosine are transcendental, but the energies of saddles are
-    algebraic.
+    phi0 is 0 there: of any other angle of binary64 sine and cosine are transcendental, but the
+    energies of saddles are algebraic.
     """
     at = np.flatnonzero((rows[:, rc.PHI0] == 0.0) & (rows[:, 0] == 0.0))  # as a rule, none
     some = rows[at, : rc.GIVEN]
@@ -232,21 +273,29 @@ def exact_starts(rows):
 
 
 class Aware:
-    """A measure of single solutions, as `solution`, which takes those that start exactly on a separatrix from here."""
+    """A measure of single solutions, as `solution`, which takes those that start exactly on a
+    separatrix from here.
+    """
 
     def __init__(self, measure):
         self.measure = measure
 
     def trajectories(self, method, rows, times, rtol):
-        return self._replaced(self.measure.trajectories(method, rows, times, rtol), rows, times, rtol, trajectories)
+        return self._replaced(
+            self.measure.trajectories(method, rows, times, rtol), rows, times, rtol, trajectories
+        )
 
     def abel(self, method, rows, targets, rtol, before=False):
-        return self._replaced(self.measure.abel(method, rows, targets, rtol, before), rows, targets, rtol, abel)
+        return self._replaced(
+            self.measure.abel(method, rows, targets, rtol, before), rows, targets, rtol, abel
+        )
 
     def _replaced(self, results, rows, columns, rtol, measure):
         own = exact_starts(rows)
         if own:
             at = list(own)
-            for result, new in zip(results, through(rows[at], columns[at], rtol, own.values(), measure), strict=True):
+            for result, new in zip(
+                results, through(rows[at], columns[at], rtol, own.values(), measure), strict=True
+            ):
                 result[at] = new
         return results

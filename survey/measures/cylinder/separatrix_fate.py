@@ -1,7 +1,9 @@
-"""Fates of motions that start on a separatrix, as exactly as their parameters are given (see `separatrix`).
+"""Fates of motions that start on a separatrix, as exactly as their parameters are given (see
+`separatrix`).
 
-On a stable branch the motion tends to its saddle. On an unstable one it ends where that branch does, which is followed
-from its saddle as a portrait follows it (`destinations`); without Barnett-London effect that is a saddle again.
+On a stable branch the motion tends to its saddle. On an unstable one it ends where that branch
+does, which is followed from its saddle as a portrait follows it (`destinations`); without
+Barnett-London effect that is a saddle again.
 """
 
 import math
@@ -30,7 +32,13 @@ def solve(method, rows, rtol, stable, left):
         if not stable and key not in ends:
             ends[key] = _end(method, rows[i, :6], key[-1], rtol, left)
         if stable:
-            _at_saddle(result, i, starts.heads[i, separatrix.SADDLE], starts.heads[i, separatrix.SADDLE_BAR], 0)
+            _at_saddle(
+                result,
+                i,
+                starts.heads[i, separatrix.SADDLE],
+                starts.heads[i, separatrix.SADDLE_BAR],
+                0,
+            )
         else:
             _written(result, i, rows[i, 6], *ends[key], left)
     return result, starts.heads
@@ -67,7 +75,9 @@ def _written(result, i, phi0, s, at, found, reached, left):
     if reached is not None:
         result["status"][i] = OK
         turns = far_end(Level(s.p, s.equilibria[at]), s, -1.0 if left else 1.0)[1]
-        _at_saddle(result, i, s.equilibria[reached, eq.ANGLE], s.equilibria[reached, eq.BAR], int(turns))
+        _at_saddle(
+            result, i, s.equilibria[reached, eq.ANGLE], s.equilibria[reached, eq.BAR], int(turns)
+        )
     elif found is not None:
         for name, column in fate.COLUMNS_OF.items():
             result[name][i] = found[column]

@@ -1,7 +1,8 @@
-"""Single solutions of a flow on the cylinder phi' = w, w' = f(phi) w + g(phi): in time, and w and t over phi (57).
+"""Single solutions of a flow on the cylinder phi' = w, w' = f(phi) w + g(phi): in time, and w and t
+over phi (57).
 
-Arrays in, arrays out; a row is one solution, its columns are the times or angles asked for. A row that misses the
-asked accuracy is solved again with smaller steps, and the better answer is kept.
+Arrays in, arrays out; a row is one solution, its columns are the times or angles asked for. A row
+that misses the asked accuracy is solved again with smaller steps, and the better answer is kept.
 """
 
 import numpy as np
@@ -14,12 +15,15 @@ from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
-ATTEMPTS = (3e-4, 1e-5, 1e-7)  # the same for trajectories: most of what misses the accuracy misses it by little
+# the same for trajectories: most of what misses the accuracy misses it by little
+ATTEMPTS = (3e-4, 1e-5, 1e-7)
 FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
 def reverse(rows):
-    """S1: (b, w, t) -> -(b, w, t); rows of GIVEN numbers (see `records`), and a program after them or none."""
+    """S1: (b, w, t) -> -(b, w, t); rows of GIVEN numbers (see `records`), and a program after them
+    or none.
+    """
     return _signed(rows, [-1, -1, 1, 1, 1, 1, 1, -1.0])
 
 
@@ -46,22 +50,31 @@ def tolerances(method, rtol):
 def attempts(method, rtol):
     """Truncation per step of trajectories, ever finer."""
     tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), 1e-6) for share in ATTEMPTS]
-    return [first for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True) if finer < 0.5 * first]
+    return [
+        first
+        for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True)
+        if finer < 0.5 * first
+    ]
 
 
 def split(rows):
     """Rows of GIVEN numbers (see `records`) as the kernels take them: coefficients and initial states."""
     own = rows.shape[1] > rc.GIVEN
-    P, starts = np.empty((len(rows), rows.shape[1] - 2 if own else COLUMNS)), np.empty((len(rows), 2))
+    P, starts = (
+        np.empty((len(rows), rows.shape[1] - 2 if own else COLUMNS)),
+        np.empty((len(rows), 2)),
+    )
     (spread_programs if own else spread)(np.ascontiguousarray(rows, dtype=float), P, starts)
     P.flags.writeable = own
     return P, starts
 
 
 def trajectories(method, rows, times, rtol):
-    """PHI to W_BAR of `records` (last axis), turnings and status at `times` (rows, columns), of either sign.
+    """PHI to W_BAR of `records` (last axis), turnings and status at `times` (rows, columns), of
+    either sign.
 
-    turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound leaves it open.
+    turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound
+    leaves it open.
     """
     past = times < 0
     if not past.any():
@@ -116,29 +129,38 @@ def _in_time(method, rows, times, rtol):
 
 
 def _count(method, rows, times, tolerance, asked, results):
-    """Count the turnings that the steps left UNDETERMINED, as beside a focus, where w is less than its error bound."""
+    """Count the turnings that the steps left UNDETERMINED, as beside a focus, where w is less than
+    its error bound.
+    """
     _floats, turnings, status = results
     pick = (asked & (turnings == UNDETERMINED) & (status == OK)).any(axis=1)
     if pick.any():
         P, starts = split(rows[pick])
         counted = turnings[pick]
-        method.flow_turnings(P, starts, np.ascontiguousarray(times[pick]), tolerance, STEPS, counted)
+        method.flow_turnings(
+            P, starts, np.ascontiguousarray(times[pick]), tolerance, STEPS, counted
+        )
         turnings[pick] = np.where(status[pick] == OK, counted, turnings[pick])
 
 
 def abel(method, rows, targets, rtol, before=False, by_row=False):
     """VALUE to TIME_BAR of `records` (last axis) and status at phi = `targets` (rows, columns).
 
-    Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in time, or backward if
-    `before`; both branches lie to the side of g, and at targets on the other side it has turned at t = 0.
+    Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in
+    time, or backward if `before`; both branches lie to the side of g, and at targets on the other
+    side it has turned at t = 0.
 
-    `by_row`: one row after the other, which is compiled 12 s sooner than lock step: for those who need few.
+    `by_row`: one row after the other, which is compiled 12 s sooner than lock step: for those who
+    need few.
     """
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
     if len(rows) and (past == past[0]).all() and (targets >= phi0).all():  # as a rule
         return _branch(method, rows, targets, rtol, 1.0, past[0], by_row)
-    floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, dtype=np.int64)
+    floats, status = (
+        np.full((*targets.shape, rc.STATE), np.nan),
+        np.zeros(targets.shape, dtype=np.int64),
+    )
     for side in (1.0, -1.0):
         onward = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):
@@ -147,7 +169,8 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
                 continue
             mine = onward[picked]
             same = np.flatnonzero(mine[0])
-            if (mine == mine[0]).all() and same[-1] - same[0] < same.size:  # picking costs more than solving
+            # picking costs more than solving
+            if (mine == mine[0]).all() and same[-1] - same[0] < same.size:
                 at = slice(same[0], same[-1] + 1)
                 some = slice(None) if picked.all() else picked
                 floats[some, at], status[some, at] = _branch(
@@ -217,7 +240,9 @@ def missed(results, rtol):
     for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
         wide = np.flatnonzero(~(points[:, bar] <= rtol))  # as a rule, few
         if wide.size:
-            out.reshape(-1)[wide] |= ~(points[wide, bar] <= rtol * (1.0 + np.abs(points[wide, value])))
+            out.reshape(-1)[wide] |= ~(
+                points[wide, bar] <= rtol * (1.0 + np.abs(points[wide, value]))
+            )
     return out
 
 
@@ -239,7 +264,8 @@ def _sorted(columns):
 
     def undone(results):
         return tuple(
-            np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1) for result in results
+            np.take_along_axis(result, back[..., None] if result.ndim == 3 else back, axis=1)
+            for result in results
         )
 
     return np.take_along_axis(columns, order, axis=1), undone

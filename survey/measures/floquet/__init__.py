@@ -1,8 +1,8 @@
 """Linear periodic systems x' = A(t) x of n states: monodromy, multipliers, verdict.
 
-METHODS lists what a method that serves the family "floquet", or "orbit" (periodic orbits of x' = f(t, x)), offers. A
-step is taken over by its propagator F; steps of all points are tasks, in no particular order. A and t have the units
-of the user's functions.
+METHODS lists what a method that serves the family "floquet", or "orbit" (periodic orbits of x' =
+f(t, x)), offers. A step is taken over by its propagator F; steps of all points are tasks, in no
+particular order. A and t have the units of the user's functions.
 """
 
 from survey.contract import Function
@@ -24,10 +24,24 @@ METHODS = {
         ),
     }
 }  # fmt: skip
-METHODS["orbit"] = METHODS["floquet"] | {  # for the linear system along an orbit, whose series begin with its states
+# for the linear system along an orbit, whose series begin with its states
+METHODS["orbit"] = METHODS["floquet"] | {
     "orbit_motion": Function(
         "instead of proofs: fill X (N, n), the states at span (N) from x0 (N, n) at 0, and M (N, n, n), their "
         "derivatives by x0, in `steps` (N) equal steps; the other arguments are as in `kernels.floquet.flow.flow`",
-        ("operations", "signs", "inside", "order", "terms", "numbers", "places", "x0", "span", "steps", "X", "M"),
+        (
+            "operations",
+            "signs",
+            "inside",
+            "order",
+            "terms",
+            "numbers",
+            "places",
+            "x0",
+            "span",
+            "steps",
+            "X",
+            "M",
+        ),
     ),
 }

@@ -1,4 +1,6 @@
-"""What a process of its own compiles at the first use of linear systems (see `survey.sweep.compile_ahead`)."""
+"""What a process of its own compiles at the first use of linear systems (see
+`survey.sweep.compile_ahead`).
+"""
 
 import numpy as np
 

@@ -6,7 +6,9 @@ from survey.measures import answers
 
 
 class Answers(answers.Answers):
-    """`floats`: re, im of n multipliers, bars of each, spectral radius and its bar; `codes`; Krein `signs` (n, N)."""
+    """`floats`: re, im of n multipliers, bars of each, spectral radius and its bar; `codes`; Krein
+    `signs` (n, N).
+    """
 
     def __init__(self, size, n):
         super().__init__(size, 4 * n + 2, ("verdict", "crossing"))

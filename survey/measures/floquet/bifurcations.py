@@ -1,4 +1,5 @@
-"""Functions of the monodromy matrix M whose zeros are where multipliers reach the unit circle or leave it.
+"""Functions of the monodromy matrix M whose zeros are where multipliers reach the unit circle or
+leave it.
 
     plus_one        det(M - 1)
     minus_one       det(M + 1)
@@ -6,19 +7,25 @@
     collision       of symplectic and reversible systems: the discriminant of the polynomial whose roots are the s =
                     l + 1 / l, as the determinant of their moments sum_s T_j(s / 2) T_k(s / 2)
 
-All are analytic in the parameters, with simple zeros as a rule. Each is given but for a positive factor, with an error
-bound that contains that of M. det(C - 1) is also 0 where two real multipliers are l and 1 / l, and the discriminant
-where two s meet beyond -2 and 2: `passing` tells these apart.
+All are analytic in the parameters, with simple zeros as a rule. Each is given but for a positive
+factor, with an error bound that contains that of M. det(C - 1) is also 0 where two real multipliers
+are l and 1 / l, and the discriminant where two s meet beyond -2 and 2: `passing` tells these apart.
 
-Source: Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory (2004), 10.2; V. A. Yakubovich, V. M. Starzhinskii,
-Linear Differential Equations with Periodic Coefficients (1975), III.
+Source: Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory (2004), 10.2; V. A. Yakubovich, V.
+M. Starzhinskii, Linear Differential Equations with Periodic Coefficients (1975), III.
 """
 
 import numpy as np
 
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
-from survey.measures.floquet.multipliers import COLLISION, MINUS_ONE, NEIMARK_SACKER, PLUS_ONE, Discs
+from survey.measures.floquet.multipliers import (
+    COLLISION,
+    MINUS_ONE,
+    NEIMARK_SACKER,
+    PLUS_ONE,
+    Discs,
+)
 
 CLOSE = 1e-2  # far more than two s differ, next to a collision, by the error bounds of M
 CHUNK = 2_000_000  # entries of matrices that are treated together
@@ -55,7 +62,10 @@ def neimark_sacker(M, E):
             return a * d - b * c, bar + EPS * (abs(a * d) + abs(b * c))
 
     size = max(1, CHUNK // one.size**2)
-    parts = [determinant(*_shifted(*minors(M[i : i + size], E[i : i + size]), -1.0)) for i in range(0, len(M), size)]
+    parts = [
+        determinant(*_shifted(*minors(M[i : i + size], E[i : i + size]), -1.0))
+        for i in range(0, len(M), size)
+    ]
     return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
 
 
@@ -85,7 +95,8 @@ def _shifted(A, E, by):
 
 
 def determinant(A, E, relative=True):
-    """det A, over the square root of det(1 + A^T A) if `relative`, and its bound, of A (N, n, n) known to within E.
+    """det A, over the square root of det(1 + A^T A) if `relative`, and its bound, of A (N, n, n)
+    known to within E.
 
     With A = U S V^T within R, entries of U^T (E + R) V are moduli B at most, and the determinant of S + G, |G| <= B,
     differs from the product of the s_i by at most prod(s_i + sum_j B_ij) - prod s_i, as a permanent.
@@ -94,7 +105,11 @@ def determinant(A, E, relative=True):
     n = A.shape[1]
     with np.errstate(all="ignore"):
         # a smooth one: that of the balanced A would jump
-        whole = np.linalg.slogdet(np.eye(n) + np.swapaxes(A, 1, 2) @ A)[1] if relative else np.zeros(len(A))
+        whole = (
+            np.linalg.slogdet(np.eye(n) + np.swapaxes(A, 1, 2) @ A)[1]
+            if relative
+            else np.zeros(len(A))
+        )
         size = np.exp(whole / (2 * n))
         scale = monodromy.balanced(abs(A))
         A, E = (X * scale[:, None, :] / scale[:, :, None] for X in (A, E))
@@ -124,10 +139,11 @@ def _distances(s, some):
 
 
 def passing(M, E, kind, structure):
-    """What passes at points (N) of a curve of the class `kind`: (does it?, angle, its bound, outside).
+    """What passes at points (N) of a curve of the class `kind`: (does it?, angle, its bound,
+    outside).
 
-    The angle is the argument of the multiplier, from 0 to pi, and `outside` the number of the others that are
-    certainly outside the unit circle, NaN where the error bounds allow several.
+    The angle is the argument of the multiplier, from 0 to pi, and `outside` the number of the
+    others that are certainly outside the unit circle, NaN where the error bounds allow several.
     """
     discs, rows = Discs(monodromy.Matrices.plain(M, E)), np.arange(len(M))
     centre, bars, n = discs.centre, discs.bars, M.shape[1]
@@ -138,26 +154,38 @@ def passing(M, E, kind, structure):
             goal = 1.0 if kind == PLUS_ONE else -1.0
             order = np.argsort(abs(centre - goal), axis=1)[:, : 2 if paired else 1]
             own[rows[:, None], order] = True
-            sure, angle, bar = np.ones(len(M), bool), np.full(len(M), np.pi * (goal < 0)), np.zeros(len(M))
+            sure, angle, bar = (
+                np.ones(len(M), bool),
+                np.full(len(M), np.pi * (goal < 0)),
+                np.zeros(len(M)),
+            )
             bar += EPS * angle
         else:
             upper = centre.imag > bars
             if kind == NEIMARK_SACKER:
                 first = second = np.where(upper, abs(abs(centre) - 1), np.inf).argmin(axis=1)
-                # the product that vanishes is that of the pair of conjugates, not one of real multipliers
+                # the product that vanishes is that of the pair of conjugates, not one of real
+                # multipliers
                 left = abs(centre[:, :, None] * centre[:, None, :] - 1)
                 left[:, np.arange(n), np.arange(n)] = np.inf
-                sure = abs(abs(centre[rows, first]) ** 2 - 1) <= 1.01 * left.min(axis=(1, 2)) + 4 * EPS
+                sure = (
+                    abs(abs(centre[rows, first]) ** 2 - 1) <= 1.01 * left.min(axis=(1, 2)) + 4 * EPS
+                )
             else:
                 real = (abs(centre.imag) <= bars) & (abs(centre) > 1.0)
                 apart, other = (_distances(centre + 1.0 / centre, some) for some in (upper, real))
                 first, second = np.unravel_index(apart.reshape(len(M), -1).argmin(axis=1), (n, n))
                 # it is not two beyond -2 and 2 that meet
-                sure = (apart[rows, first, second] < CLOSE) & (apart[rows, first, second] < other.min(axis=(1, 2)))
+                sure = (apart[rows, first, second] < CLOSE) & (
+                    apart[rows, first, second] < other.min(axis=(1, 2))
+                )
             sure &= upper[rows, first] & upper[rows, second]
             angle = np.angle(centre[rows, first] + centre[rows, second])
             # |arg z - arg c| <= asin(r / |c|) <= (pi / 2) r / |c|
-            bar = 1.6 * np.maximum(*(bars[rows, k] / abs(centre[rows, k]) for k in (first, second))) + 4 * EPS
+            bar = (
+                1.6 * np.maximum(*(bars[rows, k] / abs(centre[rows, k]) for k in (first, second)))
+                + 4 * EPS
+            )
             for k in (first, second):
                 mirror = abs(centre - centre[rows, k].conj()[:, None]).argmin(axis=1)
                 own[rows, k], own[rows, mirror] = True, True

@@ -1,20 +1,24 @@
-"""The stability of a linear periodic system everywhere in cells of a map, and the area of each verdict.
+"""The stability of a linear periodic system everywhere in cells of a map, and the area of each
+verdict.
 
-By the signs of functions that are analytic in the parameters (`survey.measures.sign_cells`); p is the characteristic
-polynomial of M.
+By the signs of functions that are analytic in the parameters (`survey.measures.sign_cells`); p is
+the characteristic polynomial of M.
 
     no structure             p(1), (-1)^n p(-1), and the leading minors, but for the last, of Schur and Cohn's matrix
-                             S = T T' - R R', T and R the lower triangular Toeplitz matrices of the coefficients of p
-                             from its first and from its last one on
+                             S = T T' - R R', T and R the lower triangular Toeplitz matrices of the
+                             coefficients of p from its first and from its last one on
     symplectic, reversible   the leading minors of the moments sum_s (4 - s^2) s^(j+k) of the roots s = l + 1 / l
 
-All are positive if all multipliers are inside the unit circle (S > 0; two multipliers l and 1 / l, or 1 / conj(l), take
-two from the rank of S, so that its last minor but one is 0 there), or if all s are real, different and between -2 and
-2. None is negative if these are inside or on the circle, or between -2 and 2 or at these. So where one is negative, a
-multiplier is outside. Where s meet and do no harm, being of one Krein sign, the cells stay undecided.
+All are positive if all multipliers are inside the unit circle (S > 0; two multipliers l and 1 / l,
+or 1 / conj(l), take two from the rank of S, so that its last minor but one is 0 there), or if all s
+are real, different and between -2 and
+2. None is negative if these are inside or on the circle, or between -2 and 2 or at these. So where
+  one is negative, a
+multiplier is outside. Where s meet and do no harm, being of one Krein sign, the cells stay
+undecided.
 
-Source: M. Marden, Geometry of Polynomials (1966), 43 (Schur-Cohn); F. R. Gantmacher, The Theory of Matrices (1959), XV
-(moments).
+Source: M. Marden, Geometry of Polynomials (1966), 43 (Schur-Cohn); F. R. Gantmacher, The Theory of
+Matrices (1959), XV (moments).
 """
 
 from functools import partial
@@ -31,11 +35,23 @@ from survey.measures.tasks import in_turn
 OUTPUTS = ("monodromy",)
 VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE}
 
-__all__ = ["MOST", "OUTPUTS", "POINTS", "VERDICTS", "Side", "accuracy", "find", "keywords", "refusal"]
+__all__ = [
+    "MOST",
+    "OUTPUTS",
+    "POINTS",
+    "VERDICTS",
+    "Side",
+    "accuracy",
+    "find",
+    "keywords",
+    "refusal",
+]
 
 
 def refusal(scene, point):
-    """Why there are no cells on maps of the scene about this point, {parameter: value}, in words; None if there are."""
+    """Why there are no cells on maps of the scene about this point, {parameter: value}, in words;
+    None if there are.
+    """
     if scene.FAMILY == "orbit":
         return "cells are known of linear systems, not of periodic orbits, which end at folds"
     if not hasattr(scene, "conserved"):
@@ -89,7 +105,9 @@ def margins(M, E, structure):
 
 
 def _schur_cohn(c, d):
-    """S (N, n, n) of the polynomials with the coefficients c (N, n + 1), known to within d, and its bounds."""
+    """S (N, n, n) of the polynomials with the coefficients c (N, n + 1), known to within d, and its
+    bounds.
+    """
     n = c.shape[1] - 1
     S, E = np.zeros((2, len(c), n, n))
     for i in range(n):
@@ -104,7 +122,9 @@ def _schur_cohn(c, d):
 
 
 def _moments(c, d):
-    """The moments (N, m, m) of the roots of s^m + c_1 s^(m-1) + ..., c (N, m) known to within d, and their bounds."""
+    """The moments (N, m, m) of the roots of s^m + c_1 s^(m-1) + ..., c (N, m) known to within d,
+    and their bounds.
+    """
     m = c.shape[1]
     sums, bars = np.zeros((2, len(c), 2 * m + 1))
     sums[:, 0] = m
@@ -117,11 +137,18 @@ def _moments(c, d):
             bars[:, k] += 2 * (m + 1) * EPS * abs(c[:, j - 1] * other)
     j, k = np.indices((m, m))
     low, high = sums[:, j + k], sums[:, j + k + 2]
-    return 4.0 * low - high, 4.0 * bars[:, j + k] + bars[:, j + k + 2] + 4 * EPS * (4.0 * abs(low) + abs(high))
+    return 4.0 * low - high, 4.0 * bars[:, j + k] + bars[:, j + k + 2] + 4 * EPS * (
+        4.0 * abs(low) + abs(high)
+    )
 
 
 def _minors(A, E, most=None):
     """The leading minors (N, most) of A (N, n, n), all by default, and their bounds."""
     count = A.shape[1] if most is None else most
-    found = [bifurcations.determinant(A[:, :k, :k], E[:, :k, :k], False) for k in range(1, count + 1)]
-    return tuple(np.stack([one[k] for one in found], axis=1) if found else np.zeros((len(A), 0)) for k in (0, 1))
+    found = [
+        bifurcations.determinant(A[:, :k, :k], E[:, :k, :k], False) for k in range(1, count + 1)
+    ]
+    return tuple(
+        np.stack([one[k] for one in found], axis=1) if found else np.zeros((len(A), 0))
+        for k in (0, 1)
+    )

@@ -1,13 +1,15 @@
-"""Curves of periodic orbits, followed in one parameter, both ways round folds: all orbits at a point that they meet.
+"""Curves of periodic orbits, followed in one parameter, both ways round folds: all orbits at a
+point that they meet.
 
-The unknowns y = (x(0), l), or (x(0), T, l) where T is unknown, l the share of the parameter's range, obey n, or n + 1,
-equations (see `newton`); a curve is followed by its arc length: a step along the tangent, and Newton's method across
-it. Where T is unknown, x(0) stays in a plane across the motion, which moves along with the curve.
+The unknowns y = (x(0), l), or (x(0), T, l) where T is unknown, l the share of the parameter's
+range, obey n, or n + 1, equations (see `newton`); a curve is followed by its arc length: a step
+along the tangent, and Newton's method across it. Where T is unknown, x(0) stays in a plane across
+the motion, which moves along with the curve.
 
-Curves begin at the orbits that Newton's method finds, from the start as a rule, at SEEDS values of l, and end where l
-leaves its range, after MOST_STEPS steps, or where these become too short. Curves that branch off are not looked for.
-They depend on the other parameters and the range alone: so a point has the same orbits, in the same order, on every
-grid.
+Curves begin at the orbits that Newton's method finds, from the start as a rule, at SEEDS values of
+l, and end where l leaves its range, after MOST_STEPS steps, or where these become too short. Curves
+that branch off are not looked for. They depend on the other parameters and the range alone: so a
+point has the same orbits, in the same order, on every grid.
 
 Source: H. B. Keller, in Applications of Bifurcation Theory (1977) 359 (pseudo-arclength).
 """
@@ -17,14 +19,23 @@ from typing import NamedTuple
 
 import numpy as np
 
-from survey.measures.floquet.newton import ACROSS, ROUGH, ROUGH_REACH, applied, bordered, inverse, located
+from survey.measures.floquet.newton import (
+    ACROSS,
+    ROUGH,
+    ROUGH_REACH,
+    applied,
+    bordered,
+    inverse,
+    located,
+)
 
 SEEDS = 9
 FIRST_STEP, LONGEST, SHORTEST = 0.01, 0.15, 1e-6  # relative to the range of l, x and T
 MOST_STEPS = 400  # in each direction
 CORRECTIONS, CORRECTED, CONTRACTION = 5, 1e-3, 0.5
 GROWTH, LEAST = 1.5, 1e-2  # of steps; the size of a state, relative to the largest one
-TURN, LITTLE = 0.35, 0.12  # of the tangent in a step, in radians: too much, and so little that steps become longer
+# of the tangent in a step, in radians: too much, and so little that steps become longer
+TURN, LITTLE = 0.35, 0.12
 DIFFERENCE = 1e-7  # of l, for derivatives that give directions alone
 SAME, SAME_SIZE = 1e-3, 1e-2  # relative: what lies on a curve already
 
@@ -56,7 +67,8 @@ class Curve:
         step, size = np.diff(self.y, axis=0), self.size[:-1]
         length = np.linalg.norm(step / size, axis=1)[:, None]
         one, two = (
-            length * t / np.linalg.norm(t / size, axis=1)[:, None] for t in (self.tangent[:-1], self.tangent[1:])
+            length * t / np.linalg.norm(t / size, axis=1)[:, None]
+            for t in (self.tangent[:-1], self.tangent[1:])
         )
         return np.stack([self.y[:-1], one, 3 * step - 2 * one - two, one + two - 2 * step])
 
@@ -66,7 +78,9 @@ class Curve:
         ends = _monotonic(c[:, :, -1])
         at = _cubic(c[:, :, -1, None], ends)
         below, above = np.minimum(at[:, :-1], at[:, 1:]), np.maximum(at[:, :-1], at[:, 1:])
-        piece, part, which = np.nonzero((below[:, :, None] <= values) & (values <= above[:, :, None]))
+        piece, part, which = np.nonzero(
+            (below[:, :, None] <= values) & (values <= above[:, :, None])
+        )
         u = _bisected(c[:, piece, -1], values[which], ends[piece, part], ends[piece, part + 1])
         return which, _cubic(c[:, piece], u[:, None])
 
@@ -98,7 +112,8 @@ def _bisected(c, values, low, high):
 class Curves:
     """The curves of each of R rows, sets of parameters whose continued one does not matter.
 
-    begin(points) gives [(states (R, n), periods (R))] from which Newton's method begins; the start if it is missing.
+    begin(points) gives [(states (R, n), periods (R))] from which Newton's method begins; the start
+    if it is missing.
     """
 
     def __init__(self, equation, continued, rows, reach, begin=None):
@@ -118,8 +133,8 @@ class Curves:
         return points
 
     def _follow(self, share, orbits, good):
-        """Follow the curves through the `good` ones of Located orbits at this share of the range, but for those that
-        are known.
+        """Follow the curves through the `good` ones of Located orbits at this share of the range,
+        but for those that are known.
         """
         those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
         if not those.size:
@@ -127,7 +142,11 @@ class Curves:
         share, size, T = np.full((those.size, 1), share), orbits.size[those], orbits.T[those, None]
         y = np.concatenate([orbits.x[those], *([T] if self.free else []), share], axis=1)
         walk = _Walk(
-            self, np.tile(those, 2), np.tile(y, (2, 1)), np.tile(size, (2, 1)), np.repeat([1.0, -1.0], those.size)
+            self,
+            np.tile(those, 2),
+            np.tile(y, (2, 1)),
+            np.tile(size, (2, 1)),
+            np.repeat([1.0, -1.0], those.size),
         )
         walk.run()
         for k, i in enumerate(those):
@@ -144,13 +163,17 @@ class Curves:
                     same = abs(y[-2] - orbits.T[k]) <= SAME * orbits.T[k]
                     same &= (abs(y[:-2] - orbits.x[k]) <= orbits.size[k] * 2.1).all()
                 else:
-                    same = (abs(y[: self.equation.n] - orbits.x[k]) <= SAME * orbits.size[k].max()).all()
+                    same = (
+                        abs(y[: self.equation.n] - orbits.x[k]) <= SAME * orbits.size[k].max()
+                    ).all()
                 if same:
                     return True
         return False
 
     def starts(self, row, values):
-        """The curves of a row at values of the parameter (V): numbers of the values, states, periods (C each)."""
+        """The curves of a row at values of the parameter (V): numbers of the values, states,
+        periods (C each).
+        """
         shares = (values - self.continued.low) / (self.continued.high - self.continued.low)
         n, m = self.equation.n, self.equation.n + self.free + 1
         found = [curve.crossings(shares) for curve in self.of_row[row]]
@@ -160,10 +183,11 @@ class Curves:
 
 
 class _Walk:
-    """Steps along the curves of K tasks, from y (K, m) and the largest moduli of the states (K, n), in the direction
-    in which l changes by `sign` at first.
+    """Steps along the curves of K tasks, from y (K, m) and the largest moduli of the states (K, n),
+    in the direction in which l changes by `sign` at first.
 
-    Lengths are relative to the orbit and the period at the last point, so that large orbits have as few steps as small.
+    Lengths are relative to the orbit and the period at the last point, so that large orbits have as
+    few steps as small.
     """
 
     def __init__(self, curves, rows, y, moduli, sign):
@@ -171,12 +195,19 @@ class _Walk:
         self.n, self.free, self.equation = curves.equation.n, curves.free, curves.equation
         K, m = y.shape
         self.step, self.kept = np.full(K, FIRST_STEP), [([], [], []) for _ in range(K)]
-        self.size, self.tangent, self.plane = np.ones((K, m)), np.zeros((K, m)), np.full((2, K, self.n), np.nan)
+        self.size, self.tangent, self.plane = (
+            np.ones((K, m)),
+            np.zeros((K, m)),
+            np.full((2, K, self.n), np.nan),
+        )
         self.size[:, : self.n] = floored(moduli)
         self.tangent[:, -1] = sign
         everyone = np.arange(K)
         if self.free:
-            self.plane[:] = slopes(self.equation, curves.points(rows, y[:, -1]), y[:, : self.n]), y[:, : self.n]
+            self.plane[:] = (
+                slopes(self.equation, curves.points(rows, y[:, -1]), y[:, : self.n]),
+                y[:, : self.n],
+            )
         self.live = everyone[self._moved(everyone, y, np.pi)]
 
     def run(self):
@@ -185,12 +216,16 @@ class _Walk:
             if not self.live.size:
                 break
             live = self.live
-            good = self._moved(live, self.y[live] + self.step[live, None] * self.tangent[live], TURN)
+            good = self._moved(
+                live, self.y[live] + self.step[live, None] * self.tangent[live], TURN
+            )
             took, failed = live[good], live[~good]
             self.step[failed] *= 0.5
             closed = np.array([self._closed(k) for k in took], bool)
             ended = closed | (self.y[took, -1] < 0.0) | (self.y[took, -1] > 1.0)
-            self.live = np.setdiff1d(live, np.concatenate([failed[self.step[failed] < SHORTEST], took[ended]]))
+            self.live = np.setdiff1d(
+                live, np.concatenate([failed[self.step[failed] < SHORTEST], took[ended]])
+            )
 
     def done(self, k):
         """Points, tangents and sizes of a task's curve."""
@@ -207,7 +242,9 @@ class _Walk:
         return points, y[:, : self.n], y[:, self.n] if self.free else self.equation.periods(points)
 
     def _moved(self, those, y, most):
-        """Move these tasks to the curve near y, across their tangents, if these turn by less than `most`; where."""
+        """Move these tasks to the curve near y, across their tangents, if these turn by less than
+        `most`; where.
+        """
         done, lost, last = np.zeros(len(y), bool), np.zeros(len(y), bool), self.step[those]
         tangent, size = np.empty_like(y), np.empty_like(y)
         for _ in range(CORRECTIONS):
@@ -236,14 +273,21 @@ class _Walk:
         self.y[took], self.tangent[took], self.size[took] = y[done], tangent[done], size[done]
         if self.free and took.size:
             x = self.y[took, : self.n]
-            self.plane[:, took] = slopes(self.equation, self.curves.points(self.rows[took], self.y[took, -1]), x), x
+            self.plane[:, took] = (
+                slopes(self.equation, self.curves.points(self.rows[took], self.y[took, -1]), x),
+                x,
+            )
         for k in took:
-            for kept, one in zip(self.kept[k], (self.y[k], self.tangent[k], self.size[k]), strict=True):
+            for kept, one in zip(
+                self.kept[k], (self.y[k], self.tangent[k], self.size[k]), strict=True
+            ):
                 kept.append(one.copy())
         return done
 
     def _equations(self, those, y):
-        """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths are relative to."""
+        """The equations' left sides at y (K, m), their derivatives (K, m - 1, m), and what lengths
+        are relative to.
+        """
         n = self.n
         points, x, T = self._real(those, y)
         X, M, moduli = rough_flow(self.equation, points, x, self.equation.share * T)
@@ -268,7 +312,9 @@ class _Walk:
         return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
 
     def _closing(self, those, points, x, X, M):
-        """What is to be 0 for orbits to close, and its derivatives by (x(0), T), of X = x(T) and M = dX/dx(0)."""
+        """What is to be 0 for orbits to close, and its derivatives by (x(0), T), of X = x(T) and M
+        = dX/dx(0).
+        """
         n, symmetry = self.n, self.equation.symmetry
         if symmetry is not None:
             guess = self.equation.begin(points)[0]
@@ -282,7 +328,9 @@ class _Walk:
 
 
 def _flow_alike(equation, points, others, x):
-    """Where motions from x (N, n) are the same at both points, as of a parameter that only chooses an orbit."""
+    """Where motions from x (N, n) are the same at both points, as of a parameter that only chooses
+    an orbit.
+    """
     alike = np.zeros(len(x), bool)
     usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(others).all(axis=1))
     for inside, programs in equation.traced(points[usable], x[usable]):
@@ -293,9 +341,15 @@ def _flow_alike(equation, points, others, x):
 
 
 def rough_flow(equation, points, x, T, derived=True):
-    """x(T) from x (N, n), its derivatives, and the largest moduli of the states, not quite to rounding; or NaN."""
+    """x(T) from x (N, n), its derivatives, and the largest moduli of the states, not quite to
+    rounding; or NaN.
+    """
     N, n = x.shape
-    X, M, size = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan), np.full((N, n), np.nan)
+    X, M, size = (
+        np.full((N, n), np.nan),
+        np.full((N * derived, n, n), np.nan),
+        np.full((N, n), np.nan),
+    )
     usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0))
     for inside, programs in equation.traced(points[usable], x[usable]):
         own = usable[inside]
@@ -311,7 +365,9 @@ def slopes(equation, points, x):
     """f (N, n) at t = 0."""
     f = np.full(x.shape, np.nan)
     for inside, programs in equation.traced(points, x):
-        f[inside] = programs.slopes(programs.numbers(points[inside]), np.zeros(inside.size), x[inside])[0]
+        f[inside] = programs.slopes(
+            programs.numbers(points[inside]), np.zeros(inside.size), x[inside]
+        )[0]
     return f
 
 

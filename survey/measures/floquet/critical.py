@@ -1,26 +1,29 @@
-"""Periodic orbits with a multiplier on the unit circle: the equation that has them as isolated solutions.
+"""Periodic orbits with a multiplier on the unit circle: the equation that has them as isolated
+solutions.
 
-Time is counted in periods, and everything is a state: y = (x, v, w, angle, drift, T, p), of which T and the varied
-parameters p are constant. With A = df/dx,
+Time is counted in periods, and everything is a state: y = (x, v, w, angle, drift, T, p), of which T
+and the varied parameters p are constant. With A = df/dx,
 
     x' = T f(T t, x, p)
     v' = T A v + angle w        v and w: the real and the imaginary part of the multiplier's eigenvector, turned back
     w' = T A w - angle v        by its argument, `angle`
 
-Of real multipliers there is no w and no angle. Where T is unknown, the orbit at a fold is one whose derivative by
-(x(0), T) is singular: v' = T A v + drift f. Every state is 1-periodic, but v(1) = -v(0) where the multiplier is -1.
-Where f(t + T/2, S x) = S f(t, x), S a diagonal matrix of signs, orbits may be their own mirror images, x(T/2) =
-S x(0). Their multipliers are the squares of those of S dx(T/2)/dx(0), which are 1 or -1 where theirs is 1: at a fold,
-or where two others branch off, which are each other's mirror images. There time is counted in half periods, and y(1)
-is S y(0), but for a sign of v.
+Of real multipliers there is no w and no angle. Where T is unknown, the orbit at a fold is one whose
+derivative by (x(0), T) is singular: v' = T A v + drift f. Every state is 1-periodic, but v(1) =
+-v(0) where the multiplier is -1. Where f(t + T/2, S x) = S f(t, x), S a diagonal matrix of signs,
+orbits may be their own mirror images, x(T/2) = S x(0). Their multipliers are the squares of those
+of S dx(T/2)/dx(0), which are 1 or -1 where theirs is 1: at a fold, or where two others branch off,
+which are each other's mirror images. There time is counted in half periods, and y(1) is S y(0), but
+for a sign of v.
 
-Besides, y obeys linear conditions: v (and w) have a given size along themselves, x stays in a plane across the motion
-where T is unknown (v too, at a fold), and something is told of p.
+Besides, y obeys linear conditions: v (and w) have a given size along themselves, x stays in a plane
+across the motion where T is unknown (v too, at a fold), and something is told of p.
 
-The derivatives of these equations, which Newton's method and proofs need, are those of the recorded operations.
+The derivatives of these equations, which Newton's method and proofs need, are those of the recorded
+operations.
 
-Source: W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria (2000), 4; Yu. A. Kuznetsov, Elements of
-Applied Bifurcation Theory (2004), 10.3.
+Source: W. Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria (2000), 4; Yu. A.
+Kuznetsov, Elements of Applied Bifurcation Theory (2004), 10.3.
 """
 
 from dataclasses import dataclass
@@ -35,9 +38,11 @@ from survey.measures.floquet.trace import Graph
 
 @dataclass(frozen=True, eq=False)
 class Critical(Equation):
-    """The equation of orbits of `Equation` with a multiplier of this `kind`; `varied`: numbers of parameters.
+    """The equation of orbits of `Equation` with a multiplier of this `kind`; `varied`: numbers of
+    parameters.
 
-    `mirror`: the signs S, of orbits that are their own mirror images; `branching`: others branch off from these.
+    `mirror`: the signs S, of orbits that are their own mirror images; `branching`: others branch
+    off from these.
     """
 
     kind: int = PLUS_ONE

@@ -1,4 +1,5 @@
-"""Orbits with a multiplier on the unit circle: Newton's method, and that they exist; see `critical`.
+"""Orbits with a multiplier on the unit circle: Newton's method, and that they exist; see
+`critical`.
 
 With y = (x, v, ...) of `critical` and G(y) the differences of y(1) and y(0), and what its linear conditions leave, such
 an orbit is a simple zero of G. If |1 - B G'| <= q < 1 for all y of a ball about the computed one, B nearly the inverse
@@ -26,7 +27,9 @@ CHUNK = 64  # orbits that are shown to exist together
 
 @dataclass
 class Shown:
-    """Which orbits exist; bounds of their y; their M by x(0) alone, with bounds, and f at x(0), with bounds."""
+    """Which orbits exist; bounds of their y; their M by x(0) alone, with bounds, and f at x(0),
+    with bounds.
+    """
 
     good: np.ndarray
     dy: np.ndarray
@@ -38,7 +41,9 @@ class Shown:
 
 @dataclass(frozen=True)
 class Points:
-    """Of one `critical` equation; `given`: all parameters. The varied ones change by `scale`, relative if `log`."""
+    """Of one `critical` equation; `given`: all parameters. The varied ones change by `scale`,
+    relative if `log`.
+    """
 
     critical: Critical
     given: np.ndarray
@@ -62,7 +67,11 @@ class Points:
     def flow(self, y, derived=True, reach=ROUGH_REACH, tolerance=ROUGH):
         """y(1) from y(0) = y (N, size), its derivatives, the largest moduli; NaN where there is none."""
         (N, n), points = y.shape, self.parameters(y)
-        X, M, size = np.full((N, n), np.nan), np.full((N * derived, n, n), np.nan), np.full((N, n), np.nan)
+        X, M, size = (
+            np.full((N, n), np.nan),
+            np.full((N * derived, n, n), np.nan),
+            np.full((N, n), np.nan),
+        )
         usable = np.flatnonzero(np.isfinite(y).all(axis=1))
         for inside, programs in self.critical.traced(points[usable], y[usable]):
             own = usable[inside]
@@ -78,13 +87,15 @@ class Points:
         """x' (N, n) at t = 0."""
         points, found = self.parameters(y), np.full((len(y), self.critical.n), np.nan)
         for own, programs in self.critical.traced(points, y):
-            found[own] = programs.slopes(programs.numbers(points[own]), np.zeros(own.size), y[own])[0][
-                :, : found.shape[1]
-            ]
+            found[own] = programs.slopes(programs.numbers(points[own]), np.zeros(own.size), y[own])[
+                0
+            ][:, : found.shape[1]]
         return found
 
     def linearised(self, y, **how):
-        """y(1) - y(0) with signs, of what is not constant (N, m), its derivatives (N, m, size), and sizes of y."""
+        """y(1) - y(0) with signs, of what is not constant (N, m), its derivatives (N, m, size), and
+        sizes of y.
+        """
         m, signs = self.critical.moving, self.critical.signs
         X, M, moduli = self.flow(y, **how)
         value = signs * X[:, :m] - y[:, :m]
@@ -105,11 +116,15 @@ class Points:
         if own.drifts:
             x, v = (floored(moduli[:, low:high]).max(axis=1) for low, high in parts)
             size[:, own.angle_at] = v / x * abs(y[:, own.period_at])
-        size[:, own.parameters_at :] = self.scale * np.where(self.log, abs(y[:, own.parameters_at :]), 1.0)
+        size[:, own.parameters_at :] = self.scale * np.where(
+            self.log, abs(y[:, own.parameters_at :]), 1.0
+        )
         return size
 
     def conditions(self, y):
-        """Rows (N, k, size) and values (N, k) of the linear conditions but for those on parameters, about y."""
+        """Rows (N, k, size) and values (N, k) of the linear conditions but for those on parameters,
+        about y.
+        """
         own, n = self.critical, self.critical.n
         v, w = y[:, n : 2 * n], y[:, 2 * n : 3 * n]
         rows = []
@@ -148,7 +163,10 @@ class Points:
     def solved(self, y, rows, values):
         """Newton's method from y, under these conditions too: (y, which are found)."""
         own_rows, own_values = self.conditions(y)
-        rows, values = np.concatenate([own_rows, rows], axis=1), np.concatenate([own_values, values], axis=1)
+        rows, values = (
+            np.concatenate([own_rows, rows], axis=1),
+            np.concatenate([own_values, values], axis=1),
+        )
         y, good, _slope, _size = self.newton(y, rows, values)
         # to rounding
         near, how = np.flatnonzero(good), {"reach": self.reach, "tolerance": ROUNDOFF}
@@ -157,12 +175,17 @@ class Points:
         return y, good
 
     def newton(self, y, rows, values, how=(), last=ROUGHLY, first=FIRST):
-        """(y, which converge, last derivatives of the equations, sizes of y), under these conditions alone.
+        """(y, which converge, last derivatives of the equations, sizes of y), under these
+        conditions alone.
 
         `how` the flow is computed; `last` and `first`: the longest steps.
         """
         (N, n), y = y.shape, y.copy()
-        found, live, most = np.zeros(N, bool), np.flatnonzero(np.isfinite(y).all(axis=1)), np.full(N, first)
+        found, live, most = (
+            np.zeros(N, bool),
+            np.flatnonzero(np.isfinite(y).all(axis=1)),
+            np.full(N, first),
+        )
         slopes, sizes = np.full((N, self.critical.moving, n), np.nan), np.ones((N, n))
         for _ in range(TRIALS):
             if not live.size:
@@ -186,7 +209,10 @@ class Points:
         out = Shown(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
                     *np.full((2, N, n), np.nan))  # fmt: skip
         own_rows, own_values = self.conditions(y)
-        rows, values = np.concatenate([own_rows, rows], axis=1), np.concatenate([own_values, values], axis=1)
+        rows, values = (
+            np.concatenate([own_rows, rows], axis=1),
+            np.concatenate([own_values, values], axis=1),
+        )
         points = self.parameters(y)
         for some, programs in self.critical.traced(points, y):
             for i in range(0, some.size, CHUNK):
@@ -210,7 +236,16 @@ class Points:
         for factor in existence.RADII:
             good, dy, M, E = certified(path, y, rows, values, self.critical.signs, factor)
             new = left[good[left]]
-            self._put(out, which[new], programs, existence.chosen(numbers, new), y[new], dy[new], M[new], E[new])
+            self._put(
+                out,
+                which[new],
+                programs,
+                existence.chosen(numbers, new),
+                y[new],
+                dy[new],
+                M[new],
+                E[new],
+            )
             left = left[~good[left]]
 
     def _put(self, out, which, programs, numbers, y, dy, M, E):
@@ -218,11 +253,16 @@ class Points:
         f, df = programs.slopes(numbers, np.zeros(len(y)), y, dy)
         out.good[which], out.dy[which] = True, dy
         out.M[which], out.dM[which] = M[:, :n, :n], E[:, :n, :n]
-        out.f[which], out.df[which] = f[:, :n], existence.WIDER * df[:, :n] + 8 * EPS * abs(f[:, :n])
+        out.f[which], out.df[which] = (
+            f[:, :n],
+            existence.WIDER * df[:, :n] + 8 * EPS * abs(f[:, :n]),
+        )
 
 
 def certified(path, y, rows, values, signs, factor):
-    """(which exist, bounds of y, M, its bounds) of the zeros within `factor` |B G|; see the head of the module."""
+    """(which exist, bounds of y, M, its bounds) of the zeros within `factor` |B G|; see the head of
+    the module.
+    """
     N, n = y.shape
     m, point, last, s = len(signs), path.point, path.last, path.scale
     delta = path.defect / s[point]
@@ -236,7 +276,8 @@ def certified(path, y, rows, values, signs, factor):
     goal = values / unit
     rest = abs(left.sum(axis=2) - goal) + (n + 4) * EPS * (abs(left).sum(axis=2) + abs(goal))
     off_G = np.concatenate(
-        [abs(signs * path.end[:, :m] - y[:, :m]) / s[:, :m] * (1 + EPS) + off[last, :m], rest], axis=1
+        [abs(signs * path.end[:, :m] - y[:, :m]) / s[:, :m] * (1 + EPS) + off[last, :m], rest],
+        axis=1,
     )
     slope = np.concatenate([signs[:, None] * M[:, :m], scaled], axis=1)
     slope[:, np.arange(m), np.arange(m)] -= 1.0
@@ -246,21 +287,31 @@ def certified(path, y, rows, values, signs, factor):
     radius = factor * near
     begins, tube = path.tube(radius, delta, wide, off)
     width = path.noise_X + (tube[:, None] * s[point])[:, :, None]
-    noise = existence.WIDER * existence.SAMPLED * path.rows_of(path.along(path.programs.A, width)[1])
+    noise = (
+        existence.WIDER * existence.SAMPLED * path.rows_of(path.along(path.programs.A, width)[1])
+    )
     error = path.error + path.h * noise * np.exp(path.h * (path.norm + noise))
     doubt = path.doubt * (error / path.error)
-    second = path.spread_of(np.repeat((n * error * existence.WIDER * begins)[:, None], n, axis=1))[1]
+    second = path.spread_of(np.repeat((n * error * existence.WIDER * begins)[:, None], n, axis=1))[
+        1
+    ]
     first_order = (wide * radius[point, None] + off).max(axis=1)
-    stays = (second.max(axis=1) <= (existence.WIDER - 1.0) * first_order) & (tube <= path.enough[point])
+    stays = (second.max(axis=1) <= (existence.WIDER - 1.0) * first_order) & (
+        tube <= path.enough[point]
+    )
     stays = np.logical_and.reduceat(stays, path.first[:-1])
     products(path.F, error, doubt, path.first, n, M, E, R)
     bounds = np.concatenate([E[:, :m], 4 * EPS * abs(scaled)], axis=1)
-    residual = abs(existence.product(B, slope) - np.eye(n)) + (n + 4) * EPS * existence.product(size, abs(slope))
+    residual = abs(existence.product(B, slope) - np.eye(n)) + (n + 4) * EPS * existence.product(
+        size, abs(slope)
+    )
     rows_of = (residual + existence.product(size, bounds)).sum(axis=2)
     q = rows_of.max(axis=1)
     off_G[:, :m] += second.max(axis=1)[last, None]
     near = (size * off_G[:, None, :]).sum(axis=2)
-    good = stays & (q < 1) & (near.max(axis=1) <= (1 - q) * radius) & np.isfinite(E).all(axis=(1, 2))
+    good = (
+        stays & (q < 1) & (near.max(axis=1) <= (1 - q) * radius) & np.isfinite(E).all(axis=(1, 2))
+    )
     dy = (near + rows_of * radius[:, None]) * s * (1 + 8 * EPS) + EPS * abs(y)
     back = s[:, :, None] / s[:, None, :]
     return good, dy, M * back, E * back

@@ -1,4 +1,6 @@
-"""A curve of orbits with a multiplier on the unit circle, followed by its arc length over a map of two parameters."""
+"""A curve of orbits with a multiplier on the unit circle, followed by its arc length over a map of
+two parameters.
+"""
 
 import numpy as np
 
@@ -73,12 +75,19 @@ class Walk:
         return found, borders, False
 
     def _corrected(self, y, tangent, size, step):
-        """The point of the curve in the plane across the tangent through y + step tangent, derivatives and sizes."""
+        """The point of the curve in the plane across the tangent through y + step tangent,
+        derivatives and sizes.
+        """
         guess = y + step * tangent
         row = (tangent / size**2)[None, None, :]
         rows, goal = self.points.conditions(y[None])
-        rows, goal = np.concatenate([rows, row], axis=1), np.concatenate([goal, row[:, 0] @ guess[:, None]], axis=1)
-        new, good, slope, sizes = self.points.newton(guess[None], rows, goal, first=CORRECTED * step)
+        rows, goal = (
+            np.concatenate([rows, row], axis=1),
+            np.concatenate([goal, row[:, 0] @ guess[:, None]], axis=1),
+        )
+        new, good, slope, sizes = self.points.newton(
+            guess[None], rows, goal, first=CORRECTED * step
+        )
         return (new[0], slope[0], sizes[0]) if good[0] else (None, None, None)
 
     def _near(self, y, tangent, new, ahead, size):
@@ -101,18 +110,23 @@ class Walk:
         a, b, s = self.positions(np.stack([y, new, seed]))
         chord = b - a
         share = (s - a) @ chord / max(chord @ chord, 1e-300)
-        if not 0.0 <= share <= 1.0 or abs(a + share * chord - s).max() > FLAT + 0.1 * np.hypot(*chord):
+        if not 0.0 <= share <= 1.0 or abs(a + share * chord - s).max() > FLAT + 0.1 * np.hypot(
+            *chord
+        ):
             return False
         own, n = y + share * (new - y), self.own.n
         if self.own.free:
-            alike = abs(own[self.own.period_at] - seed[self.own.period_at]) <= 0.01 * seed[self.own.period_at]
+            alike = (
+                abs(own[self.own.period_at] - seed[self.own.period_at])
+                <= 0.01 * seed[self.own.period_at]
+            )
         else:
             alike = (abs(own[:n] - seed[:n]) <= 0.01 * abs(seed[:n]).max() + abs(new - y)[:n]).all()
         return bool(alike) and self._on_map(seed, first) @ self._on_map(new, ahead) > 0.0
 
     def _end(self, y, new, back):
-        """([the last point], [its border]) if the curve leaves the map before `new`, or turns `back` where its complex
-        pair meets, at an angle of 0 or pi.
+        """([the last point], [its border]) if the curve leaves the map before `new`, or turns
+        `back` where its complex pair meets, at an angle of 0 or pi.
         """
         goals = []
         at, end = self.positions(np.stack([y, new]))
@@ -120,7 +134,14 @@ class Walk:
         for k in range(2):
             if not 0.0 <= end[k] <= 1.0:
                 side = float(end[k] > 1.0)
-                goals.append(((side - at[k]) / (end[k] - at[k]), self.own.parameters_at + k, ends[int(side), k], k))
+                goals.append(
+                    (
+                        (side - at[k]) / (end[k] - at[k]),
+                        self.own.parameters_at + k,
+                        ends[int(side), k],
+                        k,
+                    )
+                )
         if self.own.kind == NEIMARK_SACKER and back:
             before, after = y[self.own.angle_at], new[self.own.angle_at]
             whole = np.pi * np.round(0.5 * (before + after) / np.pi)
@@ -134,7 +155,9 @@ class Walk:
         share, place, value, border = min(goals)
         guess = y + share * (new - y)
         guess[place] = value
-        last, good = self.points.solved(guess[None], *self.points.held(guess[None], np.array([place])))
+        last, good = self.points.solved(
+            guess[None], *self.points.held(guess[None], np.array([place]))
+        )
         last[0, place] = value
         here = self.positions(last)[0]
         if not good[0] or not ((here > -1e-9) & (here < 1 + 1e-9)).all():

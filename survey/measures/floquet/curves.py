@@ -1,14 +1,17 @@
-"""The curves that [boundaries] draws on a map of two parameters: where multipliers reach the unit circle or leave it.
+"""The curves that [boundaries] draws on a map of two parameters: where multipliers reach the unit
+circle or leave it.
 
-Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems, and about orbits that are
-symmetric, whose multipliers `family` gives. There the curves are zeros of the functions of `bifurcations`. These are
-known on LINES lines of the map each way, and their splines, on lines FINER times as dense, show where to look (marching
-squares). Every point is then bracketed along an axis by signs of the function itself that are certain within the error
-bounds of M, and curves are followed on from their ends inside the map, into the tips of tongues (see `tips`). A tongue
-that is narrower everywhere than the distance of two of the dense lines may be missed, and one that the splines do not
-show. Curves are drawn wherever a multiplier passes, also where another one is outside the circle already: `outside`
-counts those. `row_count` tells where they do not explain how many multipliers are outside, or, by the Maslov index, how
-often some have passed 1 or -1.
+Those of periodic orbits are found by `orbit_curves`; what follows is about linear systems, and
+about orbits that are symmetric, whose multipliers `family` gives. There the curves are zeros of the
+functions of `bifurcations`. These are known on LINES lines of the map each way, and their splines,
+on lines FINER times as dense, show where to look (marching squares). Every point is then bracketed
+along an axis by signs of the function itself that are certain within the error bounds of M, and
+curves are followed on from their ends inside the map, into the tips of tongues (see `tips`). A
+tongue that is narrower everywhere than the distance of two of the dense lines may be missed, and
+one that the splines do not show. Curves are drawn wherever a multiplier passes, also where another
+one is outside the circle already: `outside` counts those. `row_count` tells where they do not
+explain how many multipliers are outside, or, by the Maslov index, how often some have passed 1 or
+-1.
 """
 
 from functools import partial
@@ -27,7 +30,9 @@ from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
 from survey.scene import Output, Request
 
-CLASSES = {name: CROSSINGS[name] for name in ("plus_one", "minus_one", "neimark_sacker", "collision")}
+CLASSES = {
+    name: CROSSINGS[name] for name in ("plus_one", "minus_one", "neimark_sacker", "collision")
+}
 TITLE = "how a multiplier passes the unit circle"
 ALONG = (
     Output("angle", "argument of the multiplier on the unit circle", r"\theta", units="rad"),
@@ -37,7 +42,8 @@ ALONG = (
 LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
 NEAR = 3e-5  # of the map: how near curves of splines are
 BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
-TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))  # one after another: times NEAR, along the best axis or the other
+# one after another: times NEAR, along the best axis or the other
+TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))
 TRIED_OF_ORBITS = TRIED[::2]  # which take long
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
@@ -48,12 +54,20 @@ def refusal(axes, scene, options=None):
     if scene is not None and scene.FAMILY == "orbit" and scene.continued is not None:
         along = scene.own[scene.continued.index].name
         if "branch" in axes:
-            whose = "all orbits, whatever their number" if scene.symmetry is None else "the orbits of one number"
+            whose = (
+                "all orbits, whatever their number"
+                if scene.symmetry is None
+                else "the orbits of one number"
+            )
             return f"curves are those of {whose}: let `branch` be a number, not an axis"
         alone = len([name for name in axes if name]) == 1
         if scene.symmetry is not None and along not in axes[:2] and not alone:
             return f"curves are drawn along one parameter, or on maps of {along}, that of CONTINUATION, and another one"
-    return None if len(axes) in (1, 2, 3) else f"curves are drawn on two axes, or three, not on {len(axes)}"
+    return (
+        None
+        if len(axes) in (1, 2, 3)
+        else f"curves are drawn on two axes, or three, not on {len(axes)}"
+    )
 
 
 def searched(scene, square, axes, fixed, options):
@@ -70,7 +84,11 @@ def searched(scene, square, axes, fixed, options):
         on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
     found = []
     n = on_lattice[0].shape[1]
-    functions = scene.functions(n) if hasattr(scene, "functions") else bifurcations.functions(n, structure).items()
+    functions = (
+        scene.functions(n)
+        if hasattr(scene, "functions")
+        else bifurcations.functions(n, structure).items()
+    )
 
     def on_map(function, x):
         return function(*matrices(x, RTOL))
@@ -86,7 +104,8 @@ def searched(scene, square, axes, fixed, options):
 
     for kind, function in functions:
         values, bars = function(*on_lattice)
-        # where no sign is certain all around, as where the function is 0 throughout, there is only noise
+        # where no sign is certain all around, as where the function is 0 throughout, there is only
+        # noise
         open_ = ~(abs(values) > bars).reshape(number, -1)
         around = np.ones((3, 3 if square.across is None else 1))
         values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
@@ -101,7 +120,10 @@ def searched(scene, square, axes, fixed, options):
             draw(kind, x, error)
     if square.across is not None:
         return joined(found, [output.name for output in ALONG])
-    drawn, passed = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found], {}
+    drawn, passed = (
+        [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found],
+        {},
+    )
     names = _indices(scene, square, axes) if structure == "symplectic" else {}
     indices = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
     on_lines = indices(contours.lattice(number), ROUGH) if names else {}
@@ -111,11 +133,15 @@ def searched(scene, square, axes, fixed, options):
             return indices(x, ROUGH)[name]
 
         passed[kind] = on_lines[name].reshape(number, number)
-        for x, error in narrow.curves(index, partial(on_map, dict(functions)[kind]), passed[kind], kind, drawn):
+        for x, error in narrow.curves(
+            index, partial(on_map, dict(functions)[kind]), passed[kind], kind, drawn
+        ):
             draw(kind, x, error + square.grain)
             drawn.append((kind, x))
     if len(on_lattice) > 2:
-        passed = {kind: one.reshape(number, number) for kind, one in scene.passed(*on_lattice[2:]).items()}
+        passed = {
+            kind: one.reshape(number, number) for kind, one in scene.passed(*on_lattice[2:]).items()
+        }
     curves = joined(found, [output.name for output in ALONG])
     counts = row_count.outside(*on_lattice[:2], structure).reshape(number, number)
     curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
@@ -123,25 +149,39 @@ def searched(scene, square, axes, fixed, options):
 
 
 def _indices(scene, square, axes):
-    """{kind: name} of the outputs that are Maslov indices; {} where an excluded value cuts the map into parts whose
-    indices have nothing to do with one another.
+    """{kind: name} of the outputs that are Maslov indices; {} where an excluded value cuts the map
+    into parts whose indices have nothing to do with one another.
     """
     ends = {name: (square.low[k], square.high[k]) for k, name in enumerate(axes)}
-    cut = any(ends[p.name][0] < x < ends[p.name][1] for p in scene.PARAMETERS if p.name in ends for x in p.excluded)
+    cut = any(
+        ends[p.name][0] < x < ends[p.name][1]
+        for p in scene.PARAMETERS
+        if p.name in ends
+        for x in p.excluded
+    )
     return {} if cut else {PLUS_ONE: "index_plus_one", MINUS_ONE: "index_minus_one"}
 
 
 def matrices_of(scene, square, axes, fixed, options, method="auto"):
-    """matrices(positions (N, axes), rtol) -> (M, E), the monodromy matrices without what is conserved, and "edges" with
-    their error, if the scene counts them.
+    """matrices(positions (N, axes), rtol) -> (M, E), the monodromy matrices without what is
+    conserved, and "edges" with their error, if the scene counts them.
     """
     solved = _solved(scene, square, axes, fixed, options, method, ["monodromy"])
 
     def matrices(x, rtol=RTOL):
         out = solved(x, rtol)
-        found = tuple(out[name + end] for name in ("monodromy", "edges") if name in out for end in ("", "_error"))
+        found = tuple(
+            out[name + end]
+            for name in ("monodromy", "edges")
+            if name in out
+            for end in ("", "_error")
+        )
         # a system of one's own may have a conserved quantity
-        return scene.judged(square.parameters(x), axes, fixed, *found) if hasattr(scene, "judged") else found
+        return (
+            scene.judged(square.parameters(x), axes, fixed, *found)
+            if hasattr(scene, "judged")
+            else found
+        )
 
     return matrices
 
@@ -159,13 +199,18 @@ def _solved(scene, square, axes, fixed, options, method, variables):
 
 
 def _lines(function, grain, values, tried=TRIED):
-    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the lattice (lines, lines)."""
+    """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the
+    lattice (lines, lines).
+    """
     lines, known = len(values), np.isfinite(values)
     ticks, fine = np.linspace(0.0, 1.0, lines), np.linspace(0.0, 1.0, (lines - 1) * FINER + 1)
     spline = RectBivariateSpline(ticks, ticks, contours.filled(values))
     dense = spline(fine, fine)
     if not known.all():
-        hole = RectBivariateSpline(ticks, ticks, np.where(known, 0.0, 1.0), kx=1, ky=1)(fine, fine) > 0.0
+        hole = (
+            RectBivariateSpline(ticks, ticks, np.where(known, 0.0, 1.0), kx=1, ky=1)(fine, fine)
+            > 0.0
+        )
         dense = np.ma.masked_array(dense, hole)
     found = contourpy.contour_generator(fine, fine, dense).lines(0.0)
     parts = [_thinned(np.asarray(line)[:, ::-1]) for line in found]
@@ -175,7 +220,9 @@ def _lines(function, grain, values, tried=TRIED):
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
     along = np.argmax(np.where(border, -1.0, slope), axis=1)
-    return tips.followed(function, _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried), grain)
+    return tips.followed(
+        function, _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried), grain
+    )
 
 
 def _crossings(function, grain, values, tried=TRIED, *, across):
@@ -186,16 +233,27 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
     dense = CubicSpline(ticks, contours.filled(values[:, 0]))(fine)
     dense[np.interp(fine, ticks, np.where(known, 0.0, 1.0)) > 0.0] = np.nan
     with np.errstate(invalid="ignore"):
-        at = np.flatnonzero(np.isfinite(dense[1:] + dense[:-1]) & ((dense[1:] > 0.0) != (dense[:-1] > 0.0)))
+        at = np.flatnonzero(
+            np.isfinite(dense[1:] + dense[:-1]) & ((dense[1:] > 0.0) != (dense[:-1] > 0.0))
+        )
     if not at.size:
         return []
     start = fine[at] + dense[at] / (dense[at] - dense[at + 1]) / (fine.size - 1)
     parts = [np.array([[t, across]]) for t in start]
-    return _closed_in(function, parts, np.zeros(len(parts), int), grain, 0.5 / (lines - 1), tried[: len(tried) // 2])
+    return _closed_in(
+        function,
+        parts,
+        np.zeros(len(parts), int),
+        grain,
+        0.5 / (lines - 1),
+        tried[: len(tried) // 2],
+    )
 
 
 def _sharpened(function, pieces, grain):
-    """The pieces [(positions (m, 2), errors (m))], which are nearly zeros of the function, bracketed by it."""
+    """The pieces [(positions (m, 2), errors (m))], which are nearly zeros of the function,
+    bracketed by it.
+    """
     if not pieces:
         return []
     along = []
@@ -207,8 +265,8 @@ def _sharpened(function, pieces, grain):
 
 
 def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR):
-    """The curves near positions, moved along the axis `along` of each, by `widest` at most; cut where one is not
-    certain. Brackets are `near` wide at first.
+    """The curves near positions, moved along the axis `along` of each, by `widest` at most; cut
+    where one is not certain. Brackets are `near` wide at first.
     """
     x = np.concatenate(parts)
 
@@ -223,11 +281,17 @@ def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR):
         left = np.flatnonzero(error == np.inf)
         axis = abs(along[left] - other)
         start, same = x[left, axis], np.ones(left.size)
-        t, width, sure = close_in(partial(at, left, axis), start, times * near * same, grain * same, widest)
+        t, width, sure = close_in(
+            partial(at, left, axis), start, times * near * same, grain * same, widest
+        )
         sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < widest)
         found[left[sure], axis[sure]], error[left[sure]] = t[sure], width[sure] + grain
     firsts = np.cumsum([0, *map(len, parts)])
-    own = [first + run for first, last in pairwise(firsts) for run in contours.runs(np.isfinite(error[first:last]))]
+    own = [
+        first + run
+        for first, last in pairwise(firsts)
+        for run in contours.runs(np.isfinite(error[first:last]))
+    ]
     return [(found[part], error[part]) for part in own]
 
 
@@ -240,7 +304,11 @@ def _thinned(x):
             continue
         chord, rest = x[last] - x[first], x[first + 1 : last] - x[first]
         length = np.hypot(*chord)
-        off = abs(chord[0] * rest[:, 1] - chord[1] * rest[:, 0]) / length if length > 0 else np.hypot(*rest.T)
+        off = (
+            abs(chord[0] * rest[:, 1] - chord[1] * rest[:, 0]) / length
+            if length > 0
+            else np.hypot(*rest.T)
+        )
         if length > LONGEST or off.max() > FLAT:
             middle = (first + last) // 2
             kept.add(middle)

@@ -1,4 +1,5 @@
-"""Dense maps of a linear periodic system: the characteristic polynomial as Chebyshev series in one or two parameters.
+"""Dense maps of a linear periodic system: the characteristic polynomial as Chebyshev series in one
+or two parameters.
 
 Where A is analytic in the parameters so is the polynomial. Its coefficients are series on panels of the map, solved at
 their nodes; panels on which they converge slowly, or vary by more orders than the accuracy allows, are halved. A point
@@ -7,12 +8,12 @@ or whose Krein signs, is solved on its own. Of symplectic and reversible systems
 s = l + 1 / l, and Krein signs come from the traces of J times polynomials of M: with adj(l - M) = sum_k l^(n-1-k) B_k
 and v the eigenvector of l, |v|^2 / (v* i J v) = tr(adj(l - M) i J) / p'(l).
 
-The bound of a coefficient: those at the nodes times the largest magnitudes that their Lagrange polynomials have in a
-part of the panel, the tails of the series, and rounding; at a few points that are no nodes it is tried. All depends on
-the axes of the map, never on the block.
+The bound of a coefficient: those at the nodes times the largest magnitudes that their Lagrange
+polynomials have in a part of the panel, the tails of the series, and rounding; at a few points that
+are no nodes it is tried. All depends on the axes of the map, never on the block.
 
-Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15; F. R. Gantmacher,
-The Theory of Matrices (1959), IV.4 (B_k).
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and
+15; F. R. Gantmacher, The Theory of Matrices (1959), IV.4 (B_k).
 """
 
 import threading
@@ -38,7 +39,8 @@ BEST = 1e-14  # accuracy of M at the nodes
 MOST_DEEP = 12  # halvings
 LEAST = 0.5  # the share of those that their own bounds answer, below which cutting is of no use
 MOST = 0.9  # the share of the nodes answered to the asked accuracy from which on a panel serves
-TRIED = np.array([[0.137, -0.713], [-0.551, 0.318], [0.862, 0.907], [-0.934, -0.269]])  # points that are no nodes
+# points that are no nodes
+TRIED = np.array([[0.137, -0.713], [-0.551, 0.318], [0.862, 0.907], [-0.934, -0.269]])
 LARGEST = 12  # states
 SERVED = frozenset({"multiplier_re", "multiplier_im", "spectral_radius", "exponent", "period", "krein", "crossing",
                     "verdict"})  # fmt: skip
@@ -81,8 +83,8 @@ class Map:
 
 @dataclass(frozen=True)
 class Panel:
-    """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds (K, PARTS n1, PARTS n2), where
-    n1 is 1 (K, 1, PARTS n2), and roots at the nodes.
+    """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds (K, PARTS
+    n1, PARTS n2), where n1 is 1 (K, 1, PARTS n2), and roots at the nodes.
     """
 
     middle: tuple[float, ...]
@@ -94,14 +96,28 @@ class Panel:
 
 def flags(wanted):
     """What the kernel is asked for (see `kernels.floquet.characteristic`), by names of outputs."""
-    groups = ({"multiplier_re", "multiplier_im"}, {"spectral_radius", "exponent"}, {"verdict"}, {"crossing"}, {"krein"})
+    groups = (
+        {"multiplier_re", "multiplier_im"},
+        {"spectral_radius", "exponent"},
+        {"verdict"},
+        {"crossing"},
+        {"krein"},
+    )
     return tuple(bool(group & wanted) for group in groups)
 
 
 def axes_of(lines):
-    """The Axes of a map that series may serve, from {column: (number, low, high)}: two at most, the longest."""
-    some = [Axis(column, *line) for column, line in lines.items() if line[0] >= SMALLEST and line[2] > line[1]]
-    return tuple(sorted(sorted(some, key=lambda a: (-a.number, a.column))[:2], key=lambda a: a.column))
+    """The Axes of a map that series may serve, from {column: (number, low, high)}: two at most, the
+    longest.
+    """
+    some = [
+        Axis(column, *line)
+        for column, line in lines.items()
+        if line[0] >= SMALLEST and line[2] > line[1]
+    ]
+    return tuple(
+        sorted(sorted(some, key=lambda a: (-a.number, a.column))[:2], key=lambda a: a.column)
+    )
 
 
 def serves(system, structure, wanted, lines):
@@ -110,7 +126,9 @@ def serves(system, structure, wanted, lines):
 
 
 def serves_scattered(system, structure, wanted, ranges):
-    """May series answer points on their own, whose parameters lie within `ranges`, {column: (number, low, high)}?"""
+    """May series answer points on their own, whose parameters lie within `ranges`, {column:
+    (number, low, high)}?
+    """
     known = _of_series(system, structure, wanted) and len(ranges) == 2
     return known and all(number >= FEWEST and high > low for number, low, high in ranges.values())
 
@@ -121,7 +139,8 @@ def _of_series(system, structure, wanted):
 
 
 def solve(system, structure, points, rtol, wanted, lines, answer):
-    """Answer the points (..., parameters) of a block that series serve; returns those (N, bool) still to be solved.
+    """Answer the points (..., parameters) of a block that series serve; returns those (N, bool)
+    still to be solved.
 
     `points` has the block's axes first; a parameter in `lines` varies along one of them.
     """
@@ -133,7 +152,9 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
         along.append(varies[0] if varies else None)
     for k in along:
         index = index[..., None] if k is None else index
-    moved = [k if k is not None else len(shape) + along[:i].count(None) for i, k in enumerate(along)]
+    moved = [
+        k if k is not None else len(shape) + along[:i].count(None) for i, k in enumerate(along)
+    ]
     index = np.moveaxis(index, moved, range(-len(axes), 0))
     index = index.reshape(-1, *index.shape[-len(axes) :])
     flat, left = points.reshape(-1, points.shape[-1]), np.ones(index.size, bool)
@@ -164,7 +185,9 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
 
 
 def scattered(system, structure, points, rtol, wanted, ranges, answer):
-    """As `solve`, of points (N, parameters) on their own that differ in the two parameters of `ranges` alone."""
+    """As `solve`, of points (N, parameters) on their own that differ in the two parameters of
+    `ranges` alone.
+    """
     column, left = sorted(ranges), np.ones(len(points), bool)
     # a map of as many points
     axes = tuple(Axis(k, int(ranges[k][0] ** 0.5), *ranges[k][1:]) for k in column)
@@ -223,9 +246,13 @@ def _answer_points(key, panel, x, places, answer):
 
 
 def _part(x, n):
-    """The number of the part that holds x, of which each of n nodes has PARTS, all equal in the angle; 0 if n is 1."""
+    """The number of the part that holds x, of which each of n nodes has PARTS, all equal in the
+    angle; 0 if n is 1.
+    """
     last = n * PARTS - 1 if n > 1 else 0
-    return np.clip((np.arccos(np.clip(x, -1.0, 1.0)) * (n * PARTS / np.pi)).astype(np.int64), 0, last)
+    return np.clip(
+        (np.arccos(np.clip(x, -1.0, 1.0)) * (n * PARTS / np.pi)).astype(np.int64), 0, last
+    )
 
 
 @lru_cache(maxsize=32)
@@ -236,7 +263,10 @@ def panels(key):
     left, found = [(tuple((axis.low, axis.high) for axis in key.axes), 0)], []
     while left:
         sides, depth = left.pop(0)
-        share = [n * (b - a) / (axis.high - axis.low) for n, (a, b), axis in zip(number, sides, key.axes, strict=True)]
+        share = [
+            n * (b - a) / (axis.high - axis.low)
+            for n, (a, b), axis in zip(number, sides, key.axes, strict=True)
+        ]
         made, spent, cut = _panel(key, sides, min(budget, float(np.prod(share)) / POINTS_PER_NODE))
         budget -= spent
         if made is not None:
@@ -249,7 +279,9 @@ def panels(key):
 
 
 def _panel(key, sides, budget):
-    """(the Panel or None, points solved, the side to be cut or None) of a part of the map, within a budget."""
+    """(the Panel or None, points solved, the side to be cut or None) of a part of the map, within a
+    budget.
+    """
     middle = tuple(0.5 * (a + b) for a, b in sides)
     radius = tuple(0.5 * (b - a) for a, b in sides)
     degrees, spent = _degrees(key, middle, radius, budget)
@@ -261,7 +293,9 @@ def _panel(key, sides, budget):
     sizes = [int(DEGREES[np.searchsorted(DEGREES, n)]) for n in degrees]
     if spent + np.prod(sizes) > budget:
         return None, spent, None
-    x = np.stack(np.meshgrid(*map(chebyshev.symmetric_nodes, sizes), indexing="ij"), axis=-1).reshape(-1, len(sizes))
+    x = np.stack(
+        np.meshgrid(*map(chebyshev.symmetric_nodes, sizes), indexing="ij"), axis=-1
+    ).reshape(-1, len(sizes))
     tried = TRIED[:, : len(sizes)]
     known = _coefficients(key, middle, radius, np.concatenate([x, tried]))
     spent += len(x) + len(tried)
@@ -282,7 +316,9 @@ def _panel(key, sides, budget):
 
 
 def _degrees(key, middle, radius, budget):
-    """The number of nodes that each side asks for, beyond DEGREES if none is enough; and the points solved."""
+    """The number of nodes that each side asks for, beyond DEGREES if none is enough; and the points
+    solved.
+    """
     sides = len(middle)
     ends = [np.zeros(1)] if sides == 1 else [np.array([-0.97, 0.97])]
     if 2.0 * PROBED * sides * len(ends[0]) > budget:
@@ -306,14 +342,18 @@ def _degrees(key, middle, radius, budget):
 
 
 def _coefficients(key, middle, radius, x):
-    """Coefficients (N, K) of the polynomial at x (N, sides) on a panel, and their bounds; None if there are none."""
-    points = key.points(*(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True))))
+    """Coefficients (N, K) of the polynomial at x (N, sides) on a panel, and their bounds; None if
+    there are none.
+    """
+    points = key.points(
+        *(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True)))
+    )
     return at_points(key.system, key.structure, points)
 
 
 def at_points(system, structure, points):
-    """Coefficients (N, K) of the polynomial at the points (N, parameters), and their bounds; None where no series
-    serves.
+    """Coefficients (N, K) of the polynomial at the points (N, parameters), and their bounds; None
+    where no series serves.
     """
     if not system.smooth(points[0]):
         return None
@@ -322,12 +362,17 @@ def at_points(system, structure, points):
         if not _is_analytic(own):
             return None
         every, n, paired = np.arange(len(points)), system.n, structure != "none"
-        out = np.empty((2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n))
+        out = np.empty(
+            (2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n)
+        )
 
         def finish(some, matrices, scale, *steps_of):
             out[:, some] = coefficients(matrices.M, matrices.E, scale, structure, steps_of)
             units = scale[:, :, None] / scale[:, None, :]
-            if structure == "symplectic" and not_symplectic(units * matrices.M, units * matrices.E).any():
+            if (
+                structure == "symplectic"
+                and not_symplectic(units * matrices.M, units * matrices.E).any()
+            ):
                 out[:, some] = np.nan  # each point for itself
 
         monodromy.solve(own, monodromy.method_of("auto"), BEST, np.ones(len(points)), every, finish)
@@ -378,12 +423,19 @@ def coefficients(M, E, scale, structure, steps_of=None):
         )
         bars[:, k] += near * abs(B).sum(axis=(1, 2))
         sharper = doubt < bars[:, k]
-        c[:, k], bars[:, k] = np.where(sharper, direct, c[:, k]), np.where(sharper, doubt, bars[:, k])
+        c[:, k], bars[:, k] = (
+            np.where(sharper, direct, c[:, k]),
+            np.where(sharper, doubt, bars[:, k]),
+        )
         if k <= kept:
             found[:, k - 1] = B
         B = MB + c[:, k, None, None] * one
         off = off + (bars[:, k] + EPS * abs(c[:, k]))[:, None, None] * one
-        wide = wide + (bars[:, k] + n * (abs(B) * np.swapaxes(E, 1, 2)).sum(axis=(1, 2)))[:, None, None] * one
+        wide = (
+            wide
+            + (bars[:, k] + n * (abs(B) * np.swapaxes(E, 1, 2)).sum(axis=(1, 2)))[:, None, None]
+            * one
+        )
         if structure == "symplectic" and k < n:
             form[0, :, k] = (B * np.swapaxes(J, 1, 2)).sum(axis=(1, 2))
             form[1, :, k] = (wide * abs(np.swapaxes(J, 1, 2))).sum(axis=(1, 2))
@@ -399,19 +451,25 @@ def coefficients(M, E, scale, structure, steps_of=None):
     values, doubts = _in_sums(c[:, ::-1], bars[:, ::-1], m)
     if structure == "symplectic":
         forms = _in_sums(form[0, :, m:0:-1], form[1, :, m:0:-1], m - 1)
-        return np.concatenate([values[:, 1:], forms[0]], axis=1), np.concatenate([doubts[:, 1:], forms[1]], axis=1)
+        return np.concatenate([values[:, 1:], forms[0]], axis=1), np.concatenate(
+            [doubts[:, 1:], forms[1]], axis=1
+        )
     return values[:, 1:], doubts[:, 1:]
 
 
 def _in_sums(c, bars, m):
-    """The sum of c_j (l^j + l^-j), c_0 once, as a polynomial of s = l + 1 / l, highest power first, and bounds."""
+    """The sum of c_j (l^j + l^-j), c_0 once, as a polynomial of s = l + 1 / l, highest power first,
+    and bounds.
+    """
     change = _sums(m)
     return (c @ change)[:, ::-1], ((bars + 4 * EPS * abs(c)) @ abs(change))[:, ::-1]
 
 
 @lru_cache
 def _sums(m):
-    """Row j: l^j + l^-j (1 for j = 0) as a polynomial of s = l + 1 / l, from the constant term on (m + 1, m + 1)."""
+    """Row j: l^j + l^-j (1 for j = 0) as a polynomial of s = l + 1 / l, from the constant term on
+    (m + 1, m + 1).
+    """
     rows = np.zeros((m + 1, m + 1))
     before, own = np.zeros((2, m + 1))
     before[0] = 2.0
@@ -433,7 +491,9 @@ def _expanded(key, middle, radius, sizes, values, bars):
     for k in range(K):
         grid = values[:, k].reshape(n1, n2)
         own, doubt = chebyshev.expand(grid, chebyshev.by_columns(n2), ulps[-1])
-        total = doubt[:, None] + bars[:, k].reshape(n1, n2) @ chebyshev.largest_lagrange(n2, PARTS).T
+        total = (
+            doubt[:, None] + bars[:, k].reshape(n1, n2) @ chebyshev.largest_lagrange(n2, PARTS).T
+        )
         if n1 > 1:
             own, tail = chebyshev.transform(own, chebyshev.by_columns(n1), ulps[0])
             total = tail + chebyshev.largest_lagrange(n1, PARTS) @ total

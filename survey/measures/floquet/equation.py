@@ -19,8 +19,9 @@ LOCK = threading.Lock()
 
 @dataclass(frozen=True, eq=False)
 class Equation:
-    """x' = f(t, x, p) of n states. `period` is a value, a function of p, or None; `start` a value or a function of p,
-    the n states, and a guess of the period after them if `period` is None. `symmetry`: of orbits that are sought.
+    """x' = f(t, x, p) of n states. `period` is a value, a function of p, or None; `start` a value
+    or a function of p, the n states, and a guess of the period after them if `period` is None.
+    `symmetry`: of orbits that are sought.
     """
 
     f: Callable
@@ -54,7 +55,9 @@ class Equation:
         return guess, self.periods(points)
 
     def pinned(self, points, x):
-        """The states x (N, n), with the one that is held on a family of symmetric orbits as `start` gives it."""
+        """The states x (N, n), with the one that is held on a family of symmetric orbits as `start`
+        gives it.
+        """
         if self.symmetry is None or not len(x):
             return x
         x, held = x.copy(), self.symmetry.held
@@ -71,8 +74,16 @@ class Equation:
         except Exception as error:
             raise Raised(name) from error
         if row.shape != (size,):
-            what = "the states and a guess of the period" if size > self.n else "the states" if size > 1 else "a number"
-            raise Unsupported(f"{name} returns {row.shape} numbers, not {size}: {what}", "correct it")
+            what = (
+                "the states and a guess of the period"
+                if size > self.n
+                else "the states"
+                if size > 1
+                else "a number"
+            )
+            raise Unsupported(
+                f"{name} returns {row.shape} numbers, not {size}: {what}", "correct it"
+            )
         return row
 
     def traced(self, points, x0):
@@ -103,7 +114,10 @@ class Equation:
         rows = self._called(graph, graph.time, x.copy(), graph.parameters)
         programs = compiled(graph, x, rows)
         if self.free and trace.TIME in programs.A.order:
-            raise Unsupported("f(t, x, p, out) depends on t, so that PERIOD must be given", "give the period of f in t")
+            raise Unsupported(
+                "f(t, x, p, out) depends on t, so that PERIOD must be given",
+                "give the period of f in t",
+            )
         return programs
 
     @staticmethod
@@ -123,14 +137,18 @@ class Equation:
         except Unsupported as error:
             raise Unsupported(f"f(t, x, p, out): {error}", error.remedy) from None
         except ArithmeticError as error:
-            raise Unsupported(f"f(t, x, p, out): {error}, while its operations are recorded") from None
+            raise Unsupported(
+                f"f(t, x, p, out): {error}, while its operations are recorded"
+            ) from None
         except Exception as error:
             raise Raised("f(t, x, p, out)") from error
         if out.shape != (n,):
             what = f"f(t, x, p, out) returns an array of shape {out.shape}, not {(n,)}"
             raise Unsupported(what, "fill the entries of out, and return nothing")
         if not all(symbol.is_number for symbol, _yes in (*graph.guards, *graph.equalities)):
-            raise Unsupported(f"f(t, x, p, out): a branch depends on {self.BRANCHES} (abs and maximum are branches)")
+            raise Unsupported(
+                f"f(t, x, p, out): a branch depends on {self.BRANCHES} (abs and maximum are branches)"
+            )
         return [graph.entry(out[i], "f(t, x, p, out)") for i in range(n)]
 
 
@@ -138,7 +156,11 @@ def compiled(graph, x, rows):
     """The Programs of x' = rows, both symbols."""
     states = [graph.single(one) for one in x]
     graph.flow.update(zip(states, rows, strict=True))
-    slopes = {(i, j): graph.slope(row, state) for i, row in enumerate(rows) for j, state in enumerate(states)}
+    slopes = {
+        (i, j): graph.slope(row, state)
+        for i, row in enumerate(rows)
+        for j, state in enumerate(states)
+    }
     places = [graph.series[state][1] for state in states]
     A = graph.compiled({at: symbol for at, symbol in slopes.items() if symbol is not None})
     f = graph.compiled({(i, 0): row for i, row in enumerate(rows)})
@@ -167,10 +189,27 @@ class Programs:
         errors[:, self.places] = 0.0
         return values, errors
 
-    def flow(self, numbers, x0, span, reach, derived=True, first=None, most=MOST_STEPS, tolerance=ROUNDOFF):
-        """States at `span`, dX/dx0, largest states and numbers of steps; if `first` is given, steps and series."""
+    def flow(
+        self,
+        numbers,
+        x0,
+        span,
+        reach,
+        derived=True,
+        first=None,
+        most=MOST_STEPS,
+        tolerance=ROUNDOFF,
+    ):
+        """States at `span`, dX/dx0, largest states and numbers of steps; if `first` is given, steps
+        and series.
+        """
         N, n = x0.shape
-        X, M, size, steps = np.full((N, n), np.nan), np.zeros((N * derived, n, n)), np.empty((N, n)), np.zeros(N, int)
+        X, M, size, steps = (
+            np.full((N, n), np.nan),
+            np.zeros((N * derived, n, n)),
+            np.empty((N, n)),
+            np.zeros(N, int),
+        )
         total = 0 if first is None else first[-1]
         recorded = np.empty(total), np.empty(total), np.empty((total, n, ORDER + 1))
         A = self.A
@@ -183,9 +222,13 @@ class Programs:
 
     def slopes(self, numbers, t, x, width=0.0):
         """f (N, n) at states x (N, n), known to within `width`, and its bounds."""
-        out = self.along(self.f, numbers, t[:, None], x[:, :, None], np.broadcast_to(width, x.shape)[:, :, None])
+        out = self.along(
+            self.f, numbers, t[:, None], x[:, :, None], np.broadcast_to(width, x.shape)[:, :, None]
+        )
         return tuple(one[:, 0, :, 0] for one in out)
 
     def along(self, program, numbers, t, x, width):
-        """A program's values (N, m, n, n) at times t (N, m), states x (N, n, m) known to within `width`, and bounds."""
+        """A program's values (N, m, n, n) at times t (N, m), states x (N, n, m) known to within
+        `width`, and bounds.
+        """
         return program.at(t, t, x.shape[1], numbers, (x.swapaxes(0, 1), width.swapaxes(0, 1)))

@@ -9,11 +9,12 @@ the second-order terms. A = df/dx changes within the tube by no more than `noise
 the tube's width as the error of the states. So the bounds of M, which include `noise`, hold for all of them, and for
 the orbit: verdicts need nothing else.
 
-What is no strict bound: samples at NODES stand for all times (taken SAMPLED times), widths of the tube enter to first
-order (taken WIDER), and the series of A is cut off as in `kernels.floquet.steps`.
+What is no strict bound: samples at NODES stand for all times (taken SAMPLED times), widths of the
+tube enter to first order (taken WIDER), and the series of A is cut off as in
+`kernels.floquet.steps`.
 
-The autonomous system's multiplier +1 is not given or judged: the others are those of M in the coordinates
-x_i - (f_i / f_k) x_k, i not k, of the space in which f counts as 0.
+The autonomous system's multiplier +1 is not given or judged: the others are those of M in the
+coordinates x_i - (f_i / f_k) x_k, i not k, of the space in which f counts as 0.
 
 Sources: R. Krawczyk, Computing 4 (1969) 187; W. Tucker, Validated Numerics (2011), 5 and 6.
 """
@@ -29,7 +30,8 @@ from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 from survey.measures.floquet import monodromy
 from survey.measures.floquet.newton import applied, bordered, chosen, inverse
 
-NODES = np.array([0.0, 0.25, 0.5, 0.75, 0.875, 1.0])  # of a step; sums with the ends of steps are exact
+# of a step; sums with the ends of steps are exact
+NODES = np.array([0.0, 0.25, 0.5, 0.75, 0.875, 1.0])
 MIDDLE = 2  # of NODES
 MEAN = np.array([7.0, 32.0, 12.0, 32.0, 0.0, 7.0]) / 90.0  # over a step, by NODES (Boole)
 SAMPLED = 1.25  # samples within a step, whose length is a small part of the radius of convergence
@@ -40,8 +42,8 @@ WIDEST = 1e-3  # of the tube, relative to the largest state
 
 @dataclass
 class Shown:
-    """Orbits that exist: states, periods, M and what their multipliers follow from, each with bounds; mean squares of
-    the states, without."""
+    """Orbits that exist: states, periods, M and what their multipliers follow from, each with
+    bounds; mean squares of the states, without."""
 
     good: np.ndarray
     x: np.ndarray
@@ -61,7 +63,9 @@ class Shown:
 
 
 def certified(programs, numbers, x, T, guess, plane, counts, method, reach):
-    """Shown, of orbits near (x, T); see the head of the module. All is in the units that balance A, but the results."""
+    """Shown, of orbits near (x, T); see the head of the module. All is in the units that balance A,
+    but the results.
+    """
     with np.errstate(all="ignore"):
         path = Path(programs, numbers, x, T, counts, reach)
         path.enough = WIDEST * np.maximum(path.extent, (abs(guess) / path.scale).max(axis=1))
@@ -84,7 +88,9 @@ class Path:
         self.last = self.first[1:] - 1
         self.own = numbers
         self.numbers = chosen(numbers, self.point)
-        X, begin, self.h, series = programs.flow(numbers, x, T, reach, derived=False, first=self.first)
+        X, begin, self.h, series = programs.flow(
+            numbers, x, T, reach, derived=False, first=self.first
+        )
         self.begin, self.t = begin, begin[:, None] + self.h[:, None] * NODES
         k = np.arange(ORDER + 1.0)
         moduli = abs(series)
@@ -95,7 +101,9 @@ class Path:
         self.defect = SAMPLED * self.h[:, None] * (abs(dX - f) + df + noise).max(axis=2)
         # a series begins where the one before it ends, as it is summed
         end, begins = self.X[:-1, :, -1], series[1:, :, 0]
-        self.defect[:-1] += np.where((self.point[1:] == self.point[:-1])[:, None], abs(end - begins), 0.0)
+        self.defect[:-1] += np.where(
+            (self.point[1:] == self.point[:-1])[:, None], abs(end - begins), 0.0
+        )
         self.defect += self.noise_X[:, :, -1]
         self.f_end = f[self.last, :, -1]
         A, dA = self.along(programs.A, self.noise_X)
@@ -136,8 +144,12 @@ class Path:
         return wide, off
 
     def tube(self, radius, delta, wide, off):
-        """How far motions that begin within radius (N) are from the series, at the steps' beginnings and throughout."""
-        begins = np.concatenate([[0.0], (wide[:-1] * radius[self.point[:-1], None] + off[:-1]).max(axis=1)])
+        """How far motions that begin within radius (N) are from the series, at the steps'
+        beginnings and throughout.
+        """
+        begins = np.concatenate(
+            [[0.0], (wide[:-1] * radius[self.point[:-1], None] + off[:-1]).max(axis=1)]
+        )
         begins[self.first[:-1]] = radius
         return begins, WIDER * (np.exp(self.h * self.norm) * begins + delta.max(axis=1))
 
@@ -163,7 +175,9 @@ class Path:
             unit = 1.0 / fastest  # of T
             row = plane[0] * s
             row /= abs(row).max(axis=1, keepdims=True)
-            planar = plane[0] * s / abs(plane[0] * s).max(axis=1, keepdims=True) * ((x - plane[1]) / s)
+            planar = (
+                plane[0] * s / abs(plane[0] * s).max(axis=1, keepdims=True) * ((x - plane[1]) / s)
+            )
             phase = abs(planar.sum(axis=1)) + (n + 4) * EPS * abs(planar).sum(axis=1)
             off_G = np.concatenate([off_G, phase[:, None]], axis=1)
             slope = bordered(slope, f_end * unit[:, None], row)
@@ -177,7 +191,9 @@ class Path:
         noise = WIDER * SAMPLED * self.rows_of(self.along(self.programs.A, width)[1])
         error = self.error + self.h * noise * np.exp(self.h * (self.norm + noise))
         doubt = self.doubt * (error / self.error)
-        second = self.spread_of(np.repeat((n * error * WIDER * begins)[:, None], n, axis=1))[1].max(axis=1)
+        second = self.spread_of(np.repeat((n * error * WIDER * begins)[:, None], n, axis=1))[1].max(
+            axis=1
+        )
         first_order = (wide * radius[point, None] + off).max(axis=1)
         stays = (second <= (WIDER - 1.0) * first_order) & (tube <= self.enough[point])
         stays = np.logical_and.reduceat(stays, self.first[:-1])
@@ -188,7 +204,9 @@ class Path:
         bounds = E
         if plane is not None:
             moved = a_end * (WIDER * first_order[last] + shift * fastest) + 4 * EPS * fastest
-            bounds = bordered(E, np.repeat((WIDER * unit * moved)[:, None], n, axis=1), 4 * EPS * abs(row))
+            bounds = bordered(
+                E, np.repeat((WIDER * unit * moved)[:, None], n, axis=1), 4 * EPS * abs(row)
+            )
         m = n if plane is None else n + 1
         residual = abs(product(B, slope) - np.eye(m)) + (m + 4) * EPS * product(size, abs(slope))
         q = (residual + product(size, bounds)).sum(axis=2).max(axis=1)
@@ -202,14 +220,18 @@ class Path:
             dT = final * unit * (1 + 4 * EPS) + EPS * T
             f, df = self.programs.slopes(self.own, np.zeros(N), x, dx)
             f, df = f / s, (WIDER * df + 8 * EPS * abs(f)) / s
-        others = self._sharp(M, E, R, error, doubt, WIDER * shift * a_end, np.flatnonzero(shown), f, df)
+        others = self._sharp(
+            M, E, R, error, doubt, WIDER * shift * a_end, np.flatnonzero(shown), f, df
+        )
         back = s[:, :, None] / s[:, None, :]
         return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others)
 
     def _sharp(self, M, E, R, error, doubt, late, which, f, df):
-        """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but for its +1.
+        """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but
+        for its +1.
 
-        Errors are carried in the coordinates of eigenvectors; `late` bounds what the end's shift adds, relative to M.
+        Errors are carried in the coordinates of eigenvectors; `late` bounds what the end's shift
+        adds, relative to M.
         """
         N, n = M.shape[:2]
         judged, bounds = (M, E) if f is None else deflated(M, E, f, df)
@@ -226,9 +248,19 @@ class Path:
         extra = np.full((N, n, n), np.nan)
         carried(self.F, error, doubt, self.first, which, n, vectors, inverses, extra)
         tall = product(abs(M) + E, abs(vectors))
-        extra += late[:, None, None] * abs(inverses).sum(axis=2)[:, :, None] * tall.max(axis=1, keepdims=True)
+        extra += (
+            late[:, None, None]
+            * abs(inverses).sum(axis=2)[:, :, None]
+            * tall.max(axis=1, keepdims=True)
+        )
         if f is None:
-            found.R, found.extra, found.V, found.W, found.centre = R, extra, vectors, inverses, values
+            found.R, found.extra, found.V, found.W, found.centre = (
+                R,
+                extra,
+                vectors,
+                inverses,
+                values,
+            )
         else:
             # V^-1 M V, V including f, is near diag(1, centre); f itself is V (1, off)
             known = np.full((N, n, n), np.inf)
@@ -257,7 +289,8 @@ def product(A, B):
 
 
 def deflated(M, E, f, df):
-    """M without its multiplier +1, whose eigenvector is f to within df (N, n): (N, n - 1, n - 1), and bounds.
+    """M without its multiplier +1, whose eigenvector is f to within df (N, n): (N, n - 1, n - 1),
+    and bounds.
 
     In the coordinates x_i - (f_i / f_k) x_k, i not k, f is 0.
     """
@@ -282,7 +315,9 @@ def deflated(M, E, f, df):
 
 
 def completed(M, f, values, directions):
-    """Eigenvectors of M (N, n, n): f, that of +1, and those that the eigenvectors of `deflated` M stand for."""
+    """Eigenvectors of M (N, n, n): f, that of +1, and those that the eigenvectors of `deflated` M
+    stand for.
+    """
     N, n = f.shape
     rows, (k, rest) = np.arange(N), _pivots(f)
     out = np.zeros((N, n, n), complex)

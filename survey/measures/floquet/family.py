@@ -1,8 +1,9 @@
-"""Families of symmetric orbits (see `symmetry`) on a map of two parameters, or a line: their multipliers anywhere.
+"""Families of symmetric orbits (see `symmetry`) on a map of two parameters, or a line: their
+multipliers anywhere.
 
-On a lattice orbits are found from `start`, or, on every fourth line, by following them along the parameter of the
-continuation. In between, splines of x(0) and T are where Newton's method begins, and the orbit it finds is shown to
-exist (`shooting`).
+On a lattice orbits are found from `start`, or, on every fourth line, by following them along the
+parameter of the continuation. In between, splines of x(0) and T are where Newton's method begins,
+and the orbit it finds is shown to exist (`shooting`).
 """
 
 import numpy as np
@@ -14,7 +15,8 @@ from survey.measures.floquet.continuation import floored
 from survey.measures.floquet.newton import located
 
 NOISE = 1e-9  # relative: a guess of the errors on the lattice, where orbits are not shown to exist
-REACHED, ENOUGH = 1e-13, 1e-9  # rtol of the series by which orbits are found, and of those that are told apart
+# rtol of the series by which orbits are found, and of those that are told apart
+REACHED, ENOUGH = 1e-13, 1e-9
 FOLLOWED = 4  # lines from one that is followed to the next; a power of two
 SAME = 1e-4  # relative: periods of one orbit, from cubic pieces of its curve
 HOLE = 1e-9  # the weight of what is unknown, but for rounding
@@ -22,9 +24,11 @@ ALIKE = 0.05  # relative: how near its guess an orbit between these lines must b
 
 
 class Family:
-    """The orbits of an OrbitScene on the map of `axes`, the unit square `square`; `fixed`: the other parameters.
+    """The orbits of an OrbitScene on the map of `axes`, the unit square `square`; `fixed`: the
+    other parameters.
 
-    They are looked for on `lines` lines each way. Where orbits are continued, they are those number `fixed["branch"]`.
+    They are looked for on `lines` lines each way. Where orbits are continued, they are those number
+    `fixed["branch"]`.
     """
 
     def __init__(self, scene, square, axes, fixed, lines):
@@ -52,7 +56,8 @@ class Family:
             self._locate(lattice.ravel(), *self.equation.begin(self.points))
         else:
             along = self.continued.index
-            across = 1 - self.varied.index(along) if along in self.varied else 0  # the axis with a line for each place
+            # the axis with a line for each place
+            across = 1 - self.varied.index(along) if along in self.varied else 0
             each = np.arange(lattice.shape[across])
             step = FOLLOWED if each.size > 1 else 1
             followed = lattice.take(each[::step], across).ravel()
@@ -73,7 +78,9 @@ class Family:
         self.states[those[good]], self.T[those[good]] = orbits.x[good], orbits.T[good]
 
     def _followed(self, those):
-        """States and periods where Newton's method begins, of orbits that are followed along the continuation."""
+        """States and periods where Newton's method begins, of orbits that are followed along the
+        continuation.
+        """
         points = self.points[those]
         found = zip(*orbit.followed(self.equation, self.continued, points, self.reach), strict=True)
         which, states, periods = map(np.concatenate, found)
@@ -85,17 +92,23 @@ class Family:
         return x, T
 
     def _chosen(self, point, x, T):
-        """Which of the orbits near x (K, n) and T at a point is number `branch`; None if there are not so many."""
+        """Which of the orbits near x (K, n) and T at a point is number `branch`; None if there are
+        not so many.
+        """
         if (abs(T - T[0]) <= SAME * T).all():  # one orbit, perhaps found twice
             return 0 if abs(self.branch) == 1 else None
         points = np.tile(point, (len(x), 1))
         found = orbit.shown(self.equation, points, x, T, self.method, ENOUGH, relax=False)
-        shown = [(found.square[i], tuple(found.x[i]), found.T[i], i) for i in np.flatnonzero(found.good)]
+        shown = [
+            (found.square[i], tuple(found.x[i]), found.T[i], i) for i in np.flatnonzero(found.good)
+        ]
         order = orbit.numbered(shown, free=False)
         return order[self.branch - (self.branch > 0)] if abs(self.branch) <= len(order) else None
 
     def _interpolate(self, lattice):
-        """Make splines of the states that are unknown and of T from those on a lattice, an array of their numbers."""
+        """Make splines of the states that are unknown and of T from those on a lattice, an array of
+        their numbers.
+        """
         ticks = self.x[lattice[:, 0], 0], self.x[lattice[0], 1]
         columns = [*self.states.T[self.equation.symmetry.unknown], self.T]
         self._splines = [_spline(ticks, values[lattice]) for values in columns]
@@ -109,15 +122,21 @@ class Family:
         points, start, T = self._near(x)
         orbits, good = located(self.equation, points, self.reach, start, T)
         known = np.isin(np.arange(len(x)), good)
-        return self._rough(points, np.where(known[:, None], orbits.x, np.nan), np.where(known, orbits.T, np.nan))
+        return self._rough(
+            points, np.where(known[:, None], orbits.x, np.nan), np.where(known, orbits.T, np.nan)
+        )
 
     def matrices(self, x, rtol):
-        """(M, E) (N, m, m) at positions (N, 2), of the multipliers that are judged: (0 1; -1 2 K), see `symmetry`."""
+        """(M, E) (N, m, m) at positions (N, 2), of the multipliers that are judged: (0 1; -1 2 K),
+        see `symmetry`.
+        """
         points, start, T = self._near(x)
         M, E = np.full((2, len(x), self.equation.judged, self.equation.judged), np.nan)
         for i in range(0, len(x), orbit.CHUNK):
             own = slice(i, i + orbit.CHUNK)
-            found = orbit.shown(self.equation, points[own], start[own], T[own], self.method, rtol, relax=False)
+            found = orbit.shown(
+                self.equation, points[own], start[own], T[own], self.method, rtol, relax=False
+            )
             M[own], E[own] = found.others.M, found.others.E
         return M, E
 
@@ -155,6 +174,11 @@ def _spline(ticks, values):
     hole, values = np.where(np.isfinite(values), 0.0, 1.0), contours.filled(values)
     if len(ticks[1]) == 1:
         along = CubicSpline(ticks[0], values[:, 0])
-        return lambda x: np.where(np.interp(x[:, 0], ticks[0], hole[:, 0]) > 0.0, np.nan, along(x[:, 0]))
-    both, outside = RectBivariateSpline(*ticks, values), RectBivariateSpline(*ticks, hole, kx=1, ky=1)
+        return lambda x: np.where(
+            np.interp(x[:, 0], ticks[0], hole[:, 0]) > 0.0, np.nan, along(x[:, 0])
+        )
+    both, outside = (
+        RectBivariateSpline(*ticks, values),
+        RectBivariateSpline(*ticks, hole, kx=1, ky=1),
+    )
     return lambda x: np.where(outside.ev(*x.T) > HOLE, np.nan, both.ev(*x.T))

@@ -1,4 +1,5 @@
-"""Symmetries in t of a linear periodic system, by which a half or a quarter of a piece of the period is enough.
+"""Symmetries in t of a linear periodic system, by which a half or a quarter of a piece of the
+period is enough.
 
 Of a piece from a to b, R and S diagonal matrices of signs:
 
@@ -6,11 +7,12 @@ Of a piece from a to b, R and S diagonal matrices of signs:
                     of the step over [s, t]
     repetition      A(t + (b - a) / 2) = S A(t) S: the step half a piece later has S F S
 
-Neither is tried on samples: both are read off the recorded operations (`trace`). A wave, the sine or cosine of a line
-c t + d, keeps or changes its sign where c (a + b) + 2 d, or c (b - a) / 2, is a multiple of pi; parity then passes on
-through sums, products, quotients and functions, and each term of an entry says whether two signs are equal. The digits
-show a multiple of pi to within their rounding alone; `late` bounds how far off it may be, which counts as an error of
-A. What these rules do not see, as waves whose sum alone is even, is integrated as it is.
+Neither is tried on samples: both are read off the recorded operations (`trace`). A wave, the sine
+or cosine of a line c t + d, keeps or changes its sign where c (a + b) + 2 d, or c (b - a) / 2, is a
+multiple of pi; parity then passes on through sums, products, quotients and functions, and each term
+of an entry says whether two signs are equal. The digits show a multiple of pi to within their
+rounding alone; `late` bounds how far off it may be, which counts as an error of A. What these rules
+do not see, as waves whose sum alone is even, is integrated as it is.
 
 Source: J. S. W. Lamb, J. A. G. Roberts, Physica D 112 (1998) 1.
 """
@@ -30,8 +32,8 @@ EVEN = frozenset({"cos", "cosh"})
 
 @dataclass(frozen=True)
 class Images:
-    """What of a piece follows from its beginning: signs of the states in a reversal of time, and in a repetition, as
-    bytes of -1 and 1, or None where there is none.
+    """What of a piece follows from its beginning: signs of the states in a reversal of time, and in
+    a repetition, as bytes of -1 and 1, or None where there is none.
     """
 
     reversal: bytes | None = None
@@ -43,10 +45,11 @@ class Images:
         return (1 if self.reversal is None else 2) * (1 if self.repetition is None else 2)
 
     def complete(self, F, error, doubt, first, count):
-        """Fill the steps of the other parts of points, the first of whose first parts (count steps) are given.
+        """Fill the steps of the other parts of points, the first of whose first parts (count steps)
+        are given.
 
-        F (steps, n, n), error and doubt (steps) begin at `first` (N) for each point. Where time is reversed, the steps
-        backwards are in the place of those of the next part, in the same order.
+        F (steps, n, n), error and doubt (steps) begin at `first` (N) for each point. Where time is
+        reversed, the steps backwards are in the place of those of the next part, in the same order.
         """
         tasks = np.repeat(np.arange(len(count)), count)
         index = np.arange(tasks.size) - np.repeat(np.cumsum(count) - count, count)
@@ -57,13 +60,21 @@ class Images:
                 signs = signs * _signs(self.repetition)
             back = first[tasks] + 2 * count[tasks] - 1 - index
             own = here + count[tasks]
-            F[back], error[back], doubt[back] = F[own] * np.outer(signs, signs), error[own], doubt[own]
+            F[back], error[back], doubt[back] = (
+                F[own] * np.outer(signs, signs),
+                error[own],
+                doubt[own],
+            )
             done, here = 2, np.concatenate([here, back])
             tasks = np.concatenate([tasks, tasks])
         if self.repetition is not None:
             signs = _signs(self.repetition)
             later = here + done * count[tasks]
-            F[later], error[later], doubt[later] = F[here] * np.outer(signs, signs), error[here], doubt[here]
+            F[later], error[later], doubt[later] = (
+                F[here] * np.outer(signs, signs),
+                error[here],
+                doubt[here],
+            )
 
 
 def _signs(given):
@@ -71,9 +82,11 @@ def _signs(given):
 
 
 class Waves:
-    """The sines and cosines of lines c t + d among the basis functions of a Program, and what follows from them.
+    """The sines and cosines of lines c t + d among the basis functions of a Program, and what
+    follows from them.
 
-    `places` of the waves, `lines`: those of c and d among the numbers, or None for 1 and 0; `cosine`, or sine?
+    `places` of the waves, `lines`: those of c and d among the numbers, or None for 1 and 0;
+    `cosine`, or sine?
     """
 
     def __init__(self, program):
@@ -90,8 +103,8 @@ class Waves:
                 self.cosine.append(operation == "cos")
 
     def found(self, n, numbers, low, high):
-        """[(indices, Images, late)] of points, from values and error bounds of their numbers and the ends (N) of the
-        piece; `late`: see `trace.Program.series`.
+        """[(indices, Images, late)] of points, from values and error bounds of their numbers and
+        the ends (N) of the piece; `late`: see `trace.Program.series`.
         """
         (values, errors), terms = numbers, self.program.terms[:, pg.NUMBER]
         given = np.zeros((2, 2, len(self.places), len(low)))  # c and d, values and error bounds
@@ -130,15 +143,21 @@ class Waves:
             waves = len(self.places)
             back, later, present = row[:waves], row[waves : 2 * waves], row[2 * waves :]
             # sin(k pi - x) = -(-1)^k sin x
-            back = [turn if cosine else -turn for turn, cosine in zip(back, self.cosine, strict=True)]
-            signs = [self._signs(n, turns, present, sign) for turns, sign in ((back, -1), (later, 1))]
+            back = [
+                turn if cosine else -turn for turn, cosine in zip(back, self.cosine, strict=True)
+            ]
+            signs = [
+                self._signs(n, turns, present, sign) for turns, sign in ((back, -1), (later, 1))
+            ]
             self.known[key] = Images(*(None if one is None else one.tobytes() for one in signs))
         return self.known[key]
 
     def _signs(self, n, turns, present, sign):
         """Signs r (n) with r_i r_j A_ij(image of t) = `sign` A_ij(t), or None."""
         parity, allowed = self._parities(turns), np.ones((2, n, n), bool)
-        for (basis, i, j, _number), counts in zip(self.program.terms.tolist(), present, strict=True):
+        for (basis, i, j, _number), counts in zip(
+            self.program.terms.tolist(), present, strict=True
+        ):
             if counts:
                 allowed[0, i, j] &= parity[basis] == sign
                 allowed[1, i, j] &= parity[basis] == -sign
@@ -162,15 +181,18 @@ class Waves:
                 known[place] = 0
             else:
                 own = known[o[0]]
-                known[place] = own if own >= 0 else -1 if operation in ODD else int(operation in EVEN)
+                known[place] = (
+                    own if own >= 0 else -1 if operation in ODD else int(operation in EVEN)
+                )
         return known
 
 
 def _multiples(c, d, low, high):
-    """(sign, off) (2, waves, N): (-1)^k and bounds of c (low + high) + 2 d - k pi, then of c (high - low) / 2 - k pi;
-    0 where it is no multiple of pi.
+    """(sign, off) (2, waves, N): (-1)^k and bounds of c (low + high) + 2 d - k pi, then of c (high
+    - low) / 2 - k pi; 0 where it is no multiple of pi.
 
-    c and d (2, waves, N) are values and error bounds. Products and sums are taken in two parts, which is nearly exact.
+    c and d (2, waves, N) are values and error bounds. Products and sums are taken in two parts,
+    which is nearly exact.
     """
     ends = np.array([[high, 0.5 * high], [low, -0.5 * low]])[:, :, None]
     products = c[0] * ends
@@ -191,7 +213,9 @@ def _multiples(c, d, low, high):
 
 
 def alike_or_opposite(alike, opposite):
-    """Signs r (n) with r_i = r_j only where `alike` (n, n) is true, r_i = -r_j only where `opposite` is; or None."""
+    """Signs r (n) with r_i = r_j only where `alike` (n, n) is true, r_i = -r_j only where
+    `opposite` is; or None.
+    """
     n = len(alike)
     signs = np.zeros(n, np.int8)
     if not (alike | opposite).all():

@@ -1,4 +1,5 @@
-"""The Maslov index of a symplectic system: how often a pair of multipliers has passed 1, or -1, on the way to it.
+"""The Maslov index of a symplectic system: how often a pair of multipliers has passed 1, or -1, on
+the way to it.
 
 The graph of X(t), x -> X(t) x, is a Lagrangian subspace, and meets that of c, c = 1 or -1, where c is an eigenvalue of
 X(t). With X in blocks of coordinates q and momenta p, and Z = (i 1; X_qq + i X_pq  X_qp + i X_pp), the graph belongs to
@@ -11,12 +12,13 @@ followed from t = 0 on, step by step, and with a_j in (0, 2 pi) the angles of it
 
     index = (sum_j a_j - theta(0) - the change of theta) / 2 pi,
 
-an integer, from which m = n / 2 is taken for c = 1. All paths begin at the identity, so that the indices of two systems
-differ by the signed number of passages of c between them, on whatever line of parameters (homotopy). They grow with
-the Hamiltonian function; of Hill's equation y'' + (a + ...) y = 0 they count the edges of tongues below a.
+an integer, from which m = n / 2 is taken for c = 1. All paths begin at the identity, so that the
+indices of two systems differ by the signed number of passages of c between them, on whatever line
+of parameters (homotopy). They grow with the Hamiltonian function; of Hill's equation y'' + (a +
+...) y = 0 they count the edges of tongues below a.
 
-Sources: J. Robbin, D. Salamon, Topology 32 (1993) 827; V. I. Arnold, Functional Analysis and Its Applications 1 (1967)
-1; M. A. de Gosson, Symplectic Methods in Harmonic Analysis (2011), 3.
+Sources: J. Robbin, D. Salamon, Topology 32 (1993) 827; V. I. Arnold, Functional Analysis and Its
+Applications 1 (1967) 1; M. A. de Gosson, Symplectic Methods in Harmonic Analysis (2011), 3.
 """
 
 import numpy as np
@@ -39,7 +41,9 @@ UNITARY, WHOLE = 1e-3, 0.05  # how far W may be from unitary, and an index from 
 
 
 def indices(system, points):
-    """The index relative to each of GOALS (2, N) of a symplectic System at points (N, parameters); else UNKNOWN."""
+    """The index relative to each of GOALS (2, N) of a symplectic System at points (N, parameters);
+    else UNKNOWN.
+    """
     own = monodromy.Points(system, points, halves=True)
     method = monodromy.method_of("auto")
     found = np.full((2, len(points)), UNKNOWN, dtype=np.int32)
@@ -60,7 +64,9 @@ def indices(system, points):
 
 
 def _followed(matrices, scale, F, _error, _doubt, first):
-    """The indices (2, N), not rounded, and whether theta turned too far in a step, from the steps' propagators."""
+    """The indices (2, N), not rounded, and whether theta turned too far in a step, from the steps'
+    propagators.
+    """
     N, n = matrices.M.shape[:2]
     m = n // 2
     # in units that balance q with p, and are symplectic
@@ -89,23 +95,34 @@ def _rotation(X):
 
 
 def _index(X, turn, goal):
-    """The index (N) relative to `goal`, NaN where it is not sure, of X (N, n, n) after theta has turned by `turn`."""
+    """The index (N) relative to `goal`, NaN where it is not sure, of X (N, n, n) after theta has
+    turned by `turn`.
+    """
     n = X.shape[1]
     angles, sure = _angles(X, goal)
-    start = n * np.pi if goal > 0 else _angles(np.eye(n)[None], goal)[0].sum()  # for 1 that takes m from the index
+    # for 1 that takes m from the index
+    start = n * np.pi if goal > 0 else _angles(np.eye(n)[None], goal)[0].sum()
     return np.where(sure, (angles.sum(axis=1) - start - turn) / (2.0 * np.pi), np.nan)
 
 
 def _angles(X, goal):
-    """Angles (N, n) in [0, 2 pi) of the eigenvalues of W relative to the graph of `goal`, and whether they are sure."""
+    """Angles (N, n) in [0, 2 pi) of the eigenvalues of W relative to the graph of `goal`, and
+    whether they are sure.
+    """
     N, n = X.shape[:2]
     angles, sure = np.full((N, n), np.nan), np.isfinite(X).all(axis=(1, 2))
     Z, U = _frame(X[sure]), _frame(goal * np.eye(n)[None])[0] / np.sqrt(2.0)
     U = U.conj().T
-    W = U @ np.swapaxes(np.linalg.solve(np.swapaxes(Z.conj(), 1, 2), np.swapaxes(Z, 1, 2)), 1, 2) @ U.T
+    W = (
+        U
+        @ np.swapaxes(np.linalg.solve(np.swapaxes(Z.conj(), 1, 2), np.swapaxes(Z, 1, 2)), 1, 2)
+        @ U.T
+    )
     value = np.linalg.eigvals(W)
     angles[sure] = np.angle(value) % (2.0 * np.pi)
-    sure[sure] = (abs(abs(value) - 1.0) < UNITARY).all(axis=1) & (abs(value - 1.0) > CLOSE).all(axis=1)
+    sure[sure] = (abs(abs(value) - 1.0) < UNITARY).all(axis=1) & (abs(value - 1.0) > CLOSE).all(
+        axis=1
+    )
     return angles, sure
 
 

@@ -1,9 +1,10 @@
 """The monodromy matrix of a linear periodic system, each entry with its error bound.
 
-The period is cut at the breaks, and each piece into steps of equal length: as many as the norm of A, in units of
-the states that balance it, and the rate at which A varies ask for; points whose bounds miss the accuracy climb a
-ladder of more steps, and have their errors carried sharply (`stability`). Of a piece that a symmetry in t makes up of
-equal parts, the steps of the first alone are computed (`halves`).
+The period is cut at the breaks, and each piece into steps of equal length: as many as the norm of
+A, in units of the states that balance it, and the rate at which A varies ask for; points whose
+bounds miss the accuracy climb a ladder of more steps, and have their errors carried sharply
+(`stability`). Of a piece that a symmetry in t makes up of equal parts, the steps of the first alone
+are computed (`halves`).
 """
 
 from dataclasses import dataclass, fields
@@ -20,8 +21,11 @@ from survey.measures.floquet.halves import Images
 
 # Times at which A is looked at, as shares of a piece.
 TIMES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
-WEIGHTS = np.cos(1.0 + 7.0 * np.arange(64)) + 1.5  # of entries, in a sum that stands for all: no special ones
-TRANSFORM = np.array([[np.cos(np.pi * j * (k + 0.5) / 12) / 6 for k in range(12)] for j in range(12)])
+# of entries, in a sum that stands for all: no special ones
+WEIGHTS = np.cos(1.0 + 7.0 * np.arange(64)) + 1.5
+TRANSFORM = np.array(
+    [[np.cos(np.pi * j * (k + 0.5) / 12) / 6 for k in range(12)] for j in range(12)]
+)
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
 BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 DIGITS = 48  # bits of the ends of steps
@@ -32,8 +36,8 @@ MOST_STEPS = 100_000  # of a point
 
 @dataclass(frozen=True)
 class Group:
-    """Points with the same recorded operations and symmetries: their numbers among all, of each piece the program,
-    the values of its numbers there, and its Images.
+    """Points with the same recorded operations and symmetries: their numbers among all, of each
+    piece the program, the values of its numbers there, and its Images.
     """
 
     own: np.ndarray
@@ -45,9 +49,10 @@ class Group:
 class Points:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
-    `halves`: is no more integrated than symmetries of A ask for? `growth` (2, N): the integral of A's trace over the
-    period, the logarithm of det M, and its error bound; infinite where the trace depends on t. If `paired`, with l also
-    1 / l is said to be a multiplier: points whose growth is certainly not 0 are not valid.
+    `halves`: is no more integrated than symmetries of A ask for? `growth` (2, N): the integral of
+    A's trace over the period, the logarithm of det M, and its error bound; infinite where the trace
+    depends on t. If `paired`, with l also 1 / l is said to be a multiplier: points whose growth is
+    certainly not 0 are not valid.
     """
 
     def __init__(self, system, points, halves=False, paired=False):
@@ -70,18 +75,24 @@ class Points:
             self.valid &= ~(abs(self.growth[0]) > self.growth[1])
 
     def _alike(self, own, programs):
-        """[(those of the points `own` with the same symmetries, of each piece (values and error bounds of its numbers,
-        Images, late: see `halves.Waves`))]."""
+        """[(those of the points `own` with the same symmetries, of each piece (values and error
+        bounds of its numbers, Images, late: see `halves.Waves`))]."""
         found = [(own, [])]
         for k, program in enumerate(programs):
             before, found = found, []
             for some, pieces in before:
                 numbers = program.numbers(self.points[some])
                 ends = self.edges[some, k], self.edges[some, k + 1]
-                kinds = program.waves.found(self.n, numbers, *ends) if self.halves else [(slice(None), Images(), None)]
+                kinds = (
+                    program.waves.found(self.n, numbers, *ends)
+                    if self.halves
+                    else [(slice(None), Images(), None)]
+                )
                 for those, images, late in kinds:
                     here = *(values[those] for values in numbers), images, late
-                    found.append((some[those], [*(_of_those(piece, those) for piece in pieces), here]))
+                    found.append(
+                        (some[those], [*(_of_those(piece, those) for piece in pieces), here])
+                    )
         return found
 
     def _measure(self, own, programs, given):
@@ -93,7 +104,9 @@ class Points:
             edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
             t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
             A, E = np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
-            self._add_trace(own, program.trace(numbers), self.edges[own, k + 1] - self.edges[own, k])
+            self._add_trace(
+                own, program.trace(numbers), self.edges[own, k + 1] - self.edges[own, k]
+            )
             terms, values, errors = program.sampled(numbers, t, late)
             errors[:, :, TIMES * images.parts > 1.0] = 0.0  # only what is integrated rounds
             sizes.samples(terms, values, errors, *numbers, A, E, largest)
@@ -109,14 +122,18 @@ class Points:
             self.size[own, k] = np.where(np.isnan(rate), np.nan, size)
             self.noise[own, k] = noise
         self.scale[own] = scale
-        self.groups.append(Group(own, programs, [values for values, *_ in given], [piece[2] for piece in given]))
+        self.groups.append(
+            Group(own, programs, [values for values, *_ in given], [piece[2] for piece in given])
+        )
 
     def _add_trace(self, own, trace, length):
         value, bar = (0.0, np.inf) if trace is None else trace
         with np.errstate(all="ignore"):
             part = value * length
             self.growth[0, own] += part
-            self.growth[1, own] += bar * length + 4 * ROUNDOFF_UP * (abs(part) + abs(self.growth[0, own]))
+            self.growth[1, own] += bar * length + 4 * ROUNDOFF_UP * (
+                abs(part) + abs(self.growth[0, own])
+            )
 
     def steps(self, reach, factor, those):
         """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""
@@ -124,7 +141,9 @@ class Points:
         with np.errstate(invalid="ignore"):
             least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
             count = np.ceil(factor[:, None] * np.maximum(np.ceil(least), 1.0))  # more on every rung
-        return np.where(length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0).astype(np.int64)
+        return np.where(
+            length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0
+        ).astype(np.int64)
 
 
 def _of_those(piece, those):
@@ -136,7 +155,9 @@ def _of_those(piece, those):
 
 
 def balanced(matrices):
-    """Units of the states (N, n), powers of 2, in which rows and columns of |A| (N, n, n) are of one size (Osborne)."""
+    """Units of the states (N, n), powers of 2, in which rows and columns of |A| (N, n, n) are of
+    one size (Osborne).
+    """
     scale = np.empty(matrices.shape[:2])
     sizes.balance(np.array(matrices, order="C"), scale)
     return scale
@@ -187,10 +208,12 @@ class Matrices:
 
 
 def solve(points, method, rtol, factor, those, sharp):
-    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see Matrices.
+    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see
+    Matrices.
 
-    A function `sharp` takes, for some of `those` (their places there), the Matrices in the balanced units of the
-    states, these units (N, n), and the steps: F, their error bounds, `doubt` and `first` of `steps.products`.
+    A function `sharp` takes, for some of `those` (their places there), the Matrices in the balanced
+    units of the states, these units (N, n), and the steps: F, their error bounds, `doubt` and
+    `first` of `steps.products`.
     """
     n = points.n
     count = points.steps(method.floquet_reach(rtol), factor, those)
@@ -206,7 +229,11 @@ def solve(points, method, rtol, factor, those, sharp):
         cuts = np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if work.size else []
         for some in np.split(mine, cuts):
             if some.size:
-                given = group, count[some], sharp if isinstance(sharp, bool) else partial(sharp, some)
+                given = (
+                    group,
+                    count[some],
+                    sharp if isinstance(sharp, bool) else partial(sharp, some),
+                )
                 found[some] = _call(points, method, those[some], place[those[some]], *given)
     return found
 
@@ -218,7 +245,9 @@ def _call(points, method, those, place, group, count, sharp):
     F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])
     offset = first[:-1].copy()
     scale = np.ascontiguousarray(points.scale[those])
-    for k, (program, values, images) in enumerate(zip(group.programs, group.numbers, group.images, strict=True)):
+    for k, (program, values, images) in enumerate(
+        zip(group.programs, group.numbers, group.images, strict=True)
+    ):
         steps_of = count[:, k]
         point = np.repeat(np.arange(len(those)), steps_of)
         if not point.size:
@@ -230,11 +259,16 @@ def _call(points, method, those, place, group, count, sharp):
             late = high = low + (high - low) / parts[k]
         start, end = (_ends(low, high, steps_of, point, index + shift) for shift in (0, 1))
         middle, half = 0.5 * (start + end), 0.5 * (end - start)
-        # all is exact but the first and the last step of the piece, which meet others within their rounding
+        # all is exact but the first and the last step of the piece, which meet others within their
+        # rounding
         share = late / np.where(high > low, high - low, 1.0)
         noise = points.noise[those, k] + 4 * ROUNDOFF_UP * points.size[those, k] * share
         ways = 1 if images.reversal is None else 2
-        found = np.empty((ways * point.size, n, n)), np.empty(ways * point.size), np.empty(ways * point.size)
+        found = (
+            np.empty((ways * point.size, n, n)),
+            np.empty(ways * point.size),
+            np.empty(ways * point.size),
+        )
         if jit.other_compiler:
             steps.compile_some()
             jit.wait_for_other_compiler()
@@ -243,7 +277,9 @@ def _call(points, method, those, place, group, count, sharp):
             np.ascontiguousarray(values[place]), scale, noise, n, point, middle, half, *found,
         )  # fmt: skip
         where = np.repeat(offset, steps_of) + index
-        where = where if ways == 1 else np.concatenate([where, where + np.repeat(steps_of, steps_of)])
+        where = (
+            where if ways == 1 else np.concatenate([where, where + np.repeat(steps_of, steps_of)])
+        )
         F[where], error[where], doubt[where] = found
         images.complete(F, error, doubt, offset, steps_of)
         offset += steps_of * parts[k]
@@ -253,7 +289,9 @@ def _call(points, method, those, place, group, count, sharp):
     if callable(sharp):
         sharp(found, scale, F, error, doubt, first)
     elif sharp:
-        which = np.flatnonzero(np.isfinite(found.M).all(axis=(1, 2)) & np.isfinite(found.E).all(axis=(1, 2)))
+        which = np.flatnonzero(
+            np.isfinite(found.M).all(axis=(1, 2)) & np.isfinite(found.E).all(axis=(1, 2))
+        )
         found.centre[which], found.V[which] = np.linalg.eig(found.M[which])
         found.W[which] = inverse(found.V[which])
         steps.carried(F, error, doubt, first, which, n, found.V, found.W, found.extra)
@@ -281,7 +319,9 @@ def inverse(V):
 
 
 def _ends(low, high, steps, point, index):
-    """Ends of steps, but for those of the piece with so few digits that their sums and differences are exact."""
+    """Ends of steps, but for those of the piece with so few digits that their sums and differences
+    are exact.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = np.exp2(np.ceil(np.log2(np.maximum(abs(low), abs(high)))) - DIGITS)[point]
         t = np.rint((low[point] + (high - low)[point] * (index / steps[point])) / unit) * unit

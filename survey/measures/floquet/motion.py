@@ -14,11 +14,17 @@ REACH, LEAST, MOST = 0.1, 120, 20_000  # norm of A times half a step; steps per 
 
 
 def solve(system, states, point, answer, time):
-    """The Trajectory of one point (1, parameters) from the real part of the leading multiplier's eigenvector."""
+    """The Trajectory of one point (1, parameters) from the real part of the leading multiplier's
+    eigenvector.
+    """
     points = monodromy.Points(system, point)
     period, n = float(points.period[0]), system.n
     rate = abs(np.log(max(float(answer["spectral_radius"]), 1e-300)))
-    periods = ceil(time / period) if time is not None else int(np.clip(GROWTH / max(rate, 1e-3), 1, PERIODS))
+    periods = (
+        ceil(time / period)
+        if time is not None
+        else int(np.clip(GROWTH / max(rate, 1e-3), 1, PERIODS))
+    )
     matrices, errors, lengths = _sampled(points, n)
     scale = points.scale[0]
     terms = abs(matrices).max(axis=1) + errors.max(axis=1) / ROUNDOFF_UP
@@ -28,16 +34,25 @@ def solve(system, states, point, answer, time):
         t, Y, bars = t[kept], Y[kept], bars[kept]
     start = _leading(points)
     motion, off = Y @ start, bars @ abs(start) + 2 * n * ROUNDOFF_UP * (abs(Y) @ abs(start))
-    re, im, bar = (np.asarray(answer[name]) for name in ("multiplier_re", "multiplier_im", "multiplier_re_error"))
+    re, im, bar = (
+        np.asarray(answer[name])
+        for name in ("multiplier_re", "multiplier_im", "multiplier_re_error")
+    )
     data = {
         "t": ("t", t, {"long_name": "time", "symbol": "t", "units": "1"}),
-        "multiplier": ("multiplier", np.arange(1, re.size + 1), {"long_name": "number of the multiplier"}),
+        "multiplier": (
+            "multiplier",
+            np.arange(1, re.size + 1),
+            {"long_name": "number of the multiplier"},
+        ),
         **linear_motion.described(re + 1j * im, bar),
     }
     names = [name if name not in data else f"{name}_state" for name in states]
     for i, name in enumerate(names):
         words = f"{states[i]}, from {start[i]:.6g} at t = 0"
-        data |= linear_motion.value("t", name, rf"\mathrm{{{states[i]}}}", words, motion[:, i], off[:, i])
+        data |= linear_motion.value(
+            "t", name, rf"\mathrm{{{states[i]}}}", words, motion[:, i], off[:, i]
+        )
     shown = names if n <= 4 else names[: n // 2][:4]
     return Trajectory(data, (("lines", "t", *shown), ("multipliers",)))
 
@@ -45,7 +60,9 @@ def solve(system, states, point, answer, time):
 def _leading(points):
     """The real part of the eigenvector of the leading multiplier, its largest component 1."""
     first = np.zeros(1, dtype=np.int64)
-    M = monodromy.solve(points, monodromy.method_of("auto"), 1e-10, np.ones(1), first, sharp=False).M
+    M = monodromy.solve(
+        points, monodromy.method_of("auto"), 1e-10, np.ones(1), first, sharp=False
+    ).M
     values, vectors = np.linalg.eig(M[0])
     vector = vectors[:, abs(values).argmax()]
     vector = (vector / vector[abs(vector).argmax()]).real
@@ -53,12 +70,18 @@ def _leading(points):
 
 
 def _sampled(points, n):
-    """A at the nodes of all steps of a period (steps, 9, n, n), bounds of its rounding, and the steps' lengths."""
+    """A at the nodes of all steps of a period (steps, 9, n, n), bounds of its rounding, and the
+    steps' lengths.
+    """
     found = []
     for group in points.groups:
         for k, program in enumerate(group.programs):
             low, high = points.edges[group.own[0], k : k + 2]
-            count = int(np.clip(points.size[0, k] * (high - low) / (2 * REACH), LEAST, MOST)) if high > low else 0
+            count = (
+                int(np.clip(points.size[0, k] * (high - low) / (2 * REACH), LEAST, MOST))
+                if high > low
+                else 0
+            )
             if not count:
                 continue
             h = (high - low) / count

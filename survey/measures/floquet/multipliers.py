@@ -1,15 +1,17 @@
-"""Multipliers from a monodromy matrix M that is known to within E, and what certainly follows from them.
+"""Multipliers from a monodromy matrix M that is known to within E, and what certainly follows from
+them.
 
-With any nonsingular V, M is similar to (W V)^-1 W M V, W V = 1 nearly: its diagonal entries, with the sums of the
-moduli of the others of their rows, are Gershgorin's discs, and E widens them. V are the eigenvectors of M, or of M
-plus a small perturbation where they are nearly dependent: any V is allowed, and the narrowest discs are kept. A
-disc, or several that touch, apart from all others holds as many multipliers as it has centres.
+With any nonsingular V, M is similar to (W V)^-1 W M V, W V = 1 nearly: its diagonal entries, with
+the sums of the moduli of the others of their rows, are Gershgorin's discs, and E widens them. V are
+the eigenvectors of M, or of M plus a small perturbation where they are nearly dependent: any V is
+allowed, and the narrowest discs are kept. A disc, or several that touch, apart from all others
+holds as many multipliers as it has centres.
 
-Where M is symplectic or reversible, 1 / conj(l) is a multiplier with l. So an isolated disc whose mirror image in the
-unit circle meets no other one holds a multiplier on the circle.
+Where M is symplectic or reversible, 1 / conj(l) is a multiplier with l. So an isolated disc whose
+mirror image in the unit circle meets no other one holds a multiplier on the circle.
 
-Sources: R. A. Horn, C. R. Johnson, Matrix Analysis (2013), 6.1 and 6.4; V. A. Yakubovich, V. M. Starzhinskii, Linear
-Differential Equations with Periodic Coefficients (1975), III.
+Sources: R. A. Horn, C. R. Johnson, Matrix Analysis (2013), 6.1 and 6.4; V. A. Yakubovich, V. M.
+Starzhinskii, Linear Differential Equations with Periodic Coefficients (1975), III.
 """
 
 import numpy as np
@@ -25,8 +27,9 @@ POWERS = 12  # of 2: the highest power of M that is looked at
 
 
 class Discs:
-    """Discs of N matrices: centres and radii (N, n), by descending modulus, then angle; `together` (N, n, n): do they
-    hold their multipliers together? `V` the columns whose discs they are, `coupling` (N, n, n) what couples these.
+    """Discs of N matrices: centres and radii (N, n), by descending modulus, then angle; `together`
+    (N, n, n): do they hold their multipliers together? `V` the columns whose discs they are,
+    `coupling` (N, n, n) what couples these.
     """
 
     def __init__(self, matrices):
@@ -63,7 +66,9 @@ class Discs:
         """Try the eigenvectors of `near`."""
         centre, V = np.linalg.eig(near)
         V = V.astype(complex)
-        self._improve(which, M[which], E[which], np.zeros(V.shape), centre.astype(complex), V, inverse(V))
+        self._improve(
+            which, M[which], E[which], np.zeros(V.shape), centre.astype(complex), V, inverse(V)
+        )
 
     def _improve(self, which, M, E, extra, centre, V, W):
         """Take the discs in the coordinates V where they are narrower; see `discs.couplings`."""
@@ -89,18 +94,25 @@ class Discs:
         return touch
 
     def _narrow(self):
-        """Make isolated discs narrower: in other units of their column, what couples it to others counts t times.
+        """Make isolated discs narrower: in other units of their column, what couples it to others
+        counts t times.
 
-        t is such that the discs of the others, in whose rows it counts 1 / t times, still keep away.
+        t is such that the discs of the others, in whose rows it counts 1 / t times, still keep
+        away.
         """
         n = self.centre.shape[1]
         at = np.arange(n)
         with np.errstate(all="ignore"):
             own = self.coupling[:, at, at]
             off = self.radius - own
-            gap = abs(self.centre[:, :, None] - self.centre[:, None, :]) - own[:, :, None] - self.radius[:, None, :]
+            gap = (
+                abs(self.centre[:, :, None] - self.centre[:, None, :])
+                - own[:, :, None]
+                - self.radius[:, None, :]
+            )
             gap[:, at, at] = np.inf
-            share = (2.0 * np.swapaxes(self.coupling, 1, 2) / gap).copy()  # of j, in whose row i counts
+            # of j, in whose row i counts
+            share = (2.0 * np.swapaxes(self.coupling, 1, 2) / gap).copy()
             share[:, at, at] = 0.0
             t = np.clip(share.max(axis=2), 1e-12, 1.0)
             clear = self.isolated & (gap.min(axis=2) > 2.0 * t * off)
@@ -110,7 +122,9 @@ class Discs:
         modulus = abs(self.centre)
         # what cannot be told apart counts as equal: pairs of conjugates, and all on the unit circle
         angle = np.angle(self.centre)
-        order = np.lexsort((angle, -np.round(modulus / (1e-9 * (1 + modulus)).max(axis=1, keepdims=True))), axis=1)
+        order = np.lexsort(
+            (angle, -np.round(modulus / (1e-9 * (1 + modulus)).max(axis=1, keepdims=True))), axis=1
+        )
         self.reorder(order)
 
     def reorder(self, order):
@@ -140,7 +154,9 @@ class Discs:
     def moduli(self):
         """The least and the largest modulus in each disc (N, n) each."""
         size = abs(self.centre)
-        return np.maximum(size - self.radius, 0.0) * (1 - 4 * EPS), (size + self.radius) * (1 + 4 * EPS)
+        return np.maximum(size - self.radius, 0.0) * (1 - 4 * EPS), (size + self.radius) * (
+            1 + 4 * EPS
+        )
 
     @property
     def on_circle(self):
@@ -206,14 +222,17 @@ def verdicts(own, M, E, paired):
     else:
         verdict[(most < 1.0).all(axis=1)] = STABLE
     verdict[outside] = UNSTABLE
-    left = np.flatnonzero((verdict == UNDECIDED) & np.isfinite(E).all(axis=(1, 2)) & np.isfinite(M).all(axis=(1, 2)))
+    left = np.flatnonzero(
+        (verdict == UNDECIDED) & np.isfinite(E).all(axis=(1, 2)) & np.isfinite(M).all(axis=(1, 2))
+    )
     if left.size:
         verdict[left] = by_powers(M[left], E[left], not paired)
     return verdict
 
 
 def by_powers(M, E, may_be_stable):
-    """The verdict by powers of M: stable if a norm of one is below 1, unstable if a trace exceeds n.
+    """The verdict by powers of M: stable if a norm of one is below 1, unstable if a trace exceeds
+    n.
 
     Where multipliers are nearly defective this tells what discs cannot.
     """
@@ -223,16 +242,22 @@ def by_powers(M, E, may_be_stable):
 
 
 def krein(own):
-    """Krein signs (N, n) of multipliers on the unit circle: the sign of i v* J v; 0 where there is none, or is open.
+    """Krein signs (N, n) of multipliers on the unit circle: the sign of i v* J v; 0 where there is
+    none, or is open.
 
-    J = (0 1; -1 0) in blocks: the first half of the states are coordinates, the second their momenta.
+    J = (0 1; -1 0) in blocks: the first half of the states are coordinates, the second their
+    momenta.
     """
     V, n = own.V, own.V.shape[1]
     m = n // 2
     with np.errstate(all="ignore"):
         JV = np.concatenate([V[:, m:], -V[:, :m]], axis=1)
         form = (1j * (V.conj() * JV).sum(axis=1)).real
-        gap = abs(own.centre[:, :, None] - own.centre[:, None, :]) - own.radius[:, :, None] - own.radius[:, None, :]
+        gap = (
+            abs(own.centre[:, :, None] - own.centre[:, None, :])
+            - own.radius[:, :, None]
+            - own.radius[:, None, :]
+        )
         gap[:, np.arange(n), np.arange(n)] = np.inf
         # to first order the eigenvector i is off by sum over j of V_j coupling_ji / (l_i - l_j)
         mixed = np.swapaxes(own.coupling, 1, 2) / np.where(gap > 0, gap, 0.0)
@@ -240,13 +265,16 @@ def krein(own):
         size = np.swapaxes(abs(V), 1, 2)
         swapped = np.concatenate([size[:, :, m:], size[:, :, :m]], axis=2)
         other = np.concatenate([off[:, :, m:], off[:, :, :m]], axis=2)
-        doubt = (2.0 * off * swapped + off * other).sum(axis=2) * 1.5 + 8 * n * EPS * (size * swapped).sum(axis=2)
+        doubt = (2.0 * off * swapped + off * other).sum(axis=2) * 1.5 + 8 * n * EPS * (
+            size * swapped
+        ).sum(axis=2)
         sign = np.where(abs(form) > doubt, np.sign(form), 0.0)
     return np.where(own.on_circle, sign, 0.0).astype(np.int8)
 
 
 def clusters(own, which):
-    """Krein signs (N, n) of clusters of multipliers in symplectic systems, of the points `which`; 0 elsewhere.
+    """Krein signs (N, n) of clusters of multipliers in symplectic systems, of the points `which`; 0
+    elsewhere.
 
     A cluster is what discs that meet hold together. Where v* (i J) v has one sign on its invariant subspace, M is
     unitary there in that form: all of the cluster are on the unit circle, and stay there. With V the columns of the
@@ -273,8 +301,14 @@ def clusters(own, which):
             apart = gap - blocks[0] - blocks[3]
             if not apart > 0 or not apart**2 > 4.0 * blocks[1] * blocks[2]:
                 continue
-            x = 2.0 * blocks[2] / np.sqrt(apart**2 - 4.0 * blocks[1] * blocks[2]) if two.any() else 0.0
-            doubt = 2.0 * x * np.linalg.norm(form[np.ix_(one, two)]) + x * x * np.linalg.norm(form[np.ix_(two, two)])
+            x = (
+                2.0 * blocks[2] / np.sqrt(apart**2 - 4.0 * blocks[1] * blocks[2])
+                if two.any()
+                else 0.0
+            )
+            doubt = 2.0 * x * np.linalg.norm(form[np.ix_(one, two)]) + x * x * np.linalg.norm(
+                form[np.ix_(two, two)]
+            )
             doubt += 16 * n * EPS * np.linalg.norm(size) * (1.0 + x) ** 2
             if abs(inner).min() > 1.01 * doubt and (inner[0] > 0) == (inner[-1] > 0):
                 signs[p, one] = np.sign(inner[0])
@@ -284,8 +318,9 @@ def clusters(own, which):
 def crossing(own, verdict, paired, signs=None):
     """How stability is lost nearest, or has been lost (N).
 
-    Of multipliers all on the circle, by the shortest arc: to 1, to -1, or between two of opposite Krein sign (of
-    any two if `signs` is None). Otherwise by the leading multiplier, the one of the largest modulus.
+    Of multipliers all on the circle, by the shortest arc: to 1, to -1, or between two of opposite
+    Krein sign (of any two if `signs` is None). Otherwise by the leading multiplier, the one of the
+    largest modulus.
     """
     centre, bars = own.centre, own.bars
     N, n = centre.shape
@@ -302,7 +337,9 @@ def crossing(own, verdict, paired, signs=None):
         complex_ = abs(leader.imag) > bars[rows, lead]
         kind = np.where(leader.real > 0, PLUS_ONE, MINUS_ONE)
         # two pairs collide, and one is on the circle
-        kind = np.where(complex_, (COLLISION if n > 3 else UNDECIDED) if paired else NEIMARK_SACKER, kind)
+        kind = np.where(
+            complex_, (COLLISION if n > 3 else UNDECIDED) if paired else NEIMARK_SACKER, kind
+        )
         out[alone] = kind[alone]
     circle = (verdict == STABLE) & paired
     if not paired or not circle.any():
@@ -318,7 +355,11 @@ def crossing(own, verdict, paired, signs=None):
         may &= signs[circle][:, :, None] * signs[circle][:, None, :] < 0
     arcs = np.where(may, arcs, np.inf)
     least = [to_plus.min(axis=1), to_minus.min(axis=1), arcs.min(axis=(1, 2))]
-    doubt = [2 * arc_bar.max(axis=1), 2 * arc_bar.max(axis=1), np.where(may, pairs, 0).max(axis=(1, 2))]
+    doubt = [
+        2 * arc_bar.max(axis=1),
+        2 * arc_bar.max(axis=1),
+        np.where(may, pairs, 0).max(axis=(1, 2)),
+    ]
     least, doubt = np.array(least), np.array(doubt)
     first = least.argmin(axis=0)
     columns = np.arange(first.size)
@@ -330,10 +371,11 @@ def crossing(own, verdict, paired, signs=None):
 
 
 def by_determinant(own, centre, bars, growth):
-    """Centres and bars of multipliers where the smallest, if it is real, follows from the others by Liouville: the
-    product of all is exp(growth[0]), `growth` (2, N) with its error bound.
+    """Centres and bars of multipliers where the smallest, if it is real, follows from the others by
+    Liouville: the product of all is exp(growth[0]), `growth` (2, N) with its error bound.
 
-    Beside huge multipliers this tells far more of a small one than M does, whose errors are those of its largest entry.
+    Beside huge multipliers this tells far more of a small one than M does, whose errors are those
+    of its largest entry.
     """
     centre, bars, rows = centre.copy(), bars.copy(), np.arange(len(centre))
     with np.errstate(all="ignore"):
@@ -345,14 +387,23 @@ def by_determinant(own, centre, bars, growth):
         value = np.exp(growth[0]) / np.prod(others, axis=1).real
         rounding = 8 * (centre.shape[1] + 1) * EPS
         bar = abs(value) * (x / (1.0 - x) + np.expm1(growth[1]) + rounding) * (1.0 + x) + 1e-300
-        good = own.isolated.all(axis=1) & (centre[rows, least].imag == 0) & (x < 0.5) & (growth[1] < 0.5)
-        good &= (bar < bars[rows, least]) & (abs(value - centre[rows, least]) <= bar + bars[rows, least])
+        good = (
+            own.isolated.all(axis=1)
+            & (centre[rows, least].imag == 0)
+            & (x < 0.5)
+            & (growth[1] < 0.5)
+        )
+        good &= (bar < bars[rows, least]) & (
+            abs(value - centre[rows, least]) <= bar + bars[rows, least]
+        )
     centre[rows[good], least[good]], bars[rows[good], least[good]] = value[good], bar[good]
     return centre, bars
 
 
 def symmetric(own):
-    """Centres and bars of paired multipliers: those outside the circle, and their mirror images in it, exactly."""
+    """Centres and bars of paired multipliers: those outside the circle, and their mirror images in
+    it, exactly.
+    """
     centre, bars = own.centre.copy(), own.bars.copy()
     on = own.on_circle
     with np.errstate(all="ignore"):
@@ -366,8 +417,12 @@ def symmetric(own):
             j = np.where(np.isfinite(distance[:, i]), distance[:, i], np.inf).argmin(axis=1)
             ok = outside & (j != i) & own.isolated[rows, j] & (abs(centre[rows, j]) < 1)
             # |1 / (c + d) - 1 / c| <= r / (|c| (|c| - r))
-            bar = bars[:, i] / (abs(centre[:, i]) * (abs(centre[:, i]) - bars[:, i])) + 2 * EPS / abs(centre[:, i])
-            ok &= (abs(centre[:, i]) > 2 * bars[:, i]) & (distance[rows, i, j] <= bar + bars[rows, j])
+            bar = bars[:, i] / (
+                abs(centre[:, i]) * (abs(centre[:, i]) - bars[:, i])
+            ) + 2 * EPS / abs(centre[:, i])
+            ok &= (abs(centre[:, i]) > 2 * bars[:, i]) & (
+                distance[rows, i, j] <= bar + bars[rows, j]
+            )
             centre[rows[ok], j[ok]] = mirror[ok, i]
             bars[rows[ok], j[ok]] = bar[ok]
     return centre, bars

@@ -1,10 +1,12 @@
 """Curves of tongues that a lattice does not see, and of closed ones, from the Maslov index.
 
-On both sides of a tongue that is narrower than the cells of the lattice a function of `bifurcations` has the same sign,
-and no curve is found; but where its two edges count the same way, the index has changed by 2. Segments between points
-of the lattice along which curves do not explain how it changes are halved, by the index in between, until each of them
-is short. A closed tongue, or one that is narrower still, keeps both edges in one segment, and is drawn by two curves
-at the same place. Places on neighbouring lines of the lattice belong to one curve where the index takes the same step.
+On both sides of a tongue that is narrower than the cells of the lattice a function of
+`bifurcations` has the same sign, and no curve is found; but where its two edges count the same way,
+the index has changed by 2. Segments between points of the lattice along which curves do not explain
+how it changes are halved, by the index in between, until each of them is short. A closed tongue, or
+one that is narrower still, keeps both edges in one segment, and is drawn by two curves at the same
+place. Places on neighbouring lines of the lattice belong to one curve where the index takes the
+same step.
 """
 
 from collections import Counter
@@ -24,7 +26,9 @@ ASIDE = 2.0  # cells: how far a curve may go from line to line
 
 @dataclass
 class _Segments:
-    """Parts, between `ends` (S, 2), of the lattice's lines `line` (S), at whose ends the index is `index` (S, 2)."""
+    """Parts, between `ends` (S, 2), of the lattice's lines `line` (S), at whose ends the index is
+    `index` (S, 2).
+    """
 
     line: np.ndarray
     ends: np.ndarray
@@ -35,7 +39,9 @@ class _Segments:
 
     def joined(self, others):
         """These and the others."""
-        parts = ((getattr(one, name) for one in (self, *others)) for name in ("line", "ends", "index"))
+        parts = (
+            (getattr(one, name) for one in (self, *others)) for name in ("line", "ends", "index")
+        )
         return _Segments(*(np.concatenate(list(part)) for part in parts))
 
     def cut(self, at, index):
@@ -49,10 +55,11 @@ class _Segments:
 
 
 def curves(index, function, passed, kind, drawn):
-    """[(positions (m, 2), errors (m))] of curves of `kind` that are missing among those `drawn` [(kind, positions)].
+    """[(positions (m, 2), errors (m))] of curves of `kind` that are missing among those `drawn`
+    [(kind, positions)].
 
-    `index(positions (N, 2))` is the index, `passed` (n, n) its values on the lattice, and `function(positions)` that of
-    `bifurcations` with its bounds, which is 0 on the curves.
+    `index(positions (N, 2))` is the index, `passed` (n, n) its values on the lattice, and
+    `function(positions)` that of `bifurcations` with its bounds, which is 0 on the curves.
     """
     own, found = [one for one in drawn if one[0] == kind], []
     ticks = np.linspace(0.0, 1.0, len(passed))
@@ -61,13 +68,16 @@ def curves(index, function, passed, kind, drawn):
         lines = passed if axis == 1 else passed.T
         if found:  # along the one axis, which explains most of the other
             lost = _unexplained(passed, own)
-        where = np.array([segment[1:] for segment in lost if segment[0] == axis], int).reshape(-1, 3)
+        where = np.array([segment[1:] for segment in lost if segment[0] == axis], int).reshape(
+            -1, 3
+        )
         segments = _Segments(where[:, 0], ticks[where[:, 1:]], lines[where[:, :1], where[:, 1:]])
         segments = _shortened(index, segments, axis, ticks)
         if not segments.line.size:
             continue
         values, _bars = function(_positions(segments, axis, ticks))
-        segments = segments[abs(values) <= ZERO]  # the index of a system that jumps does so without a passage
+        # the index of a system that jumps does so without a passage
+        segments = segments[abs(values) <= ZERO]
         pieces = _linked(segments, axis, ticks)
         found += pieces
         own += [(kind, x) for x, _error in pieces]
@@ -75,8 +85,14 @@ def curves(index, function, passed, kind, drawn):
 
 
 def _unexplained(passed, own):
-    """The segments along which the index changes otherwise; the border's too, where no curve counts that ends there."""
-    return [segment for segment, explained in segments(passed, own, {}, border=0).items() if not explained]
+    """The segments along which the index changes otherwise; the border's too, where no curve counts
+    that ends there.
+    """
+    return [
+        segment
+        for segment, explained in segments(passed, own, {}, border=0).items()
+        if not explained
+    ]
 
 
 def _shortened(index, segments, axis, ticks):
@@ -109,7 +125,9 @@ def _positions(segments, axis, ticks):
 
 
 def _linked(segments, axis, ticks):
-    """[(positions (m, 2), errors (m))] of places on neighbouring lines at which the index takes the same step."""
+    """[(positions (m, 2), errors (m))] of places on neighbouring lines at which the index takes the
+    same step.
+    """
     middle, error = segments.ends.mean(axis=1), 0.5 * np.diff(segments.ends)[:, 0]
     low, number = segments.index.min(axis=1), abs(np.diff(segments.index))[:, 0]
     number[error > SURE] = 0
@@ -126,4 +144,7 @@ def _linked(segments, axis, ticks):
             pieces.append([i])
     pieces = [piece for piece in pieces if len(piece) > 1]
     places = [np.stack([middle[piece], ticks[line[piece]]], axis=1) for piece in pieces]
-    return [(x if axis == 0 else x[:, ::-1].copy(), error[piece]) for x, piece in zip(places, pieces, strict=True)]
+    return [
+        (x if axis == 0 else x[:, ::-1].copy(), error[piece])
+        for x, piece in zip(places, pieces, strict=True)
+    ]

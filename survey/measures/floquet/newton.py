@@ -1,4 +1,5 @@
-"""Newton's method for x(T) = x(0), damped, or for half an orbit (`symmetry`); see `measures.floquet.orbit`.
+"""Newton's method for x(T) = x(0), damped, or for half an orbit (`symmetry`); see
+`measures.floquet.orbit`.
 
 Source: P. Deuflhard, Newton Methods for Nonlinear Problems (2004), 3.3.
 """
@@ -9,13 +10,16 @@ import numpy as np
 
 from survey.measures.floquet import monodromy
 
-MOST_RELAXED, RELAXED_RTOL = 10_000, 1e-10  # steps of the long time before an orbit, and their accuracy
+# steps of the long time before an orbit, and their accuracy
+MOST_RELAXED, RELAXED_RTOL = 10_000, 1e-10
 TRIALS, LEAST_DAMPING = 40, 1e-4
 CONVERGED = 1e-8  # relative: the last step, whose square is beyond float64
-ROUGH_REACH, ROUGH, ROUGHLY = 2.0, 1e-9, 1e-5  # until the last step is so small, the flow needs less accuracy
+# until the last step is so small, the flow needs less accuracy
+ROUGH_REACH, ROUGH, ROUGHLY = 2.0, 1e-9, 1e-5
 FARTHEST = 0.2  # a step of it, relative to the orbit and the period
 ACROSS = 0.1  # how fast the plane is passed, relative to the start: equilibria are no orbits
-RELAXED, RETURN, NEAR = 32.0, 3.0, 0.2  # periods; the time in which an orbit comes back; how near, relative to it
+# periods; the time in which an orbit comes back; how near, relative to it
+RELAXED, RETURN, NEAR = 32.0, 3.0, 0.2
 
 
 def chosen(numbers, those):
@@ -25,8 +29,8 @@ def chosen(numbers, those):
 
 @dataclass
 class Located:
-    """Orbits by Newton's method: states and periods, the points and normals of their planes (normals only where T is
-    unknown), the largest moduli of the states, and numbers of steps.
+    """Orbits by Newton's method: states and periods, the points and normals of their planes
+    (normals only where T is unknown), the largest moduli of the states, and numbers of steps.
     """
 
     x: np.ndarray
@@ -38,20 +42,25 @@ class Located:
 
 
 def located(equation, points, reach, x, T, relax=True):
-    """Located orbits at the points (N, parameters), and the numbers of those that are found, beginning at x (N, n), T.
+    """Located orbits at the points (N, parameters), and the numbers of those that are found,
+    beginning at x (N, n), T.
 
-    With `relax`, those that are not found are looked for again from the state after a long time, unless these orbits
-    are symmetric, as those of conservative systems, which attract nothing.
+    With `relax`, those that are not found are looked for again from the state after a long time,
+    unless these orbits are symmetric, as those of conservative systems, which attract nothing.
     """
     found = Located(*(np.full(np.shape(a), np.nan) for a in (x, T, x, x, x)), np.zeros(len(x), int))
     good = [np.zeros(0, int)]
-    usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0) & np.isfinite(T))
+    usable = np.flatnonzero(
+        np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0) & np.isfinite(T)
+    )
     for inside, programs in equation.traced(points[usable], x[usable]):
         own = usable[inside]
         orbits = Newton(programs, programs.numbers(points[own]), reach, x[own], T[own], equation)
         those = orbits.solve()
         if relax and equation.symmetry is None:
-            those = np.sort(np.concatenate([those, orbits.again(np.setdiff1d(np.arange(own.size), those))]))
+            those = np.sort(
+                np.concatenate([those, orbits.again(np.setdiff1d(np.arange(own.size), those))])
+            )
         found.x[own], found.T[own], found.guess[own] = orbits.x, orbits.T, orbits.guess
         if equation.free:
             found.phase[own] = orbits.phase
@@ -78,7 +87,9 @@ class Newton:
         span = RELAXED * self.period[those]
         # the same whatever accuracy is asked: the plane in which an orbit begins rests on it
         reach = monodromy.method_of("auto").floquet_reach(RELAXED_RTOL)
-        x = self.programs.flow(numbers, self.guess[those], span, reach, derived=False, most=MOST_RELAXED)[0]
+        x = self.programs.flow(
+            numbers, self.guess[those], span, reach, derived=False, most=MOST_RELAXED
+        )[0]
         T = self.period[those].copy()
         there = np.flatnonzero(np.isfinite(x).all(axis=1))
         if free and there.size:
@@ -86,7 +97,9 @@ class Newton:
             there = there[np.isfinite(T[there])]
         if not there.size:
             return those[:0]
-        other = Newton(self.programs, chosen(numbers, there), self.reach, x[there], T[there], self.equation)
+        other = Newton(
+            self.programs, chosen(numbers, there), self.reach, x[there], T[there], self.equation
+        )
         found, to = other.solve(), those[there]
         for name in ("x", "T", "guess", *(("phase",) if free else ())):
             getattr(self, name)[to[found]] = getattr(other, name)[found]
@@ -96,7 +109,9 @@ class Newton:
         """When the motions from x (N, n) first come back near x, from behind; NaN: not in RETURN T."""
         steps = self.programs.flow(numbers, x, RETURN * T, self.reach, derived=False)[3]
         first = np.concatenate([[0], np.cumsum(steps)])
-        _X, begin, _length, series = self.programs.flow(numbers, x, RETURN * T, self.reach, False, first)
+        _X, begin, _length, series = self.programs.flow(
+            numbers, x, RETURN * T, self.reach, False, first
+        )
         f, found = self.programs.slopes(numbers, np.zeros(len(x)), x)[0], np.full(len(x), np.nan)
         for i in range(len(x)):
             t, states = begin[first[i] : first[i + 1]], series[first[i] : first[i + 1], :, 0]
@@ -111,7 +126,9 @@ class Newton:
 
     def solve(self):
         """The points where it converges; their x and T are the orbit's, nearly."""
-        near = self._solve(np.arange(len(self.x)), {"reach": ROUGH_REACH, "tolerance": ROUGH}, ROUGHLY)
+        near = self._solve(
+            np.arange(len(self.x)), {"reach": ROUGH_REACH, "tolerance": ROUGH}, ROUGHLY
+        )
         return self._solve(near, {"reach": self.reach}, CONVERGED)
 
     def _solve(self, those, how, converged):
@@ -132,13 +149,19 @@ class Newton:
                 live = live[~done]
             if not live.size:
                 break
-            damping[live] = np.minimum(damping[live], FARTHEST / self._norm(step[live], size[live], live))
+            damping[live] = np.minimum(
+                damping[live], FARTHEST / self._norm(step[live], size[live], live)
+            )
             x, T = self._moved(live, damping[live, None] * step[live])
             new, new_inverse, new_size = self._linearised(live, x, T, how)
             with np.errstate(all="ignore"):
                 simplified = -applied(inverse[live], new)
-                ratio = self._norm(simplified, size[live], live) / self._norm(step[live], size[live], live)
-                better = (ratio <= 1.0 - 0.5 * damping[live]) & np.isfinite(new_inverse).all(axis=(1, 2))
+                ratio = self._norm(simplified, size[live], live) / self._norm(
+                    step[live], size[live], live
+                )
+                better = (ratio <= 1.0 - 0.5 * damping[live]) & np.isfinite(new_inverse).all(
+                    axis=(1, 2)
+                )
             took = live[better]
             self.x[took], self.T[took] = x[better], T[better]
             inverse[took], size[took] = new_inverse[better], new_size[better]
@@ -163,10 +186,17 @@ class Newton:
         X, M, size, _steps = self.programs.flow(numbers, x, self.equation.share * T, **how)
         value, slope = X - x, M - np.eye(n)
         if self.phase is not None:
-            f, c, guess = self.programs.slopes(numbers, T, X)[0], self.phase[those], self.guess[those]
+            f, c, guess = (
+                self.programs.slopes(numbers, T, X)[0],
+                self.phase[those],
+                self.guess[those],
+            )
             if self.equation.symmetry is None:
                 plane = (c * (x - guess)).sum(axis=1)
-                value, slope = np.concatenate([value, plane[:, None]], axis=1), bordered(slope, f, c)
+                value, slope = (
+                    np.concatenate([value, plane[:, None]], axis=1),
+                    bordered(slope, f, c),
+                )
             else:
                 value, slope = self.equation.symmetry.linearised(X, M, f, x, guess)
             size = np.concatenate([size, T[:, None]], axis=1)

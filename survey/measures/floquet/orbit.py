@@ -1,9 +1,11 @@
-"""Periodic orbits of x' = f(t, x, p), and their stability: states at t = 0, periods, multipliers, verdicts.
+"""Periodic orbits of x' = f(t, x, p), and their stability: states at t = 0, periods, multipliers,
+verdicts.
 
-Newton's method on x(T) - x(0) = 0, damped, from `start`; the derivative M = dx(T)/dx(0) is the monodromy matrix. Where
-f does not depend on t, T is unknown too, and x(0) stays in the plane through the start that f is normal to there.
-Where it does not converge, it begins again from the state RELAXED periods later, on the attracting orbit perhaps.
-Orbits are shown to exist, and bounds made of all outputs, by `existence`.
+Newton's method on x(T) - x(0) = 0, damped, from `start`; the derivative M = dx(T)/dx(0) is the
+monodromy matrix. Where f does not depend on t, T is unknown too, and x(0) stays in the plane
+through the start that f is normal to there. Where it does not converge, it begins again from the
+state RELAXED periods later, on the attracting orbit perhaps. Orbits are shown to exist, and bounds
+made of all outputs, by `existence`.
 """
 
 from dataclasses import replace
@@ -33,20 +35,24 @@ OUTPUTS = (
     *(o for o in stability.OUTPUTS if o.name not in {"period", *stability.SYMPLECTIC}),
 )
 
-NUMBER = Output("orbits", "number of periodic orbits that are found and shown to exist", integer=True)
+NUMBER = Output(
+    "orbits", "number of periodic orbits that are found and shown to exist", integer=True
+)
 
 
 def solve(equation, points, method, rtol, wanted):
     """The wanted outputs of the points (N, parameters), each with `_error` if it is a float, and `status`."""
     method = monodromy.method_of(method)
     parts = [
-        _chunk(equation, points[i : i + CHUNK], method, rtol, wanted) for i in range(0, max(len(points), 1), CHUNK)
+        _chunk(equation, points[i : i + CHUNK], method, rtol, wanted)
+        for i in range(0, max(len(points), 1), CHUNK)
     ]
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def solve_branches(equation, points, branch, continued, method, rtol, wanted):
-    """As `solve`, for the orbit number `branch` (N) of each point, among those on the curves of `continued`.
+    """As `solve`, for the orbit number `branch` (N) of each point, among those on the curves of
+    `continued`.
 
     They are numbered by the mean squares of their states, and where these are the same, by x0.
     """
@@ -60,7 +66,9 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
         for i in range(0, len(where), CHUNK):
             own = where[i : i + CHUNK]
             period = T[i : i + CHUNK] if equation.free else equation.periods(different[own])
-            found = shown(equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False)
+            found = shown(
+                equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False
+            )
             for k in np.flatnonzero(found.good):
                 of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
             full = np.ones(len(own), bool)
@@ -74,7 +82,9 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
         if abs(number) <= len(order[k]):
             pick[i] = order[k][number - (number > 0)]
     out = {name: values[pick] for name, values in out.items()}
-    out["status"] = np.where(known, out["status"], status.INVALID_PARAMETERS).astype(out["status"].dtype)
+    out["status"] = np.where(known, out["status"], status.INVALID_PARAMETERS).astype(
+        out["status"].dtype
+    )
     if NUMBER.name in wanted:
         out[NUMBER.name] = np.full(len(points), NUMBER.fill)
         out[NUMBER.name][known] = np.array([len(one) for one in order], int)[place]
@@ -82,8 +92,9 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
 
 
 def followed(equation, continued, points, reach):
-    """Orbits at `points` (N, parameters), by following them along `continued`: (numbers of the points, states, periods)
-    of some of the points at a time. A point may have several, and one of them more than once.
+    """Orbits at `points` (N, parameters), by following them along `continued`: (numbers of the
+    points, states, periods) of some of the points at a time. A point may have several, and one of
+    them more than once.
     """
     others = points.copy()
     others[:, continued.index] = 0.0
@@ -103,13 +114,21 @@ def followed(equation, continued, points, reach):
 
 
 def numbered(orbits, free):
-    """The numbers of different orbits, by the mean squares of their states, then x0, from (square, x0, T, number)."""
+    """The numbers of different orbits, by the mean squares of their states, then x0, from (square,
+    x0, T, number).
+    """
     kept = []
     for one in sorted(orbits):
         size = SAME * one[0] ** 0.5
-        same = (abs(np.subtract(one[1], other[1])).max() <= size for other in kept if _near(one[0], other[0]))
+        same = (
+            abs(np.subtract(one[1], other[1])).max() <= size
+            for other in kept
+            if _near(one[0], other[0])
+        )
         if free:
-            same = (abs(one[2] - other[2]) <= SAME * one[2] for other in kept if _near(one[0], other[0]))
+            same = (
+                abs(one[2] - other[2]) <= SAME * one[2] for other in kept if _near(one[0], other[0])
+            )
         if not any(same):
             kept.append(one)
     for i in range(1, len(kept)):
@@ -148,7 +167,9 @@ def shown(equation, points, guess, period, method, rtol, relax=True):
 def _show(found, equation, points, orbits, good, method, reach, finer=False):
     """Put the orbits, of the points `good`, that are shown to exist into `found`."""
     n, symmetry = equation.n, equation.symmetry
-    certified = existence.certified if symmetry is None else partial(shooting.certified, symmetry=symmetry)
+    certified = (
+        existence.certified if symmetry is None else partial(shooting.certified, symmetry=symmetry)
+    )
     for inside, programs in equation.traced(points[good], orbits.guess[good]):
         own = good[inside]
         numbers = programs.numbers(points[own])
@@ -161,11 +182,18 @@ def _show(found, equation, points, orbits, good, method, reach, finer=False):
             if some.size:
                 those = own[some]
                 plane = (orbits.phase[those], orbits.guess[those]) if equation.free else None
-                near = programs, chosen(numbers, some), orbits.x[those], equation.share * orbits.T[those]
+                near = (
+                    programs,
+                    chosen(numbers, some),
+                    orbits.x[those],
+                    equation.share * orbits.T[those],
+                )
                 if hasattr(method, "orbit_motion"):
                     shown = recomputed(*near, plane, orbits.steps[those], method, symmetry)
                 else:
-                    shown = certified(*near, orbits.guess[those], plane, orbits.steps[those], method, reach)
+                    shown = certified(
+                        *near, orbits.guess[those], plane, orbits.steps[those], method, reach
+                    )
                 found.put(those, shown)
 
 
@@ -181,7 +209,9 @@ class Found:
         n, m = equation.n, equation.judged
         self.structure = "none" if equation.symmetry is None else "reversible"
         self.good, self.square = np.zeros(N, bool), np.full(N, np.nan)
-        self.x, self.dx, self.T, self.dT = (np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N))
+        self.x, self.dx, self.T, self.dT = (
+            np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N)
+        )
         self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
 
     def put(self, points, shown):
@@ -200,12 +230,17 @@ class Found:
         answer = stability.assess(matrices, self.structure, rtol, wanted)
         answer.status[~self.good] = NO_ORBIT
         answer.status[~known] = status.INVALID_PARAMETERS
-        answer.verdict[~self.good], answer.crossing[~self.good] = stability.UNDECIDED, stability.UNDECIDED
+        answer.verdict[~self.good], answer.crossing[~self.good] = (
+            stability.UNDECIDED,
+            stability.UNDECIDED,
+        )
         out = stability.outputs(answer, matrices, self.T, computed, wanted)
         ok = answer.status == status.OK
         if "exponent" in wanted:
             with np.errstate(invalid="ignore"):
-                out["exponent_error"] = out["exponent_error"] + abs(out["exponent"]) * 1.01 * self.dT / self.T
+                out["exponent_error"] = (
+                    out["exponent_error"] + abs(out["exponent"]) * 1.01 * self.dT / self.T
+                )
         own = {"x0": self.x, "x0_error": self.dx, "period": self.T, "period_error": self.dT}
         own |= {"monodromy": self.M[:, 0], "monodromy_error": self.M[:, 1]}
         for name, values in own.items():

@@ -1,15 +1,18 @@
-"""The curves that [boundaries] draws on a map of periodic orbits: where a multiplier of an orbit is on the unit circle.
+"""The curves that [boundaries] draws on a map of periodic orbits: where a multiplier of an orbit is
+on the unit circle.
 
     plus_one        a fold of orbits
     minus_one       period doubling
     neimark_sacker  a complex pair
 
-Orbits are followed along ROWS lines of the map each way (`continuation`); on a line along another parameter than that
-of the continuation, from the orbits that this gives at nine places. Where det(M - 1), det(M + 1) or the product
-of all l_i l_j - 1 changes its sign there, Newton's method on the equations of `critical` finds the orbit that has the
-multiplier, and the curve is followed from it in the space of all unknowns, in which folds of orbits and cusps of their
-curves are nothing special. Every point that is kept is shown to exist, with bounds of its parameters
-(`critical_points`). Curves that none of the lines meets are not found. Curves belong to all orbits that are followed.
+Orbits are followed along ROWS lines of the map each way (`continuation`); on a line along another
+parameter than that of the continuation, from the orbits that this gives at nine places. Where det(M
+- 1), det(M + 1) or the product of all l_i l_j - 1 changes its sign there, Newton's method on the
+equations of `critical` finds the orbit that has the multiplier, and the curve is followed from it
+in the space of all unknowns, in which folds of orbits and cusps of their curves are nothing
+special. Every point that is kept is shown to exist, with bounds of its parameters
+(`critical_points`). Curves that none of the lines meets are not found. Curves belong to all orbits
+that are followed.
 """
 
 from itertools import product
@@ -36,7 +39,9 @@ NOISE, EDGE = 1e-7, 1e-9  # of M's entries; of the map
 
 
 def searched(scene, square, axes, fixed):
-    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves; see `curves.searched`."""
+    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves; see
+    `curves.searched`.
+    """
     names = [p.name for p in scene.own]
     varied = [names.index(name) for name in axes if name in names]
     given = np.array([fixed.get(name, np.nan) for name in names])
@@ -67,18 +72,30 @@ class _Map:
         self.equation, self.square, self.varied, self.given = equation, square, list(varied), given
         self.continued, self.reach = continued, monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
-        self.kinds = [How(kind) for kind in KINDS if kind != NEIMARK_SACKER or equation.n - equation.free > 1]
+        self.kinds = [
+            How(kind) for kind in KINDS if kind != NEIMARK_SACKER or equation.n - equation.free > 1
+        ]
         if self.mirror is not None:
             more = ((PLUS_ONE, False), (PLUS_ONE, True), (NEIMARK_SACKER, False))
-            self.kinds = [*(How(kind, self.mirror, branching) for kind, branching in more), *self.kinds]
+            self.kinds = [
+                *(How(kind, self.mirror, branching) for kind, branching in more),
+                *self.kinds,
+            ]
             self.kinds.sort(key=lambda how: how.kind != NEIMARK_SACKER)
 
     def points(self, how):
         """Points of the orbits that have a multiplier in this way."""
         if how not in self._points:
-            low, high, log = (one[: len(self.varied)] for one in (self.square.low, self.square.high, self.square.log))
-            scale = np.where(log, np.log(np.where(log, high, 1.0) / np.where(log, low, 1.0)), high - low)
-            self._points[how] = Points(Critical.of(self.equation, self.varied, *how), self.given, scale, log)
+            low, high, log = (
+                one[: len(self.varied)]
+                for one in (self.square.low, self.square.high, self.square.log)
+            )
+            scale = np.where(
+                log, np.log(np.where(log, high, 1.0) / np.where(log, low, 1.0)), high - low
+            )
+            self._points[how] = Points(
+                Critical.of(self.equation, self.varied, *how), self.given, scale, log
+            )
         return self._points[how]
 
     def positions(self, y):
@@ -114,9 +131,13 @@ class _Map:
                 yield from self._of_curve(curves, row, curve.finer(FINER), axis)
 
     def _continued(self, points):
-        """[(states, periods)] of the first, second, ... orbits at points (N, parameters), by the continuation."""
+        """[(states, periods)] of the first, second, ... orbits at points (N, parameters), by the
+        continuation.
+        """
         curves, n = Curves(self.equation, self.continued, points, self.reach), self.equation.n
-        found = [curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)]
+        found = [
+            curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)
+        ]
         for i in range(max(len(T) for _x, T in found)):
             some = [k for k, (_x, T) in enumerate(found) if i < len(T)]
             x, T = np.full((len(points), n), np.nan), np.full(len(points), np.nan)
@@ -153,14 +174,20 @@ class _Map:
         if self.mirror is None:
             return np.zeros(len(x), bool)
         half, _M, size = rough_flow(self.equation, points, x, 0.5 * T, derived=False)
-        return (abs(half - np.array(self.mirror) * x) <= OWN_IMAGE * size.max(axis=1, keepdims=True)).all(axis=1)
+        return (
+            abs(half - np.array(self.mirror) * x) <= OWN_IMAGE * size.max(axis=1, keepdims=True)
+        ).all(axis=1)
 
     def _located(self, how, start, held):
-        """Orbits y with the multiplier near these, at the same parameter number `held` of the map; those on the map."""
+        """Orbits y with the multiplier near these, at the same parameter number `held` of the map;
+        those on the map.
+        """
         points = self.points(how)
         rows, goal = np.zeros((len(start), 0, start.shape[1])), np.zeros((len(start), 0))
         if len(self.varied) > 1:
-            rows, goal = points.held(start, np.full(len(start), points.critical.parameters_at + held))
+            rows, goal = points.held(
+                start, np.full(len(start), points.critical.parameters_at + held)
+            )
         found, good = points.solved(start, rows, goal)
         with np.errstate(invalid="ignore"):
             here = self.positions(found)
@@ -190,9 +217,14 @@ class _Map:
                 if not np.isfinite(away[best]):
                     continue
                 z = vectors[:, best]
-                y[k, n : 3 * n], y[k, own.angle_at] = np.concatenate([z.real, z.imag]), np.angle(values[best])
+                y[k, n : 3 * n], y[k, own.angle_at] = (
+                    np.concatenate([z.real, z.imag]),
+                    np.angle(values[best]),
+                )
             else:
-                matrix = M[k] + (1.0 if how.kind == MINUS_ONE or how.branching else -1.0) * np.eye(n)
+                matrix = M[k] + (1.0 if how.kind == MINUS_ONE or how.branching else -1.0) * np.eye(
+                    n
+                )
                 if own.drifts:
                     matrix = bordered(matrix[None], f[k : k + 1], f[k : k + 1])[0]
                 vector = np.linalg.svd(matrix)[2][-1]
@@ -204,15 +236,23 @@ class _Map:
 
     def at_ends(self, how):
         """The Hows whose curves may pass the ends of those of `how`, complex pairs that meet."""
-        return [other for other in self.kinds if other.mirror == how.mirror] if how.kind == NEIMARK_SACKER else []
+        return (
+            [other for other in self.kinds if other.mirror == how.mirror]
+            if how.kind == NEIMARK_SACKER
+            else []
+        )
 
     def beside(self, points, y, how):
-        """Orbits y of the kind `how` next to the ends of a curve of complex pairs, which meet at 1 or at -1."""
+        """Orbits y of the kind `how` next to the ends of a curve of complex pairs, which meet at 1
+        or at -1.
+        """
         if how.kind == NEIMARK_SACKER:
             return []
         own, goal = points.critical, np.pi if how.kind == MINUS_ONE or how.branching else 0.0
         ends = y[[0, -1]]
-        ends = ends[abs(abs((ends[:, own.angle_at] - goal + np.pi) % (2 * np.pi) - np.pi)) < 1.5 * NEAREST]
+        ends = ends[
+            abs(abs((ends[:, own.angle_at] - goal + np.pi) % (2 * np.pi) - np.pi)) < 1.5 * NEAREST
+        ]
         if not len(ends):
             return []
         parameters, n = points.parameters(ends), self.equation.n
@@ -221,7 +261,9 @@ class _Map:
         return [one for held in (0, 1) for one in self._located(how, start, held)]
 
     def followed(self, points, seeds):
-        """[(y (m, size), places (m) of parameters at the map's border or -1)] of the curves through the seeds."""
+        """[(y (m, size), places (m) of parameters at the map's border or -1)] of the curves through
+        the seeds.
+        """
         if len(self.varied) < 2:
             return [(one[None], np.full(1, -1)) for one in seeds]
         curves = []
@@ -239,7 +281,10 @@ class _Map:
         y, n = np.array(seeds), own.n
         parameters = points.parameters(y)
         T = y[:, own.period_at] if own.free else self.equation.periods(parameters)
-        y[:, :n] = np.array(self.mirror) * rough_flow(self.equation, parameters, y[:, :n], 0.5 * T, derived=False)[0]
+        y[:, :n] = (
+            np.array(self.mirror)
+            * rough_flow(self.equation, parameters, y[:, :n], 0.5 * T, derived=False)[0]
+        )
         return y
 
     def _passes(self, points, y, seed):
@@ -248,7 +293,9 @@ class _Map:
             return False
         x, at = self.positions(y), self.positions(seed[None])[0]
         chord = np.diff(x, axis=0)
-        share = ((at - x[:-1]) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), 1e-300)
+        share = ((at - x[:-1]) * chord).sum(axis=1) / np.maximum(
+            (chord * chord).sum(axis=1), 1e-300
+        )
         share = np.clip(share, 0.0, 1.0)[:, None]
         off = abs(x[:-1] + share * chord - at).max(axis=1)
         own = y[:-1] + share * np.diff(y, axis=0)
@@ -257,11 +304,15 @@ class _Map:
             T = points.critical.period_at
             alike = abs(own[:, T] - seed[T]) <= ALIKE * seed[T]
         else:
-            alike = (abs(own[:, :n] - seed[:n]) <= ALIKE * floored(abs(y[:, :n]).max(axis=0)[None])).all(axis=1)
+            alike = (
+                abs(own[:, :n] - seed[:n]) <= ALIKE * floored(abs(y[:, :n]).max(axis=0)[None])
+            ).all(axis=1)
         return bool(((off < SAME) & alike).any())
 
     def shown(self, points, y, border):
-        """[(class, parameters, errors, {name: (values, errors)})] of the parts of a curve that are shown to exist."""
+        """[(class, parameters, errors, {name: (values, errors)})] of the parts of a curve that are
+        shown to exist.
+        """
         own, N = points.critical, len(y)
         last = own.parameters_at
         if len(self.varied) > 1:
@@ -282,12 +333,18 @@ class _Map:
         places = np.arange(N), 1 - held
         beside[places] += shown.dy[np.arange(N), np.minimum(last + 1 - held, own.size - 1)]
         with np.errstate(all="ignore"):
-            error = abs(self.square.positions(beside) - self.square.positions(parameters)).max(axis=1) * (1 + 1e-9)
+            error = abs(self.square.positions(beside) - self.square.positions(parameters)).max(
+                axis=1
+            ) * (1 + 1e-9)
         angle, bar, outside = self._passing(points, y, shown)
         shown.good &= np.isfinite(error)
         found = []
         least = 1 if len(self.varied) < 2 else 2
-        for part in contours.runs(shown.good) if least > 1 else [np.array([k]) for k in np.flatnonzero(shown.good)]:
+        for part in (
+            contours.runs(shown.good)
+            if least > 1
+            else [np.array([k]) for k in np.flatnonzero(shown.good)]
+        ):
             known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
             found.append((own.kind, parameters[part], error[part] + self.square.grain, known))
         return found
@@ -319,7 +376,9 @@ def square_of(M, E):
 
 
 def mirror_of(equation, square, varied, given):
-    """The signs S (n), not all 1, for which f(t + T/2, S x) = S f(t, x) as far as it is tried; None: there are none."""
+    """The signs S (n), not all 1, for which f(t + T/2, S x) = S f(t, x) as far as it is tried;
+    None: there are none.
+    """
     n = equation.n
     if n > MOST_SIGNS:
         return None
@@ -366,7 +425,9 @@ def _tests(M):
     if n > 1:
         multipliers = np.linalg.eigvals(own)
         first, second = np.triu_indices(n, 1)
-        values[NEIMARK_SACKER] = (multipliers[:, first] * multipliers[:, second] - 1.0).prod(axis=1).real
+        values[NEIMARK_SACKER] = (
+            (multipliers[:, first] * multipliers[:, second] - 1.0).prod(axis=1).real
+        )
     found = {kind: np.full(N, np.nan) for kind in values}
     for kind, own in values.items():
         found[kind][good] = own

@@ -1,18 +1,21 @@
-"""How fast A(t) varies where a few samples cannot tell: spikes, whose tails underflow in the series of other steps.
+"""How fast A(t) varies where a few samples cannot tell: spikes, whose tails underflow in the series
+of other steps.
 
-A step's Taylor series sees a pole from afar, but not exp(-x^2) from x = 10 on, nor cos^200 at its zeros. So basis
-functions that may hide such a spike are sampled densely; products of a few sines and cosines of lines cannot.
+A step's Taylor series sees a pole from afar, but not exp(-x^2) from x = 10 on, nor cos^200 at its
+zeros. So basis functions that may hide such a spike are sampled densely; products of a few sines
+and cosines of lines cannot.
 """
 
 import numpy as np
 
 from survey.kernels.floquet import program as pg
 
-# The width at half height, as a share of the period, from which a spike is seen; Chebyshev points of each piece, which
-# lie closer than that; and those when a scene is checked.
+# The width at half height, as a share of the period, from which a spike is seen; Chebyshev points
+# of each piece, which lie closer than that; and those when a scene is checked.
 WIDTH, NUMBER, CHECKED = 1 / 128, 256, 16384
 WAVES = tuple(pg.CODES[name] + pg.OF_LINE for name in ("sin", "cos"))
-SIMPLE = 4  # sines and cosines of lines, multiplied with each other: their series of order 16 show them
+# sines and cosines of lines, multiplied with each other: their series of order 16 show them
+SIMPLE = 4
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
 AT_ONCE = 64  # points that are sampled together: their arrays stay in the cache
 HARMLESS = 1e-16  # what an entry of A, in balanced units, may change by over a piece
@@ -27,7 +30,9 @@ def suspects(program):
         if place not in degree:
             code, a, b, first, last = program.operations[place]
             if code == pg.COMBINATION:
-                degree[place] = max((visit(int(k)) for k in program.inside[first:last, 0]), default=0)
+                degree[place] = max(
+                    (visit(int(k)) for k in program.inside[first:last, 0]), default=0
+                )
             elif code == pg.PRODUCT:
                 degree[place] = visit(int(a)) + visit(int(b))
             else:
@@ -39,8 +44,8 @@ def suspects(program):
 
 
 def rates(program, numbers, low, high, scale, number=NUMBER):
-    """As `kernels.floquet.sizes.measure`, of each suspect between `low` and `high` (N, 1): (suspects, N), NaN where not
-    finite. `scale` (N, n) are the units of the states that balance A.
+    """As `kernels.floquet.sizes.measure`, of each suspect between `low` and `high` (N, 1):
+    (suspects, N), NaN where not finite. `scale` (N, n) are the units of the states that balance A.
     """
     places = suspects(program)
     if not places:
@@ -60,7 +65,10 @@ def _rates(program, places, numbers, low, high, scale, number):
     t = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * (np.arange(number) + 0.5) / number))
     found = np.zeros((len(places), len(scale)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, places)):
-        c = abs(np.fft.rfft(np.concatenate([values, values[:, ::-1]], axis=1), axis=1)[:, :number]) / number
+        c = (
+            abs(np.fft.rfft(np.concatenate([values, values[:, ::-1]], axis=1), axis=1)[:, :number])
+            / number
+        )
         terms = program.terms[program.terms[:, pg.BASIS] == places[k]]
         with np.errstate(all="ignore"):
             share = c / c.max(axis=1, keepdims=True)
@@ -68,7 +76,9 @@ def _rates(program, places, numbers, low, high, scale, number):
             entries = abs(numbers[0][:, terms[:, pg.NUMBER]] * ratio)
             counts = (share > RESOLVED) & (c > bars.max(axis=1, keepdims=True))
             counts &= c * entries.max(axis=1, keepdims=True) * (high - low) > HARMLESS
-            rate = 2.0 * np.where(counts, np.arange(number) / (1.0 - np.log(share)), 0.0).max(axis=1)
+            rate = 2.0 * np.where(counts, np.arange(number) / (1.0 - np.log(share)), 0.0).max(
+                axis=1
+            )
         found[k] = np.where(np.isfinite(c).all(axis=1), rate, np.nan)
     return found
 
@@ -76,7 +86,11 @@ def _rates(program, places, numbers, low, high, scale, number):
 def combined(few, *given):
     """The rates (N) by a few samples, or those by many where these are much higher; `given` as `rates`."""
     many = rates(*given)
-    return np.where(many > SEEN * few, many, few + 0.0 * many).max(axis=0, initial=0.0) if len(many) else few
+    return (
+        np.where(many > SEEN * few, many, few + 0.0 * many).max(axis=0, initial=0.0)
+        if len(many)
+        else few
+    )
 
 
 def spikes(points):
@@ -86,12 +100,17 @@ def spikes(points):
         own = group.own
         scale = points.scale[own]
         for piece, program in enumerate(group.programs):
-            given = program.numbers(points.points[own]), *(points.edges[own, k, None] for k in (piece, piece + 1))
+            given = (
+                program.numbers(points.points[own]),
+                *(points.edges[own, k, None] for k in (piece, piece + 1)),
+            )
             one, fine = (rates(program, *given, scale, number) for number in (NUMBER, CHECKED))
             t = given[1] + (given[2] - given[1]) * (np.arange(CHECKED) + 0.5) / CHECKED
             for k, (values, _bars) in enumerate(_values(program, given[0], t, suspects(program))):
                 hidden = np.flatnonzero(fine[k] > SEEN * np.maximum(one[k], 2.0))
-                found[own[hidden]] = t[hidden, 3 + abs(np.diff(values[hidden], 6, axis=1)).argmax(axis=1)]
+                found[own[hidden]] = t[
+                    hidden, 3 + abs(np.diff(values[hidden], 6, axis=1)).argmax(axis=1)
+                ]
     return found
 
 

@@ -1,9 +1,10 @@
-"""Periodic orbits and their monodromy matrices a second way, with estimates of errors: for methods that offer
-`orbit_motion`, as `survey verify` asks for one.
+"""Periodic orbits and their monodromy matrices a second way, with estimates of errors: for methods
+that offer `orbit_motion`, as `survey verify` asks for one.
 
-The state and the variational equation are integrated together over the period, in equal steps, and in twice as many;
-the difference estimates the error. What x(T) - x(0) leaves, times the inverse of dx(T)/dx(0) - 1, is how far the orbit
-is; M is taken to change with it as with a shift by SHIFT of each state.
+The state and the variational equation are integrated together over the period, in equal steps, and
+in twice as many; the difference estimates the error. What x(T) - x(0) leaves, times the inverse of
+dx(T)/dx(0) - 1, is how far the orbit is; M is taken to change with it as with a shift by SHIFT of
+each state.
 """
 
 import numpy as np
@@ -36,7 +37,12 @@ def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
             f_end = programs.slopes(numbers, T, X)[0]
             value, slope = symmetry.linearised(X, M, 2.0 * f_end, x, x)
             # these states are 0 at the end, where rounding of others on the way has grown
-            grown = ROUNDINGS * EPS * (count[:, None] + abs(M).sum(axis=2)) * abs(X).max(axis=1, keepdims=True)
+            grown = (
+                ROUNDINGS
+                * EPS
+                * (count[:, None] + abs(M).sum(axis=2))
+                * abs(X).max(axis=1, keepdims=True)
+            )
             off = np.zeros((N, n + 1))
             off[:, : symmetry.ends.size] = (dX + grown)[:, symmetry.ends]
         elif plane is not None:
@@ -51,7 +57,9 @@ def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
         dx, dT = away[:, :n], away[:, n] if plane is not None else 4 * EPS * T
         E = dM + moved * dx.max(axis=1)[:, None, None]
         late = np.zeros(N) if plane is None else dT
-        at_end = programs.along(programs.A, numbers, T[:, None], X[:, :, None], np.zeros((N, n, 1)))[0][:, 0]
+        at_end = programs.along(
+            programs.A, numbers, T[:, None], X[:, :, None], np.zeros((N, n, 1))
+        )[0][:, 0]
         E = E + late[:, None, None] * _product(abs(at_end), abs(M))
         judged, bounds = M, E
         if plane is not None:
@@ -74,6 +82,11 @@ def _product(A, B):
 
 def _motion(method, programs, numbers, x, T, steps):
     X, M, A = np.empty_like(x), np.empty((*x.shape, x.shape[1])), programs.A
-    given = np.ascontiguousarray(numbers[0]), programs.places, np.ascontiguousarray(x), np.ascontiguousarray(T)
+    given = (
+        np.ascontiguousarray(numbers[0]),
+        programs.places,
+        np.ascontiguousarray(x),
+        np.ascontiguousarray(T),
+    )
     method.orbit_motion(A.operations, A.signs, A.inside, A.order, A.terms, *given, steps, X, M)
     return X, M

@@ -1,10 +1,12 @@
-"""Do the curves that are found explain how many multipliers are outside the unit circle, all over the map?
+"""Do the curves that are found explain how many multipliers are outside the unit circle, all over
+the map?
 
-This number is certain at most points of the lattice that was searched. It changes by what passes the circle: a real
-multiplier counts for 1, a complex pair for 2, and of a symplectic or reversible system a pair at 1 or -1 for 1, and two
-pairs that collide for 2 (see `segments`). Of symplectic systems the Maslov index (see `maslov`) counts passages of 1
-and of -1 with their signs, whatever the other multipliers do: both edges of a tongue between two points show, where
-they count the same way.
+This number is certain at most points of the lattice that was searched. It changes by what passes
+the circle: a real multiplier counts for 1, a complex pair for 2, and of a symplectic or reversible
+system a pair at 1 or -1 for 1, and two pairs that collide for 2 (see `segments`). Of symplectic
+systems the Maslov index (see `maslov`) counts passages of 1 and of -1 with their signs, whatever
+the other multipliers do: both edges of a tongue between two points show, where they count the same
+way.
 """
 
 import numpy as np
@@ -33,12 +35,14 @@ def outside(M, E, structure):
 
 
 def unexplained(counts, curves, passed=None):
-    """(segments that are not explained, all) of a map, from the `counts` (n, n) at the points of a lattice over the
-    unit square, -1 where not known, and the curves [(kind, positions (m, 2))]; `passed` {kind: (n, n)} are the Maslov
-    indices of those kinds that have one.
+    """(segments that are not explained, all) of a map, from the `counts` (n, n) at the points of a
+    lattice over the unit square, -1 where not known, and the curves [(kind, positions (m, 2))];
+    `passed` {kind: (n, n)} are the Maslov indices of those kinds that have one.
     """
     all_of = segments(np.where(counts >= 0, counts, UNKNOWN), curves, WEIGHTS)
     for kind, index in (passed or {}).items():
-        for segment, explained in segments(index, [one for one in curves if one[0] == kind], {}).items():
+        for segment, explained in segments(
+            index, [one for one in curves if one[0] == kind], {}
+        ).items():
             all_of[segment] = all_of.get(segment, True) and explained
     return sum(not explained for explained in all_of.values()), len(all_of)

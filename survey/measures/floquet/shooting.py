@@ -1,18 +1,20 @@
-"""That a symmetric periodic orbit exists near a computed one, by multiple shooting; its bounds and its multipliers.
+"""That a symmetric periodic orbit exists near a computed one, by multiple shooting; its bounds and
+its multipliers.
 
-As in `existence`, X(t) is the Taylor series of all steps along half of the orbit (see `symmetry`). Here the states at
-the beginnings of shots, of some steps each, are unknown, beside the time: with F_k the propagators of the shots, and G
-the inverse of the linear equations x_k+1 = F_k x_k with their conditions at both ends, a box of deviations is mapped
-into itself if
+As in `existence`, X(t) is the Taylor series of all steps along half of the orbit (see `symmetry`).
+Here the states at the beginnings of shots, of some steps each, are unknown, beside the time: with
+F_k the propagators of the shots, and G the inverse of the linear equations x_k+1 = F_k x_k with
+their conditions at both ends, a box of deviations is mapped into itself if
 
     |G| (defects of X + what F_k does not tell of deviations in the box) <= the box,
 
-and so holds an orbit (Brouwer; Krawczyk). Errors travel no farther than a shot before G, which bounds the deviations at
-all times, carries them: a growth by thousands over the period counts as little as it matters. What is no strict bound
-is told in `existence`, whose series and bounds are used.
+and so holds an orbit (Brouwer; Krawczyk). Errors travel no farther than a shot before G, which
+bounds the deviations at all times, carries them: a growth by thousands over the period counts as
+little as it matters. What is no strict bound is told in `existence`, whose series and bounds are
+used.
 
-Sources: R. Krawczyk, Computing 4 (1969) 187; H. B. Keller, Numerical Methods for Two-Point Boundary-Value Problems
-(1968), 2.
+Sources: R. Krawczyk, Computing 4 (1969) 187; H. B. Keller, Numerical Methods for Two-Point
+Boundary-Value Problems (1968), 2.
 """
 
 import numpy as np
@@ -29,7 +31,9 @@ SURE = 1e-2  # of 1 - B W, in the maximum norm
 
 
 def certified(programs, numbers, x, T, guess, plane, counts, method, reach, symmetry):
-    """As `existence.certified`: Shown, of symmetric orbits near x (N, n), half of whose period is near T (N)."""
+    """As `existence.certified`: Shown, of symmetric orbits near x (N, n), half of whose period is
+    near T (N).
+    """
     with np.errstate(all="ignore"):
         path = Path(programs, numbers, x, T, counts, reach)
         path.propagate(method)
@@ -51,7 +55,9 @@ class _Half:
         ends, unknown = symmetry.ends, symmetry.unknown
         # a defect early in a step grows until its end
         delta = path.defect / s[point]
-        self.delta = delta + np.expm1(path.h * path.norm)[:, None] * delta.max(axis=1, keepdims=True)
+        self.delta = delta + np.expm1(path.h * path.norm)[:, None] * delta.max(
+            axis=1, keepdims=True
+        )
         self.delta[:, list(symmetry.transverse)] = 0.0
         self._cut()
         M, E, R = np.empty((3, N, n, n))
@@ -59,11 +65,15 @@ class _Half:
         self.f_end = path.f_end / s
         self.fastest = abs(self.f_end).max(axis=1)
         self.unit = 1.0 / self.fastest  # of T
-        W = np.concatenate([M[:, ends[:, None], unknown], (self.f_end * self.unit[:, None])[:, ends, None]], axis=2)
+        W = np.concatenate(
+            [M[:, ends[:, None], unknown], (self.f_end * self.unit[:, None])[:, ends, None]], axis=2
+        )
         B = inverse(W)
         m = len(ends)
         off = abs(product(B, W) - np.eye(m)) + (m + 4) * EPS * product(abs(B), abs(W))
-        off = off + product(abs(B), np.concatenate([R[:, ends[:, None], unknown], np.zeros((N, m, 1))], axis=2))
+        off = off + product(
+            abs(B), np.concatenate([R[:, ends[:, None], unknown], np.zeros((N, m, 1))], axis=2)
+        )
         self.lost = off.sum(axis=2).max(axis=1)
         self.back = np.zeros((N, n + 1, m))
         self.back[:, unknown], self.back[:, n] = B[:, :-1], B[:, -1]
@@ -71,7 +81,9 @@ class _Half:
         self.dT = 4 * EPS * T
 
     def _cut(self):
-        """Join steps to shots: `cuts`, their first steps, `first`, the orbits' first shots, and their propagators."""
+        """Join steps to shots: `cuts`, their first steps, `first`, the orbits' first shots, and
+        their propagators.
+        """
         path, n = self.path, self.path.n
         growth = path.h * path.norm
         before = np.cumsum(growth) - growth
@@ -86,16 +98,20 @@ class _Half:
         self.rounding = R.sum(axis=2)
 
     def _responses(self, delta, at_end, around):
-        """Bounds of the deviations at the steps' beginnings and at the end, and of the time, from their sources.
+        """Bounds of the deviations at the steps' beginnings and at the end, and of the time, from
+        their sources.
 
-        `around` bounds the deviations at the shots' beginnings for what rounds the shots' propagators.
+        `around` bounds the deviations at the shots' beginnings for what rounds the shots'
+        propagators.
         """
         path, N, last_steps = self.path, len(self.x), self.cuts[1:] - 1
         wide, off = np.empty((2, *delta.shape))
         spread(path.F, np.ascontiguousarray(delta), self.cuts, wide, off)
         states, last, late = np.empty((len(self.F), path.n)), np.empty_like(self.x), np.empty(N)
         own = off[last_steps] + self.rounding * around[:, None]
-        responses(self.F, own, self.first, self.back, self.symmetry.ends, at_end, states, last, late)
+        responses(
+            self.F, own, self.first, self.back, self.symmetry.ends, at_end, states, last, late
+        )
         more = np.where(self.lost < SURE, 1.0 + 2.0 * self.lost, np.inf)
         states = states * more[path.point[self.cuts[:-1]], None]
         begins = np.empty(delta.shape)
@@ -122,12 +138,23 @@ class _Half:
         doubt = path.doubt * (error / path.error)
         second = np.repeat((error * begins)[:, None], self.x.shape[1], axis=1)
         second[:, transverse] = 0.0
-        moved = shift * a_end * WIDER * (last.max(axis=1) + shift * self.fastest) + shift * 4 * EPS * self.fastest
-        states_2, last_2, late_2 = self._responses(self.delta + second, at_end + moved[:, None], begins[self.cuts[:-1]])
+        moved = (
+            shift * a_end * WIDER * (last.max(axis=1) + shift * self.fastest)
+            + shift * 4 * EPS * self.fastest
+        )
+        states_2, last_2, late_2 = self._responses(
+            self.delta + second, at_end + moved[:, None], begins[self.cuts[:-1]]
+        )
         inside = (states_2 <= states).all(axis=1)
-        good = np.logical_and.reduceat(inside, path.first[:-1]) & (last_2 <= last).all(axis=1) & (late_2 <= late)
+        good = (
+            np.logical_and.reduceat(inside, path.first[:-1])
+            & (last_2 <= last).all(axis=1)
+            & (late_2 <= late)
+        )
         good &= ~symmetry.couples(path.largest)
-        return self._shown(good, states_2[path.first[:-1]], self.dT + late_2 * self.unit, error, doubt, a_end)
+        return self._shown(
+            good, states_2[path.first[:-1]], self.dT + late_2 * self.unit, error, doubt, a_end
+        )
 
     def _shown(self, good, start, dT, error, doubt, a_end):
         path, symmetry, s = self.path, self.symmetry, self.path.scale
@@ -139,7 +166,11 @@ class _Half:
         f, df = f / s, (WIDER * df + 8 * EPS * abs(f)) / s
         late = WIDER * dT * a_end
         M, E = self._product(path.F, error, doubt, late)
-        own = (M, E) if not symmetry.transverse else self._product(symmetry.block(path.F), error, doubt, late)
+        own = (
+            (M, E)
+            if not symmetry.transverse
+            else self._product(symmetry.block(path.F), error, doubt, late)
+        )
         good = good & np.isfinite(E).all(axis=(1, 2))
         M, E, others = symmetry.matrices(M, E, f, df, *own)
         back = s[:, :, None] / s[:, None, :]

@@ -1,8 +1,9 @@
-"""Floquet's question: is x' = A(t) x stable? Multipliers, spectral radius, verdict, and how stability is lost.
+"""Floquet's question: is x' = A(t) x stable? Multipliers, spectral radius, verdict, and how
+stability is lost.
 
 stable      asymptotically: every multiplier is certainly inside the unit circle; for symplectic and reversible systems
-            strongly: they are on the circle, and simple or, where they meet, of one Krein sign, and stay there when
-            the system is changed a little within its kind
+            strongly: they are on the circle, and simple or, where they meet, of one Krein sign, and
+            stay there when the system is changed a little within its kind
 unstable    one is certainly outside
 undecided   the error bounds allow either
 """
@@ -51,16 +52,19 @@ OUTPUTS = (
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
     *maslov.OUTPUTS,
 )  # fmt: skip
-SYMPLECTIC = frozenset(["krein", *(o.name for o in maslov.OUTPUTS)])  # outputs of symplectic systems alone
+# outputs of symplectic systems alone
+SYMPLECTIC = frozenset(["krein", *(o.name for o in maslov.OUTPUTS)])
 # Factors of the number of steps; from the second on, errors are carried sharply.
 LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
 def assess(matrices, structure, rtol, asked, period=None, growth=None):
-    """The Answers of points from their Matrices; `asked` holds the names of the outputs that are wanted.
+    """The Answers of points from their Matrices; `asked` holds the names of the outputs that are
+    wanted.
 
-    `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of `monodromy.Points`.
+    `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of
+    `monodromy.Points`.
     """
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
@@ -77,7 +81,9 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     signs = multipliers.krein(discs) if structure == "symplectic" else None
     if signs is not None:
         together = multipliers.clusters(discs, np.flatnonzero(found.verdict == UNDECIDED))
-        found.verdict[(together.any(axis=1)) & (discs.on_circle | (together != 0)).all(axis=1)] = STABLE
+        found.verdict[(together.any(axis=1)) & (discs.on_circle | (together != 0)).all(axis=1)] = (
+            STABLE
+        )
         signs = np.where(together != 0, together, signs).astype(np.int8)
     found.crossing = multipliers.crossing(discs, found.verdict, paired, signs)
     if signs is not None:
@@ -126,14 +132,19 @@ def wide_exponents(answer, period, rtol):
 
 
 def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=None):
-    """The wanted outputs of the points (..., parameters), each with `_error` if it is a float, and `status`.
+    """The wanted outputs of the points (..., parameters), each with `_error` if it is a float, and
+    `status`.
 
-    `lines`: of parameters that have an axis of a map of their own, {number of the parameter: (points of the axis,
-    least, greatest)}; `ranges`: where no parameter has one, of those that vary from point to point.
+    `lines`: of parameters that have an axis of a map of their own, {number of the parameter:
+    (points of the axis, least, greatest)}; `ranges`: where no parameter has one, of those that vary
+    from point to point.
     """
     n, shape = system.n, points.shape[:-1]
     flat = points.reshape(-1, points.shape[-1])
-    counted, wanted = [o.name for o in maslov.OUTPUTS if o.name in wanted], wanted - {o.name for o in maslov.OUTPUTS}
+    counted, wanted = (
+        [o.name for o in maslov.OUTPUTS if o.name in wanted],
+        wanted - {o.name for o in maslov.OUTPUTS},
+    )
     answer, left = Answers(len(flat), system.judged), np.arange(len(flat))
     results = monodromy.Matrices.empty(len(flat) if "monodromy" in wanted else 0, n)
     period = system.periods(flat) if wanted & {"period", "exponent"} else None
@@ -153,10 +164,16 @@ def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=No
         _solve_some(system, structure, flat[some], method, rtol, wanted, some, answer, results)
     out = outputs(answer, results, period, callable(system.period), wanted)
     if counted:
-        parts = [maslov.indices(system, flat[i : i + chunk]) for i in range(0, max(len(flat), 1), chunk)]
+        parts = [
+            maslov.indices(system, flat[i : i + chunk]) for i in range(0, max(len(flat), 1), chunk)
+        ]
         indices = zip((o.name for o in maslov.OUTPUTS), np.concatenate(parts, axis=1), strict=True)
         ok = answer.status == status.OK
-        out |= {name: np.where(ok, values, maslov.UNKNOWN) for name, values in indices if name in counted}
+        out |= {
+            name: np.where(ok, values, maslov.UNKNOWN)
+            for name, values in indices
+            if name in counted
+        }
     return {name: values.reshape(*shape, *values.shape[1:]) for name, values in out.items()}
 
 
@@ -166,7 +183,9 @@ def judged(system, points, matrices):
         return matrices
     w = system.weights(points)
     # w is an eigenvector of the transposed matrix
-    M, E = deflated(np.swapaxes(matrices.M, 1, 2), np.swapaxes(matrices.E, 1, 2), w, np.zeros_like(w))
+    M, E = deflated(
+        np.swapaxes(matrices.M, 1, 2), np.swapaxes(matrices.E, 1, 2), w, np.zeros_like(w)
+    )
     return monodromy.Matrices.plain(*(np.ascontiguousarray(np.swapaxes(X, 1, 2)) for X in (M, E)))
 
 
@@ -174,7 +193,9 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
     """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
     # another method is asked to answer a second way: without what symmetries tell
     paired = structure != "none"
-    points = monodromy.Points(system, given, halves=method is monodromy.method_of("auto"), paired=paired)
+    points = monodromy.Points(
+        system, given, halves=method is monodromy.method_of("auto"), paired=paired
+    )
     where = np.flatnonzero(points.valid)
     asked = wanted | ({"multiplier_re"} if wanted & {"multiplier_im", "krein"} else set())
     asked |= {"spectral_radius"} if "exponent" in wanted else set()
@@ -188,12 +209,18 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
         own = where[those]
         broken = structure == "symplectic" and multipliers.not_symplectic(found.M, found.E)
         if system.conserved is not None:
-            broken = broken | multipliers.not_conserved(system.weights(given[own]), found.M, found.E)
+            broken = broken | multipliers.not_conserved(
+                system.weights(given[own]), found.M, found.E
+            )
         found = judged(system, given[own], found)
         out = assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
         if np.any(broken):  # what is said of A is not true here: nothing follows from it
             out.status[broken], out.missed[broken] = status.INVALID_PARAMETERS, False
-            out.verdict[broken], out.crossing[broken], out.signs[:, broken] = UNDECIDED, UNDECIDED, 0
+            out.verdict[broken], out.crossing[broken], out.signs[:, broken] = (
+                UNDECIDED,
+                UNDECIDED,
+                0,
+            )
         return out
 
     if where.size:
@@ -205,14 +232,18 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
         if len(results.M):
             results[places[where]] = own
     lost = ~points.valid
-    answer.status[places[lost]] = np.where(points.rough[lost], status.NO_CONVERGENCE, status.INVALID_PARAMETERS)
+    answer.status[places[lost]] = np.where(
+        points.rough[lost], status.NO_CONVERGENCE, status.INVALID_PARAMETERS
+    )
     for name in ("verdict", "crossing"):
         getattr(answer, name)[places[lost]] = UNDECIDED
     answer.signs[:, places[lost]] = 0
 
 
 def outputs(answer, results, period, computed, wanted):
-    """The wanted outputs from the Answers and the Matrices; `period` (N), `computed` from parameters or not."""
+    """The wanted outputs from the Answers and the Matrices; `period` (N), `computed` from
+    parameters or not.
+    """
     n = answer.n
     ok = answer.status == status.OK
     answer.floats[:, ~ok] = np.nan

@@ -1,6 +1,8 @@
-"""The surfaces that [boundaries] draws in a box of three parameters: where multipliers reach or leave the unit circle.
+"""The surfaces that [boundaries] draws in a box of three parameters: where multipliers reach or
+leave the unit circle.
 
-They are zeros of the functions of `bifurcations`, as the curves on maps of two parameters are (see `curves`).
+They are zeros of the functions of `bifurcations`, as the curves on maps of two parameters are (see
+`curves`).
 """
 
 from survey.measures.floquet import bifurcations, curves
@@ -36,7 +38,9 @@ class Functions:
 
     def passing(self, x, kind):
         """(is it this that passes?, {name of ALONG: (values, error bounds)}) at zeros of a class."""
-        sure, angle, bar, outside = bifurcations.passing(*self.matrices(x, self.rtol), kind, self.structure)
+        sure, angle, bar, outside = bifurcations.passing(
+            *self.matrices(x, self.rtol), kind, self.structure
+        )
         return sure, {"angle": (angle, bar), "outside": (outside, 0.0 * bar)}
 
     def _of(self, M):

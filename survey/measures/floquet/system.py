@@ -1,7 +1,8 @@
-"""A user's linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0, as programs of its pieces.
+"""A user's linear periodic system x' = A(t, p) x, or M q'' + C q' + K q = 0, as programs of its
+pieces.
 
-With M, C, K the states are (q, q'), or, if the system is symplectic, (q, M q' + C q / 2), M and C constant in t: then
-J A is symmetric where M and K are, C is antisymmetric.
+With M, C, K the states are (q, q'), or, if the system is symplectic, (q, M q' + C q / 2), M and C
+constant in t: then J A is symmetric where M and K are, C is antisymmetric.
 """
 
 import threading
@@ -31,10 +32,11 @@ class Raised(Exception):
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """n states; `matrices` {"A"} or {"M", "C", "K"} (M, C optional): functions of t, p and out, the matrix to fill.
+    """n states; `matrices` {"A"} or {"M", "C", "K"} (M, C optional): functions of t, p and out, the
+    matrix to fill.
 
-    `period` and `breaks` are values, or functions of p; so is `conserved`, if given: w (n), where w x is the same a
-    period later. Its multiplier, 1, is not judged.
+    `period` and `breaks` are values, or functions of p; so is `conserved`, if given: w (n), where w
+    x is the same a period later. Its multiplier, 1, is not judged.
     """
 
     matrices: dict
@@ -68,7 +70,9 @@ class System:
         return not callable(self.period) and not callable(self.breaks)
 
     def ranges(self, points):
-        """Period (N) and the edges of the pieces (N, P + 1), the last one repeated where a point has fewer."""
+        """Period (N) and the edges of the pieces (N, P + 1), the last one repeated where a point
+        has fewer.
+        """
         each = points[:1] if self.same_ranges else points
         period = self.periods(each)
         if not callable(self.breaks) and not np.size(self.breaks):
@@ -80,8 +84,12 @@ class System:
             inside = np.unique(inside[(inside > 0) & (inside < length)])
             rows.append([0.0, *inside, length])
         most = max(map(len, rows), default=2)
-        edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(len(rows), most)
-        return np.broadcast_to(period, len(points)).copy(), np.broadcast_to(edges, (len(points), most)).copy()
+        edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(
+            len(rows), most
+        )
+        return np.broadcast_to(period, len(points)).copy(), np.broadcast_to(
+            edges, (len(points), most)
+        ).copy()
 
     def periods(self, points):
         """The period of each point (N); NaN where it is not positive."""
@@ -128,7 +136,8 @@ class System:
             raise Raised(f"{name}(p)") from error
 
     def traced(self, points, edges):
-        """[(indices, [program of each piece])] of the points (N, parameters); raises Unsupported or Raised.
+        """[(indices, [program of each piece])] of the points (N, parameters); raises Unsupported or
+        Raised.
 
         Points in no group, whose branches change within a piece, are rough.
         """
@@ -185,14 +194,24 @@ class System:
         except Unsupported as error:
             raise Unsupported(f"{name}(t, p, out): {error}", error.remedy) from None
         except ArithmeticError as error:
-            raise Unsupported(f"{name}(t, p, out): {error}, while its operations are recorded") from None
+            raise Unsupported(
+                f"{name}(t, p, out): {error}, while its operations are recorded"
+            ) from None
         except Exception as error:
             raise Raised(f"{name}(t, p, out)") from error
         if out.shape != (size, size):
             what = f"{name}(t, p, out) returns an array of shape {out.shape}, not {(size, size)}"
             raise Unsupported(what, "fill the entries of out, and return nothing")
-        entries = {(i, j): graph.entry(out[i, j], f"{name}(t, p, out)") for i in range(size) for j in range(size)}
-        return {at: out[at] for at, x in entries.items() if isinstance(out[at], Symbol) or x.value != 0.0}
+        entries = {
+            (i, j): graph.entry(out[i, j], f"{name}(t, p, out)")
+            for i in range(size)
+            for j in range(size)
+        }
+        return {
+            at: out[at]
+            for at, x in entries.items()
+            if isinstance(out[at], Symbol) or x.value != 0.0
+        }
 
     def _of_second_order(self, graph):
         """The entries of A from those of M, C and K."""
@@ -204,13 +223,20 @@ class System:
             entries = {(i, m + i): 1.0 for i in range(m)}
             sides = [[*K[i], *C[i]] for i in range(m)]
             sides = solved(dense(given["M"], m), sides, graph) if "M" in given else sides
-            filled = {(m + i, j): -x for i, row in enumerate(sides) for j, x in enumerate(row) if not _is_zero(x)}
+            filled = {
+                (m + i, j): -x
+                for i, row in enumerate(sides)
+                for j, x in enumerate(row)
+                if not _is_zero(x)
+            }
             return entries | filled
         inverse = solved(dense(given["M"], m), identity(m), graph) if "M" in given else identity(m)
         for name in "MC":
             if any(isinstance(x, Symbol) and not x.is_number for x in given.get(name, {}).values()):
                 what = f"{name}(t, p, out) depends on t, so that the momenta are not M q' + C q / 2"
-                raise Unsupported(what, "give A(t, p, out) in place of the matrices, or set STRUCTURE = 'none'")
+                raise Unsupported(
+                    what, "give A(t, p, out) in place of the matrices, or set STRUCTURE = 'none'"
+                )
         half = [[0.5 * x for x in row] for row in C]
         velocity = times(inverse, half, m)  # q' = M^-1 (p - C q / 2)
         for (i, j), value in velocity.items():
@@ -247,7 +273,11 @@ def times(left, right, m):
     found = {}
     for i in range(m):
         for j in range(m):
-            terms = [left[i][k] * right[k][j] for k in range(m) if not (_is_zero(left[i][k]) or _is_zero(right[k][j]))]
+            terms = [
+                left[i][k] * right[k][j]
+                for k in range(m)
+                if not (_is_zero(left[i][k]) or _is_zero(right[k][j]))
+            ]
             if terms:
                 total = terms[0]
                 for term in terms[1:]:
@@ -259,8 +289,8 @@ def times(left, right, m):
 def solved(rows, sides, graph):
     """The rows of X where M X = sides, by elimination; M is given by its rows.
 
-    Pivots are not small at the example, constants rather than functions of t, and of those that fill in least: what is
-    eliminated is made of series, and each product costs.
+    Pivots are not small at the example, constants rather than functions of t, and of those that
+    fill in least: what is eliminated is made of series, and each product costs.
     """
     m = len(rows)
     work, sides = [list(row) for row in rows], [list(row) for row in sides]
@@ -308,6 +338,7 @@ def _pivot(work, left, columns, graph):
             found.append((varies, (in_row[i] - 1) * (in_column[j] - 1), -size[i, j], i, j))
     if not found:
         raise Unsupported(
-            "M(t, p, out) is singular", "give every coordinate a mass, or leave M out: it is the identity"
+            "M(t, p, out) is singular",
+            "give every coordinate a mass, or leave M out: it is the identity",
         )
     return min(found)[3:]

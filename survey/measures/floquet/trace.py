@@ -1,16 +1,19 @@
-"""A user's A(t, p) as a sum of few functions of t, found by running it once on symbols instead of numbers.
+"""A user's A(t, p) as a sum of few functions of t, found by running it once on symbols instead of
+numbers.
 
     A_ij(t, p) = sum over terms of number(p) * basis(t, p)
 
-A *number* depends on the parameters alone, and is computed for all points at once; a *basis* function depends on t, and
-is a power series in each step: a `Graph` records how both follow from the parameters and from t. What depends on t must
-be analytic: + - * / ** and FUNCTIONS. Branches are followed as they go at one example point; each comparison that
-decided one becomes a *guard*, and other points for which a guard decides otherwise are traced on their own.
+A *number* depends on the parameters alone, and is computed for all points at once; a *basis*
+function depends on t, and is a power series in each step: a `Graph` records how both follow from
+the parameters and from t. What depends on t must be analytic: + - * / ** and FUNCTIONS. Branches
+are followed as they go at one example point; each comparison that decided one becomes a *guard*,
+and other points for which a guard decides otherwise are traced on their own.
 
-The states x of a nonlinear system x' = f(t, x, p) are basis functions, too, whose series follow from that of f; the
-derivatives of f by them are those of the recorded operations.
+The states x of a nonlinear system x' = f(t, x, p) are basis functions, too, whose series follow
+from that of f; the derivatives of f by them are those of the recorded operations.
 
-Numbers in the code are taken as exact binary64 numbers. With every value goes a bound of its rounding error.
+Numbers in the code are taken as exact binary64 numbers. With every value goes a bound of its
+rounding error.
 """
 
 import builtins
@@ -38,7 +41,9 @@ DISPATCHER = type(fresh(lambda: None))
 class Unsupported(Exception):
     """The function cannot be traced; says why, and what to do."""
 
-    def __init__(self, why, remedy="use + - * / ** and functions such as sin, exp, sqrt of math or numpy"):
+    def __init__(
+        self, why, remedy="use + - * / ** and functions such as sin, exp, sqrt of math or numpy"
+    ):
         super().__init__(why)
         self.remedy = remedy
 
@@ -82,7 +87,13 @@ SLOPES = {
     "erf": lambda x, y: call("exp", -(x * x)) * (2 / math.sqrt(math.pi)),
 }
 # Functions whose derivatives are each other's or their own, with the sign.
-COUPLED = {"sin": ("cos", 1.0), "cos": ("sin", -1.0), "sinh": ("cosh", 1.0), "cosh": ("sinh", 1.0), "exp": ("exp", 1.0)}
+COUPLED = {
+    "sin": ("cos", 1.0),
+    "cos": ("sin", -1.0),
+    "sinh": ("cosh", 1.0),
+    "cosh": ("sinh", 1.0),
+    "exp": ("exp", 1.0),
+}
 ACCURATE = ("sin", "cos", "exp", "log", "sqrt")  # rounded to 1 ulp
 NUMPY = {
     np.arcsin: "asin", np.arccos: "acos", np.arctan: "atan", np.arcsinh: "asinh", np.arccosh: "acosh",
@@ -103,7 +114,9 @@ OTHERS = {
     "fmod": lambda x, y: x - y * (1 if x * y > 0 else -1) * math.floor(abs(x / y)),
     "copysign": lambda x, y: abs(x) if y >= 0 else -abs(x),
     "atan2": lambda y, x: _atan2(y, x),
-    "cbrt": lambda x: call("exp", call("log", x) / 3) if x > 0 else -call("exp", call("log", -x) / 3),
+    "cbrt": lambda x: (
+        call("exp", call("log", x) / 3) if x > 0 else -call("exp", call("log", -x) / 3)
+    ),
 }
 UFUNCS = {
     "add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv,
@@ -134,7 +147,9 @@ def call(name, *given):
 
 
 class Symbol:
-    """A value that depends on t or on parameters: {basis: number} of a graph, and its value at the example."""
+    """A value that depends on t or on parameters: {basis: number} of a graph, and its value at the
+    example.
+    """
 
     def __init__(self, graph, terms, value):
         self.graph, self.terms, self.value = graph, terms, value
@@ -229,14 +244,20 @@ class Symbol:
     __hash__ = None
 
     def __float__(self):
-        raise Unsupported("it needs the value of t or of a parameter (float, int, or an array without dtype=object)")
+        raise Unsupported(
+            "it needs the value of t or of a parameter (float, int, or an array without dtype=object)"
+        )
 
     __int__ = __index__ = __complex__ = __float__
 
     def __array_ufunc__(self, ufunc, method, *given, **keywords):
         if any(isinstance(x, np.ndarray) for x in given):
             given = [np.array(x, dtype=object) if isinstance(x, Symbol) else x for x in given]
-            return getattr(ufunc, method)(*given, **keywords) if method == "__call__" else NotImplemented
+            return (
+                getattr(ufunc, method)(*given, **keywords)
+                if method == "__call__"
+                else NotImplemented
+            )
         given = [x.item() if isinstance(x, np.generic) else x for x in given]
         name = NUMPY.get(ufunc, ufunc.__name__)
         if method == "__call__" and name in UFUNCS:
@@ -245,10 +266,17 @@ class Symbol:
 
     def __getattr__(self, name):
         # numpy calls x.sin() of the objects in an array
-        if name in FUNCTIONS or name in OTHERS or name in UFUNCS or name in ("arcsin", "arccos", "arctan"):
+        if (
+            name in FUNCTIONS
+            or name in OTHERS
+            or name in UFUNCS
+            or name in ("arcsin", "arccos", "arctan")
+        ):
             ufunc = getattr(np, name, None)
             return lambda *more: (
-                UFUNCS[name](self, *more) if name in UFUNCS else call(NUMPY.get(ufunc, name), self, *more)
+                UFUNCS[name](self, *more)
+                if name in UFUNCS
+                else call(NUMPY.get(ufunc, name), self, *more)
             )
         raise AttributeError(name)
 
@@ -260,7 +288,8 @@ def _value(x):
 class Graph:
     """How numbers follow from the parameters, and basis functions from t.
 
-    `numbers` are tuples (operation, operands ...), `series` too; `guards` are (symbol, is it positive?).
+    `numbers` are tuples (operation, operands ...), `series` too; `guards` are (symbol, is it
+    positive?).
     """
 
     def __init__(self, point, time):
@@ -270,7 +299,9 @@ class Graph:
         self.shared = [True, True]  # does the basis function depend on t alone?
         self.flow = {}  # the symbol of f for the basis function that is its state
         self._slopes = {}
-        self.parameters = [self.symbol(self.number("parameter", k), value) for k, value in enumerate(point)]
+        self.parameters = [
+            self.symbol(self.number("parameter", k), value) for k, value in enumerate(point)
+        ]
         self.time = Symbol(self, {TIME: self.constant(1.0)}, time)
 
     def state(self, number, value):
@@ -292,7 +323,9 @@ class Graph:
     def number(self, operation, *operands):
         """The place of this number: the same for the same operation; constants are folded."""
         key = (operation, *operands)
-        if operation not in ("constant", "parameter") and all(self.is_constant(k) for k in operands):
+        if operation not in ("constant", "parameter") and all(
+            self.is_constant(k) for k in operands
+        ):
             folded = self._folded(operation, [self.numbers[k][1] for k in operands])
             if folded is not None:
                 return folded
@@ -307,7 +340,9 @@ class Graph:
         """The constant of an operation on constants, where it is exact."""
         exact = {
             "add": lambda x, y: x + y if x + y - x == y and x + y - y == x else None,
-            "multiply": lambda x, y: x * y if abs(x) in (0.0, 1.0) or abs(y) in (0.0, 1.0, 2.0, 0.5) else None,
+            "multiply": lambda x, y: (
+                x * y if abs(x) in (0.0, 1.0) or abs(y) in (0.0, 1.0, 2.0, 0.5) else None
+            ),
         }
         value = exact[operation](*values) if operation in exact else None
         return None if value is None or not math.isfinite(value) else self.constant(value)
@@ -321,7 +356,9 @@ class Graph:
             self._series_places[key] = len(self.series)
             self.series.append(key)
             if operation == "combination":
-                self.shared.append(all(self.shared[b] and self.is_constant(c) for b, c in operands[0]))
+                self.shared.append(
+                    all(self.shared[b] and self.is_constant(c) for b, c in operands[0])
+                )
             elif operation == "state":
                 self.shared.append(False)
             else:
@@ -349,14 +386,18 @@ class Graph:
         try:
             return self.lift(x)
         except Unsupported as error:
-            raise Unsupported(f"an entry that {call} fills in is no number: {error}", "give one number each") from None
+            raise Unsupported(
+                f"an entry that {call} fills in is no number: {error}", "give one number each"
+            ) from None
 
     def sum(self, x, y):
         """x + y."""
         x, y = self.lift(x), self.lift(y)
         terms = dict(x.terms)
         for basis, number in y.terms.items():
-            terms[basis] = self.number("add", *sorted((terms[basis], number))) if basis in terms else number
+            terms[basis] = (
+                self.number("add", *sorted((terms[basis], number))) if basis in terms else number
+            )
         return Symbol(self, self._without_zeros(terms), x.value + y.value)
 
     def _without_zeros(self, terms):
@@ -388,9 +429,13 @@ class Graph:
             terms = {}
             for a, c in x.terms.items():
                 for b, d in y.terms.items():
-                    at = b if a == ONE else a if b == ONE else self.basis("product", *sorted((a, b)))
+                    at = (
+                        b if a == ONE else a if b == ONE else self.basis("product", *sorted((a, b)))
+                    )
                     number = self._times(c, d)
-                    terms[at] = self.number("add", *sorted((terms[at], number))) if at in terms else number
+                    terms[at] = (
+                        self.number("add", *sorted((terms[at], number))) if at in terms else number
+                    )
             return Symbol(self, self._without_zeros(terms), value)
         at = self.basis("product", *sorted((self.single(x), self.single(y))))
         return Symbol(self, {at: self.constant(1.0)}, value)
@@ -487,7 +532,10 @@ class Graph:
             return None if one is None else self.product(self._alone(o[1]), one) * o[2]
         two = self._slope_of(o[1], state)
         if operation == "product":
-            parts = [None if two is None else self._alone(o[0]) * two, None if one is None else one * self._alone(o[1])]
+            parts = [
+                None if two is None else self._alone(o[0]) * two,
+                None if one is None else one * self._alone(o[1]),
+            ]
         else:
             parts = [one, None if two is None else -(self._alone(basis) * two)]
         parts = [part for part in parts if part is not None]
@@ -506,7 +554,9 @@ class Graph:
 
 
 class Program:
-    """The entries of a matrix as arrays for `kernels.floquet.program`, and as functions of points and times."""
+    """The entries of a matrix as arrays for `kernels.floquet.program`, and as functions of points
+    and times.
+    """
 
     def __init__(self, graph, entries):
         self.graph, self.states = graph, list(graph.flow)
@@ -530,7 +580,11 @@ class Program:
                 a, b = operands
             elif operation == "state":
                 a, first = operands[0], len(inside)
-                inside += [pair for pair in graph.flow[k].terms.items() if graph.numbers[pair[1]] != ("constant", 0.0)]
+                inside += [
+                    pair
+                    for pair in graph.flow[k].terms.items()
+                    if graph.numbers[pair[1]] != ("constant", 0.0)
+                ]
                 last = len(inside)
             elif operands:
                 a, b, sign = operands
@@ -545,7 +599,9 @@ class Program:
 
     @cached_property
     def read(self):
-        """Which numbers the kernel reads: those of the parameters on which nothing depends are not among them."""
+        """Which numbers the kernel reads: those of the parameters on which nothing depends are not
+        among them.
+        """
         return np.unique(np.concatenate([self.terms[:, 3], self.inside[:, 1]]))
 
     @property
@@ -561,13 +617,15 @@ class Program:
     def is_line(self, place):
         """Is the basis function linear in t?"""
         operation, *operands = self.graph.series[place]
-        return place == TIME or (operation == "combination" and all(b in (ONE, TIME) for b, _c in operands[0]))
+        return place == TIME or (
+            operation == "combination" and all(b in (ONE, TIME) for b, _c in operands[0])
+        )
 
     def _order(self):
         """Places of the basis functions that the entries need, each after those that it is made of.
 
-        States need lower orders alone, and so do functions of their derivatives, which come last: a derivative may be
-        made of what is being visited, as that of y = sqrt x is of 1 / y.
+        States need lower orders alone, and so do functions of their derivatives, which come last: a
+        derivative may be made of what is being visited, as that of y = sqrt x is of 1 / y.
         """
         flow = self.graph.flow
         found, begun, later = list(flow), set(flow), []
@@ -618,17 +676,24 @@ class Program:
                 elif operation == "power":
                     x, y = values[:, o[0]], values[:, o[1]]
                     v = np.power(x, y)
-                    e = abs(y * v / x) * errors[:, o[0]] + abs(v * np.log(abs(x))) * errors[:, o[1]] + 8 * u * abs(v)
+                    e = (
+                        abs(y * v / x) * errors[:, o[0]]
+                        + abs(v * np.log(abs(x))) * errors[:, o[1]]
+                        + 8 * u * abs(v)
+                    )
                 else:
                     x = np.ascontiguousarray(values[:, o[0]])
                     function, slope = FUNCTIONS[operation]
                     v = function(x)
-                    e = abs(slope(x)) * errors[:, o[0]] + (1 if operation == "sqrt" else 8) * u * abs(v)
+                    e = abs(slope(x)) * errors[:, o[0]] + (
+                        1 if operation == "sqrt" else 8
+                    ) * u * abs(v)
                 values[:, k], errors[:, k] = v, e
         return values, errors
 
     def series(self, numbers, t, places, states=None, late=None):
-        """{place: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1, m).
+        """{place: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1,
+        m).
 
         `states` are values and error bounds (n, N, m) of the states, to first order in their errors; `late`, of waves
         {place: (N or 1, 1)}, bounds of further errors of their phases.
@@ -670,7 +735,11 @@ class Program:
                         dx = dx + late[k]
                     function, slope = FUNCTIONS[operation]
                     v = function(x)
-                    e = abs(slope(x)) * dx + 0.5 * dx * dx + (2 if operation in ACCURATE else 6) * u * abs(v)
+                    e = (
+                        abs(slope(x)) * dx
+                        + 0.5 * dx * dx
+                        + (2 if operation in ACCURATE else 6) * u * abs(v)
+                    )
                 found[k] = v, e
         return {k: found[k] for k in places}
 
@@ -726,8 +795,9 @@ class Program:
         return own.sum(axis=1), errors[:, diagonal[:, pg.NUMBER]].sum(axis=1) + rounding
 
     def sampled(self, numbers, t, late=None):
-        """(terms, values, error bounds): the terms with their basis functions numbered from 0, and these functions
-        (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m), and N is 1. `late` as in `series`.
+        """(terms, values, error bounds): the terms with their basis functions numbered from 0, and
+        these functions (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m),
+        and N is 1. `late` as in `series`.
         """
         found = self.series(numbers, t, self.used, late=late)
         wide = max((len(values) for values, _bars in found.values()), default=1)
@@ -739,7 +809,8 @@ class Program:
         return terms, *out
 
     def holds(self, points, low, high):
-        """Do the guards decide for the points (N) as they did for the example? 1 yes, 0 no, -1: not within (low, high).
+        """Do the guards decide for the points (N) as they did for the example? 1 yes, 0 no, -1: not
+        within (low, high).
 
         `low` and `high` (N) are the ends of the piece of the period.
         """
@@ -754,7 +825,9 @@ class Program:
             value = self._of(symbol, numbers, t)
             agrees = (value > 0) == yes
             mixed = agrees.any(axis=1) & ~agrees.all(axis=1)
-            out = np.where(mixed, -1, np.where(agrees.all(axis=1), out, np.minimum(out, 0))).astype(np.int8)
+            out = np.where(mixed, -1, np.where(agrees.all(axis=1), out, np.minimum(out, 0))).astype(
+                np.int8
+            )
         for symbol, yes in equal:
             value = self._of(symbol, numbers, t)
             agrees = (value == 0) == yes if symbol.is_number else np.full(t.shape, not yes)
@@ -791,7 +864,9 @@ class _Call:
 
 
 def lifted(value, seen=None):
-    """The value as code on symbols may use it: functions of math take symbols, compiled functions are Python again."""
+    """The value as code on symbols may use it: functions of math take symbols, compiled functions
+    are Python again.
+    """
     seen = {} if seen is None else seen
     value = getattr(value, "py_func", value) if isinstance(value, DISPATCHER) else value
     if id(value) in seen:
@@ -803,7 +878,11 @@ def lifted(value, seen=None):
     name = getattr(value, "__name__", "")
     if callable(value) and value is getattr(math, name, None):
         return _Call(name)
-    if isinstance(value, ModuleType) and value not in (np,) and value.__name__.partition(".")[0] not in ("numpy",):
+    if (
+        isinstance(value, ModuleType)
+        and value not in (np,)
+        and value.__name__.partition(".")[0] not in ("numpy",)
+    ):
         return _Refused(value.__name__)
     return value
 
@@ -828,7 +907,11 @@ def _lifted_function(function, seen):
             scope[name] = lifted(function.__globals__[name], seen)
     for cell, own in zip(cells, function.__closure__ or (), strict=True):
         cell.cell_contents = lifted(own.cell_contents, seen)
-    made.__defaults__ = None if function.__defaults__ is None else tuple(lifted(x, seen) for x in function.__defaults__)
+    made.__defaults__ = (
+        None
+        if function.__defaults__ is None
+        else tuple(lifted(x, seen) for x in function.__defaults__)
+    )
     made.__kwdefaults__ = function.__kwdefaults__
     return made
 

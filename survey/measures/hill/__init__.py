@@ -1,13 +1,14 @@
 """Hill's question: is y'' + z(t) y = 0, z of period T, stable?
 
-METHODS lists what a method that serves the family "hill" offers. A method of fixed steps gives `hill_density`, NODES,
-`hill_chain` and `hill_scatter`; an adaptive one gives `hill_walk` and `hill_walk_pieces`, from which the scenes make
-their own kernels.
+METHODS lists what a method that serves the family "hill" offers. A method of fixed steps gives
+`hill_density`, NODES, `hill_chain` and `hill_scatter`; an adaptive one gives `hill_walk` and
+`hill_walk_pieces`, from which the scenes make their own kernels.
 
-z = c0(t) + p c1(t) + p^2 c2, c2 a number; a row of points shares c0 and c1, and p varies along it. What a method gives
-of a point are the columns RESULTS of `survey.kernels.lanes`: both solutions and their derivatives at the end of the
-half period, their error bounds, and the zeros of y1 and y2 on the way. t is in the unit of the period, z in its
-inverse square. `survey.kernels.lanes.chain` and `scatter` make `hill_chain` and `hill_scatter` of one step.
+z = c0(t) + p c1(t) + p^2 c2, c2 a number; a row of points shares c0 and c1, and p varies along it.
+What a method gives of a point are the columns RESULTS of `survey.kernels.lanes`: both solutions and
+their derivatives at the end of the half period, their error bounds, and the zeros of y1 and y2 on
+the way. t is in the unit of the period, z in its inverse square. `survey.kernels.lanes.chain` and
+`scatter` make `hill_chain` and `hill_scatter` of one step.
 """
 
 from survey import methods
@@ -15,7 +16,9 @@ from survey.contract import Function, Value
 
 METHODS = {
     "hill": {
-        "NODES": Value("where in a step z is sampled: fractions of the step", tuple, needed=methods.fixed),
+        "NODES": Value(
+            "where in a step z is sampled: fractions of the step", tuple, needed=methods.fixed
+        ),
         "hill_density": Function(
             "(steps per radian of the fastest phase, steps per distance to the nearest singularity of z): so many are "
             "tried first for accuracy rtol",

@@ -17,8 +17,8 @@ NO_SQUARES = np.zeros((0, 4))
 class Asked:
     """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.answers.FLOATS`.
 
-    Points of a row that come `together` share the steps of the one that needs most, and so the row's samples. With
-    `full_period` the results are those of the period, where z is not even.
+    Points of a row that come `together` share the steps of the one that needs most, and so the
+    row's samples. With `full_period` the results are those of the period, where z is not even.
     """
 
     rtol: float
@@ -28,7 +28,8 @@ class Asked:
 
 
 class Answers(answers.Answers):
-    """`floats` (14, N): each of `kernels.hill.answers.FLOATS` and its error bound, if wanted; and the `verdict`.
+    """`floats` (14, N): each of `kernels.hill.answers.FLOATS` and its error bound, if wanted; and
+    the `verdict`.
 
     `results` (N, RESULTS) is what they follow from, where all points were solved one by one.
     """
@@ -36,18 +37,30 @@ class Answers(answers.Answers):
     results = None
 
     def __init__(self, size, asked):
-        super().__init__(size, 2 * len(kernels.FLOATS), ("verdict",), np.flatnonzero(np.repeat(asked.wanted, 2)))
+        super().__init__(
+            size, 2 * len(kernels.FLOATS), ("verdict",), np.flatnonzero(np.repeat(asked.wanted, 2))
+        )
         self.asked = asked
 
     def assess(self, results, rule, squares=NO_SQUARES, first=0):
-        """Answer the points from the `first` on, if their status is ok, from their results (n, RESULTS) and `squares`
-        (see `measure`).
+        """Answer the points from the `first` on, if their status is ok, from their results (n,
+        RESULTS) and `squares` (see `measure`).
         """
         asked, own = self.asked, (self.floats, self.verdict, self.missed, self.status)
         rule = NONE if rule is None else rule
         kernels.measure(
-            first, results, squares, rule, asked.wanted, asked.rtol, asked.full_period, status.OVERFLOW, *own
+            first,
+            results,
+            squares,
+            rule,
+            asked.wanted,
+            asked.rtol,
+            asked.full_period,
+            status.OVERFLOW,
+            *own,
         )
         if asked.wanted[kernels.EXPONENT // 2 :].any():
             wait_for_other_compiler()
-            kernels.transcendental(first, results, squares, asked.wanted, asked.rtol, asked.full_period, *own)
+            kernels.transcendental(
+                first, results, squares, asked.wanted, asked.rtol, asked.full_period, *own
+            )

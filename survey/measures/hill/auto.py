@@ -1,8 +1,10 @@
-"""Which method where: a constant coefficient by its closed form, everything else by midpoint Taylor, and points
-that it leaves undecided in double-double arithmetic, or by the adaptive DOP853 where a problem has no such kernel. So
-are the few whose D, if asked for, depends on an ulp of the parameters, where rtol is below what float64 can reach.
+"""Which method where: a constant coefficient by its closed form, everything else by midpoint
+Taylor, and points that it leaves undecided in double-double arithmetic, or by the adaptive DOP853
+where a problem has no such kernel. So are the few whose D, if asked for, depends on an ulp of the
+parameters, where rtol is below what float64 can reach.
 
-Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has the sharpest bounds.
+Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has
+the sharpest bounds.
 """
 
 import numpy as np
@@ -23,14 +25,18 @@ CALL_STEPS = 20_000
 
 
 def solve(problem, asked, answers, decide=True):
-    """Answer every point of the problem, in place; `decide`: solve what stays undecided again, with more digits."""
+    """Answer every point of the problem, in place; `decide`: solve what stays undecided again, with
+    more digits.
+    """
     free = None
     if problem.constant is not None:
         rows, z = problem.constant
         free = np.zeros(problem.p.shape, np.bool_)
         free[rows] = np.isfinite(z)
         free = free.reshape(-1)
-    open_points = dense.solve(problem, taylor16, asked, answers) if dense.serves(problem, asked) else None
+    open_points = (
+        dense.solve(problem, taylor16, asked, answers) if dense.serves(problem, asked) else None
+    )
     if free is not None:
         open_points = ~free if open_points is None else open_points & ~free
     if open_points is None or open_points.any():
@@ -47,7 +53,9 @@ def solve(problem, asked, answers, decide=True):
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
         if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:
             d, bar = abs(answers.floats[DISCRIMINANT]), answers.floats[DISCRIMINANT + 1]
-            _exactly(problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS)
+            _exactly(
+                problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS
+            )
     elif left.any() and problem.walk is not None:
         from survey.methods import dop853  # with all families' kernels: few points need it
 
@@ -58,12 +66,16 @@ def solve(problem, asked, answers, decide=True):
 
 
 def scattered(box, asked, answers, position, p):
-    """Answer points on their own from series; returns those (N, bool) that are left (see `dense.scattered`)."""
+    """Answer points on their own from series; returns those (N, bool) that are left (see
+    `dense.scattered`).
+    """
     return dense.scattered(box, taylor16, asked, answers, position, p)
 
 
 def _exactly(problem, answers, points, asked, most):
-    """Solve the `points` in double-double, where at most `most` steps suffice; the others keep their answers."""
+    """Solve the `points` in double-double, where at most `most` steps suffice; the others keep
+    their answers.
+    """
     if not points.size:
         return
     phase, distance = taylor_double.hill_density()
@@ -89,7 +101,9 @@ def _exactly(problem, answers, points, asked, most):
 
 
 def closed_form(z, span):
-    """Results (..., 10), as of a chain, of y'' + z y = 0 over `span` with constant z: circular or hyperbolic."""
+    """Results (..., 10), as of a chain, of y'' + z y = 0 over `span` with constant z: circular or
+    hyperbolic.
+    """
     rate = np.sqrt(abs(z))
     x = rate * span
     with np.errstate(all="ignore"):
@@ -99,10 +113,13 @@ def closed_form(z, span):
     # x and rate are known to 3 ulp, and cos, sin, cosh, sinh to 2.
     de, se = EPS * (3 * x * abs(s) + 2 * abs(c)), EPS * (3 * x * abs(c) + 2 * abs(s))
     y2_error = np.where(rate > 0, se / np.where(rate > 0, rate, 1.0), 0.0) + 3 * EPS * abs(y2)
-    # Zeros inside: of cos at odd multiples of pi/2, of sin at multiples of pi; the computed signs settle ties.
+    # Zeros inside: of cos at odd multiples of pi/2, of sin at multiples of pi; the computed signs
+    # settle ties.
     m = np.where(z > 0, _zeros(x / np.pi + 0.5, c < 0), 0)
     d = np.where(z > 0, _zeros(x / np.pi, s < 0), 0)
-    return np.stack([c, dy1, y2, c, de, rate * se + 3 * EPS * abs(dy1) + LEAST, y2_error, de, m, d], axis=-1)
+    return np.stack(
+        [c, dy1, y2, c, de, rate * se + 3 * EPS * abs(dy1) + LEAST, y2_error, de, m, d], axis=-1
+    )
 
 
 def _zeros(turns, negative):

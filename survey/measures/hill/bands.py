@@ -1,8 +1,10 @@
-"""How far a user's z(u, p) may lie from its interpolant at Chebyshev points: a bound, by running its code on bounds.
+"""How far a user's z(u, p) may lie from its interpolant at Chebyshev points: a bound, by running
+its code on bounds.
 
-Numbers are replaced by what bounds them: u by an ellipse about [0, end], the parameters by their largest size. What
-comes out bounds z there, where it is analytic, and its rounding on [0, end]; what is compared, or may be singular, is
-unknown. A z that is known so has no spike between its samples, and need not be probed for one.
+Numbers are replaced by what bounds them: u by an ellipse about [0, end], the parameters by their
+largest size. What comes out bounds z there, where it is analytic, and its rounding on [0, end];
+what is compared, or may be singular, is unknown. A z that is known so has no spike between its
+samples, and need not be probed for one.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), theorem 8.2.
 """
@@ -16,7 +18,8 @@ from survey.measures.hill.dependence import OTHER_NAMES, StandIn, Unknown
 
 # Ellipses, by the sum of their half axes relative to those of an interval of half length 1.
 ELLIPSES = (2.0, 4.0)
-# Of a library's function, in EPS; and how much more an interpolant at some hundred points may be off than its values.
+# Of a library's function, in EPS; and how much more an interpolant at some hundred points may be
+# off than its values.
 OF_FUNCTIONS, LEBESGUE = 4.0, 5.0
 # Of where samples are, in EPS of the end.
 OF_POSITIONS = 2.0
@@ -25,8 +28,8 @@ STEEP = {"exp": math.exp, "sinh": math.cosh, "cosh": math.cosh}
 
 
 class Bound(StandIn):
-    """Of an analytic function of u: its `size` and that of its imaginary part on the ellipse; on the interval itself
-    its size, `real`, and its rounding, `off`.
+    """Of an analytic function of u: its `size` and that of its imaginary part on the ellipse; on
+    the interval itself its size, `real`, and its rounding, `off`.
     """
 
     __slots__ = ("imaginary", "off", "real", "size")
@@ -37,7 +40,12 @@ class Bound(StandIn):
     def __add__(self, other):
         other = _bound(other)
         real = self.real + other.real
-        return Bound(self.size + other.size, self.imaginary + other.imaginary, real, self.off + other.off + EPS * real)
+        return Bound(
+            self.size + other.size,
+            self.imaginary + other.imaginary,
+            real,
+            self.off + other.off + EPS * real,
+        )
 
     def __mul__(self, other):
         other = _bound(other)
@@ -75,19 +83,27 @@ def _bound(value):
 
 
 class _Functions:
-    """The functions that `multiprecision.lift` gives to the code: those of `math`, of numbers and of bounds."""
+    """The functions that `multiprecision.lift` gives to the code: those of `math`, of numbers and
+    of bounds.
+    """
 
     def __getattr__(self, name):
         def call(*given):
             if all(map(_is_number, given)):
                 return (OTHER_NAMES.get(name) or getattr(math, name))(*given)
             if name == "power":
-                return given[0] ** given[1] if isinstance(given[0], Bound) else _bound(given[0])._refused()
+                return (
+                    given[0] ** given[1]
+                    if isinstance(given[0], Bound)
+                    else _bound(given[0])._refused()
+                )
             (x,) = given
             if name == "mpf":
                 return x
             if name in ROUND:
-                return Bound(math.cosh(x.imaginary), math.sinh(x.imaginary), 1.0, x.off + OF_FUNCTIONS * EPS)
+                return Bound(
+                    math.cosh(x.imaginary), math.sinh(x.imaginary), 1.0, x.off + OF_FUNCTIONS * EPS
+                )
             if name in STEEP:
                 size, real = STEEP[name](x.size), STEEP[name](x.real)
                 return Bound(size, size, real, real * (math.expm1(2 * x.off) + OF_FUNCTIONS * EPS))
@@ -103,8 +119,8 @@ def _lifted(z):
 
 @lru_cache(maxsize=256)
 def missed(z, largest, end, samples):
-    """A bound of how far z(u, p), as computed, is from its interpolant at as many Chebyshev points on [0, end], for all
-    parameters of these `largest` sizes; infinite if none is known.
+    """A bound of how far z(u, p), as computed, is from its interpolant at as many Chebyshev points
+    on [0, end], for all parameters of these `largest` sizes; infinite if none is known.
     """
     least = math.inf
     for rho in ELLIPSES:

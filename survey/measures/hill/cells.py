@@ -1,12 +1,14 @@
-"""The verdict of a Hill problem everywhere in cells of a plane of two parameters, so that no tongue is missed.
+"""The verdict of a Hill problem everywhere in cells of a plane of two parameters, so that no tongue
+is missed.
 
-The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor Chebyshev series to
-within a bound: the bounds at its nodes times the Lebesgue constants, the tails of the series, and rounding. A series
-that misses the factor between its nodes has that in its tails. Where a series no longer serves, the halves of its block
-are solved; all other halving is done on the series alone (`survey.kernels.hill.cells`).
+The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor
+Chebyshev series to within a bound: the bounds at its nodes times the Lebesgue constants, the tails
+of the series, and rounding. A series that misses the factor between its nodes has that in its
+tails. Where a series no longer serves, the halves of its block are solved; all other halving is
+done on the series alone (`survey.kernels.hill.cells`).
 
-Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; L. N. Trefethen, Approximation Theory and
-Approximation Practice (2013), chapters 3, 8, 15.
+Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; L. N. Trefethen, Approximation
+Theory and Approximation Practice (2013), chapters 3, 8, 15.
 """
 
 from dataclasses import dataclass
@@ -39,7 +41,9 @@ DEGREE = np.arange(NODES)
 
 @dataclass(frozen=True)
 class Side:
-    """A side of a rectangle: from `low` to `high`, halved at most `depth` times; `log`: at the geometric mean."""
+    """A side of a rectangle: from `low` to `high`, halved at most `depth` times; `log`: at the
+    geometric mean.
+    """
 
     low: float
     high: float
@@ -48,7 +52,11 @@ class Side:
 
     def at(self, part):
         """The parameter after the `part` (0 to 1) of the side; both ends exact."""
-        inside = self.low * (self.high / self.low) ** part if self.log else self.low * (1 - part) + self.high * part
+        inside = (
+            self.low * (self.high / self.low) ** part
+            if self.log
+            else self.low * (1 - part) + self.high * part
+        )
         return np.where(part == 0, self.low, np.where(part == 1, self.high, inside))
 
     def length(self, start, end):
@@ -63,14 +71,17 @@ class Side:
         out = np.empty((self.depth, 2, NODES, NODES))
         for level in range(self.depth):
             middle = np.tanh(-0.25 * np.log(self.high / self.low) / 2**level) if self.log else 0.0
-            for side, x in enumerate(((middle + 1) / 2 * (X + 1) - 1, 1 - (1 - middle) / 2 * (1 - X))):
+            for side, x in enumerate(
+                ((middle + 1) / 2 * (X + 1) - 1, 1 - (1 - middle) / 2 * (1 - X))
+            ):
                 out[level, side] = TRANSFORM @ chebyshev.chebvander(x, NODES - 1)
         return out
 
 
 @dataclass
 class Cells:
-    """`box` (M, 4): low and high along both axes; `verdict`; the areas `stable` and `unstable` at least, `total`.
+    """`box` (M, 4): low and high along both axes; `verdict`; the areas `stable` and `unstable` at
+    least, `total`.
 
     `points` were solved. Undecided cells are as small as the axes' depths allow.
     """
@@ -97,11 +108,11 @@ def serves(scene):
 def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descend):
     """The Cells of the rectangle of the Sides x and y.
 
-    `solve(x, y)` gives the four factors with their error bounds at broadcast arrays of both parameters,
-    NaN where there are none; `each`: see `measures.tasks`. `report(part, points)` is called with the part of
-    the rectangle that is settled, and the number of points solved for it. `values(out)` makes functions and their
-    bounds of what is solved, and `descend` decides cells by them. Raises OverflowError if there are more than MOST
-    cells.
+    `solve(x, y)` gives the four factors with their error bounds at broadcast arrays of both
+    parameters, NaN where there are none; `each`: see `measures.tasks`. `report(part, points)` is
+    called with the part of the rectangle that is settled, and the number of points solved for it.
+    `values(out)` makes functions and their bounds of what is solved, and `descend` decides cells by
+    them. Raises OverflowError if there are more than MOST cells.
     """
     depth = np.array([x.depth, y.depth])
     halves = np.full((2, max(depth.max(), 1), 2, NODES, NODES), np.nan)
@@ -127,19 +138,26 @@ def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descen
 
 
 def accuracy(depth):
-    """The rtol with which `find` asks for the factors where cells are halved so often: below what series leave out."""
+    """The rtol with which `find` asks for the factors where cells are halved so often: below what
+    series leave out.
+    """
     return float(np.clip(1e-2 * ENOUGH * 0.5**depth, 1e-13, 1e-9))
 
 
 def _first(depth):
     """The first blocks (B, 4), as `descend` takes them."""
     level = np.minimum(depth, START)
-    i, j = (grid.reshape(-1) for grid in np.meshgrid(*(np.arange(1 << at) for at in level), indexing="ij"))
+    i, j = (
+        grid.reshape(-1)
+        for grid in np.meshgrid(*(np.arange(1 << at) for at in level), indexing="ij")
+    )
     return np.column_stack([np.full(i.size, level[0]), i, np.full(i.size, level[1]), j])
 
 
 def _series(solve, x, y, blocks, of):
-    """The functions' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y, the rest (B, 4, 3)."""
+    """The functions' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y,
+    the rest (B, 4, 3).
+    """
     (middle_x, radius_x), (middle_y, radius_y) = _spans(x, blocks[:, :2]), _spans(y, blocks[:, 2:])
     out = solve(
         (middle_x[:, None] + radius_x[:, None] * POINTS)[:, :, None],
@@ -156,8 +174,13 @@ def _series(solve, x, y, blocks, of):
     # of the transform, and of the rounded points, where T_j' <= j^2
     rounding_x = 4 + DEGREE + DEGREE**2 * (1 + abs(middle_x) / radius_x)[:, None, None]
     rounding_y = 4 + DEGREE + DEGREE**2 * (1 + abs(middle_y) / radius_y)[:, None, None]
-    noise = LEBESGUE**2 * bars + EPS * ((by_x * rounding_x).sum(axis=2) + (by_y * rounding_y).sum(axis=2))
-    tails = [np.maximum(2 * tail(by_x), 4 * (missed_x - noise)), np.maximum(2 * tail(by_y), 4 * (missed_y - noise))]
+    noise = LEBESGUE**2 * bars + EPS * (
+        (by_x * rounding_x).sum(axis=2) + (by_y * rounding_y).sum(axis=2)
+    )
+    tails = [
+        np.maximum(2 * tail(by_x), 4 * (missed_x - noise)),
+        np.maximum(2 * tail(by_y), 4 * (missed_y - noise)),
+    ]
     return series, np.stack([*tails, noise], axis=2)
 
 
@@ -185,15 +208,23 @@ def _gathered(x, y, depth, leaves, points):
 
 
 def _merged(cells):
-    """Decided cells (low, high, low, high, verdict) that share a whole side as one, sorted; undecided ones stay."""
+    """Decided cells (low, high, low, high, verdict) that share a whole side as one, sorted;
+    undecided ones stay.
+    """
     before = len(cells) + 1
     while len(cells) < before:
         before = len(cells)
         for along, across in ((0, 2), (2, 0)):
-            cells = cells[np.lexsort((cells[:, along], cells[:, across + 1], cells[:, across], cells[:, 4]))]
+            cells = cells[
+                np.lexsort((cells[:, along], cells[:, across + 1], cells[:, across], cells[:, 4]))
+            ]
             new = np.ones(len(cells), np.bool_)
-            same = (cells[1:, [across, across + 1, 4]] == cells[:-1, [across, across + 1, 4]]).all(axis=1)
-            new[1:] = ~same | (cells[1:, along] != cells[:-1, along + 1]) | (cells[1:, 4] == UNDECIDED)
+            same = (cells[1:, [across, across + 1, 4]] == cells[:-1, [across, across + 1, 4]]).all(
+                axis=1
+            )
+            new[1:] = (
+                ~same | (cells[1:, along] != cells[:-1, along + 1]) | (cells[1:, 4] == UNDECIDED)
+            )
             ends = cells[np.append(np.flatnonzero(new)[1:], len(cells)) - 1, along + 1]
             cells = cells[new]
             cells[:, along + 1] = ends

@@ -1,11 +1,13 @@
-"""Edges of tongues as curves on a map of two parameters: each zero set of a factor, followed through its folds.
+"""Edges of tongues as curves on a map of two parameters: each zero set of a factor, followed
+through its folds.
 
-An edge is a zero of one of the four factors F of `edges`, analytic in both parameters. From edges of rows (and
-of some columns) as seeds, both ways along F = 0: predictor by tangent and curvature, corrector along the normal with
-F, its gradient and second derivatives from nine neighbouring points; all curves step together. A step is taken if the
-corrector is short against it, the curve turns little, and F keeps its positive side (neighbouring zeros of F have
-opposite ones); else it is halved. Curves end at the border of the map, where they close, or are lost where F has a
-double point. At last every point is bracketed by certain signs of F.
+An edge is a zero of one of the four factors F of `edges`, analytic in both parameters. From edges
+of rows (and of some columns) as seeds, both ways along F = 0: predictor by tangent and curvature,
+corrector along the normal with F, its gradient and second derivatives from nine neighbouring
+points; all curves step together. A step is taken if the corrector is short against it, the curve
+turns little, and F keeps its positive side (neighbouring zeros of F have opposite ones); else it is
+halved. Curves end at the border of the map, where they close, or are lost where F has a double
+point. At last every point is bracketed by certain signs of F.
 
 Positions are those of `survey.measures.square`.
 A closed curve that meets neither a row nor a column that was searched has no seed, and is not found.
@@ -17,7 +19,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from survey.measures.hill.edges import ASIDE, COUNTS, FACTORS, close_in, has_factors, of_kind, tongue
+from survey.measures.hill.edges import (
+    ASIDE,
+    COUNTS,
+    FACTORS,
+    close_in,
+    has_factors,
+    of_kind,
+    tongue,
+)
 from survey.measures.hill.expansion import expander
 from survey.measures.tasks import in_turn
 
@@ -39,7 +49,9 @@ def serves(scene):
 
 @dataclass
 class Seeds:
-    """Edges as positions (n, 2) with `kind`, `index`; `low`, `high` (n, 2) the rectangle in which F is analytic."""
+    """Edges as positions (n, 2) with `kind`, `index`; `low`, `high` (n, 2) the rectangle in which F
+    is analytic.
+    """
 
     x: np.ndarray
     kind: np.ndarray
@@ -52,8 +64,8 @@ class Seeds:
 class Curves:
     """Curves one after another: `count` points each; `kind`, `index`, `complete` per curve.
 
-    Per point its position `x` (m, 2), unit tangent `along` (m, 2) and `error`, a bound of its distance from the
-    curve; `of_seed` is the curve of each seed.
+    Per point its position `x` (m, 2), unit tangent `along` (m, 2) and `error`, a bound of its
+    distance from the curve; `of_seed` is the curve of each seed.
     """
 
     count: np.ndarray
@@ -69,7 +81,8 @@ class Curves:
 def trace(solve, square, seeds, each=in_turn):
     """The Curves through all seeds.
 
-    `solve(q, p, wanted)` gives outputs at q (m, 1), p (m, n), the square's parameters; `each`: see `measures.tasks`.
+    `solve(q, p, wanted)` gives outputs at q (m, 1), p (m, n), the square's parameters; `each`: see
+    `measures.tasks`.
     """
     expand = expander(solve, square)
     of_seed = np.full(seeds.kind.size, -1)
@@ -78,17 +91,25 @@ def trace(solve, square, seeds, each=in_turn):
     def task(own):
         # on the edge itself the rotation number would ask for double-double arithmetic
         step = np.full(own.size, LONGEST)
-        seen = expand(seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False)
+        seen = expand(
+            seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False
+        )
         towards[own] = seen.course(np.ones(own.size))[0]
 
     _in_chunks(each, task, of_seed.size, "parts of the curves' seeds")
     paths, starts = [], []
     while (of_seed < 0).any():
         left = np.flatnonzero(of_seed < 0)
-        group = np.unique(np.stack([seeds.kind[left], seeds.index[left]], axis=1), axis=0, return_index=True)[1]
+        group = np.unique(
+            np.stack([seeds.kind[left], seeds.index[left]], axis=1), axis=0, return_index=True
+        )[1]
         start = np.sort(left[group])  # one of each kind and index: no two on the same curve
         for path, seed in zip(_follow(expand, seeds, start), start, strict=True):
-            on_it = (of_seed < 0) & (seeds.kind == seeds.kind[seed]) & (seeds.index == seeds.index[seed])
+            on_it = (
+                (of_seed < 0)
+                & (seeds.kind == seeds.kind[seed])
+                & (seeds.index == seeds.index[seed])
+            )
             near = np.flatnonzero(on_it)
             of_seed[near[_on(path, seeds.x[near], towards[near])]] = len(paths)
             of_seed[seed] = len(paths)
@@ -98,7 +119,11 @@ def trace(solve, square, seeds, each=in_turn):
 
 
 def _in_chunks(each, task, number, what):
-    each(lambda at: task(np.arange(at * CHUNK, min((at + 1) * CHUNK, number))), range(-(-number // CHUNK)), what)
+    each(
+        lambda at: task(np.arange(at * CHUNK, min((at + 1) * CHUNK, number))),
+        range(-(-number // CHUNK)),
+        what,
+    )
 
 
 @dataclass
@@ -130,7 +155,9 @@ def _follow(expand, seeds, start):
         a = np.flatnonzero(~ended & ~lost)
         if not a.size:
             break
-        length, guess, edge, border = _predict(x[a], along[a], normal[a], bend[a], step[a], low[a], high[a])
+        length, guess, edge, border = _predict(
+            x[a], along[a], normal[a], bend[a], step[a], low[a], high[a]
+        )
         leaves = border & (length < 4 * SHORTEST)  # it stands at the border and points outside
         with np.errstate(all="ignore"):
             seen = expand(guess, kind[a], length, low[a], high[a])
@@ -139,12 +166,22 @@ def _follow(expand, seeds, start):
             off = seen.zero(line)
             new = guess + off[:, None] * line
             t, nrm, c = seen.moved(new - guess).course(side[a])
-        good = (abs(off) <= OFF * length) & ((t * along[a]).sum(axis=1) >= TURN) & np.isfinite(c) & ~leaves
+        good = (
+            (abs(off) <= OFF * length)
+            & ((t * along[a]).sum(axis=1) >= TURN)
+            & np.isfinite(c)
+            & ~leaves
+        )
         good &= ((new >= low[a]) & (new <= high[a])).all(axis=1)
         astray = abs(seen.turns - index[a])
-        good &= (astray < 0.5) | (astray == 1)  # in the tongue, near it, or beyond a band too thin to be seen
+        # in the tongue, near it, or beyond a band too thin to be seen
+        good &= (astray < 0.5) | (astray == 1)
         closing = good & _returns(x[a], new, t, home[a], heading[a], length, gone[a])
-        new[closing], t[closing], line[closing] = home[a][closing], heading[a][closing], trail[0][3][a][closing]
+        new[closing], t[closing], line[closing] = (
+            home[a][closing],
+            heading[a][closing],
+            trail[0][3][a][closing],
+        )
         took = a[good]
         trail.append((took, new[good], t[good], line[good]))
         x[took], along[took], normal[took], bend[took] = new[good], t[good], nrm[good], c[good]
@@ -160,7 +197,8 @@ def _follow(expand, seeds, start):
 
 
 def _predict(x, along, normal, bend, step, low, high):
-    """Steps along the parabola of tangent and curvature: (length, position, line to correct along, border).
+    """Steps along the parabola of tangent and curvature: (length, position, line to correct along,
+    border).
 
     Where it leaves the rectangle it goes to its border, and is corrected along that.
     """
@@ -224,7 +262,9 @@ def _joined(trail, ended, closed):
 
 
 def _on(path, x, towards):
-    """Which of the positions x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite pieces)?"""
+    """Which of the positions x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite
+    pieces)?
+    """
     found = np.zeros(len(x), bool)
     length = np.hypot(*np.diff(path.x, axis=0).T)
     for first in range(0, len(x), CHUNK):
@@ -264,7 +304,11 @@ def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
         )  # fmt: skip
         sides = t[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
         good &= tongue(at(slice(None), sides, COUNTS), mine) == index[whose[own]]
-        new[own], error[own], sure[own] = x[own] + t[:, None] * line[own], width + square.grain, good
+        new[own], error[own], sure[own] = (
+            x[own] + t[:, None] * line[own],
+            width + square.grain,
+            good,
+        )
 
     _in_chunks(each, task, len(x), "parts of the curves")
     complete = np.array([path.complete for path in paths], bool)

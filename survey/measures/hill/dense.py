@@ -1,21 +1,24 @@
-"""Dense maps of a Hill problem by Chebyshev series in p, and across rows, solved at nodes alone: of the discriminant,
-or, where more is asked, of the four factors.
+"""Dense maps of a Hill problem by Chebyshev series in p, and across rows, solved at nodes alone: of
+the discriminant, or, where more is asked, of the four factors.
 
-All are entire functions of p (z is a polynomial in p), so that the series on an axis converge faster than any power.
-Where p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those of one half axis; so are y1', y2 and
-y1 + y2', and y1 - y2' is odd. Where the rows are an axis too, the coefficients are series across it, solved at its
-nodes; a panel of rows on which they do not converge is halved, and the rest is served row by row.
+All are entire functions of p (z is a polynomial in p), so that the series on an axis converge
+faster than any power. Where p -> -p exchanges y1 and y2', D is a series in p^2 and its nodes those
+of one half axis; so are y1', y2 and y1 + y2', and y1 - y2' is odd. Where the rows are an axis too,
+the coefficients are series across it, solved at its nodes; a panel of rows on which they do not
+converge is halved, and the rest is served row by row.
 
-The error bound: those at the nodes times the Lebesgue constants, or, of D where these are too large, times the Lagrange
-polynomials at each point (D, and with it the bounds, may fall by 1e5 along a row); the tails of the series, and
-rounding. Points whose verdict or accuracy it leaves open count as `missed`, and are solved one by one from their
-factors. All depends on the row and on the axes of the map, never on the block.
+The error bound: those at the nodes times the Lebesgue constants, or, of D where these are too
+large, times the Lagrange polynomials at each point (D, and with it the bounds, may fall by 1e5
+along a row); the tails of the series, and rounding. Points whose verdict or accuracy it leaves open
+count as `missed`, and are solved one by one from their factors. All depends on the row and on the
+axes of the map, never on the block.
 
-Rotation numbers need the numbers of zeros of y1 and y2. The signs at T/2 tell their parity, and the numbers at the
-nodes around a point, between which they lie, the rest; a point where that is ambiguous, or contradicts the rotation
-number between those at the nodes, counts as missed.
+Rotation numbers need the numbers of zeros of y1 and y2. The signs at T/2 tell their parity, and the
+numbers at the nodes around a point, between which they lie, the rest; a point where that is
+ambiguous, or contradicts the rotation number between those at the nodes, counts as missed.
 
-Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and 15.
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and
+15.
 """
 
 import threading
@@ -34,15 +37,17 @@ from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked
 
-DEGREES = np.array([16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384])
+DEGREES = np.array(
+    [16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384]
+)
 # A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
 ROWS_PER_NODE = 3
-# Of the asked accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by 4; those of a map
-# are solved as well as can be.
+# Of the asked accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
+# 4; those of a map are solved as well as can be.
 NODES_SHARE, BEST = 0.1, 1e-14
-# Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what `_enough` looks at by 10^7
-# or so, on every row that was measured.
+# Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what
+# `_enough` looks at by 10^7 or so, on every row that was measured.
 FACTORS_SHARE = 1e-6
 # The share of the nodes known to the asked accuracy from which on a series serves.
 MOST = 0.9
@@ -50,7 +55,8 @@ RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
-# The parts of the axis across points on their own: rows in each, of D and of factors, where more terms are summed.
+# The parts of the axis across points on their own: rows in each, of D and of factors, where more
+# terms are summed.
 ROWS_PER_PART, MOST_PARTS = (260, 130), 8
 # Points of a call that answers from factors: their temporaries stay in the processor's cache.
 CALL_POINTS = 8192
@@ -58,7 +64,9 @@ CALL_POINTS = 8192
 
 @dataclass(frozen=True)
 class Sought:
-    """The functions that are expanded, as rows of `floats`: D, or the factors; and are rotation numbers wanted?"""
+    """The functions that are expanded, as rows of `floats`: D, or the factors; and are rotation
+    numbers wanted?
+    """
 
     rows: tuple[int, ...]
     turns: bool = False
@@ -70,7 +78,9 @@ class Sought:
     @property
     def wanted(self):
         """What is asked of the nodes."""
-        return np.array([2 * i in self.rows or (self.turns and 2 * i == kernels.ROTATION) for i in range(7)])
+        return np.array(
+            [2 * i in self.rows or (self.turns and 2 * i == kernels.ROTATION) for i in range(7)]
+        )
 
 
 def serves(problem, asked):
@@ -86,25 +96,39 @@ def _sought(asked, factors_only=False):
 
 
 def compile_ahead(sample, no_rows, variables):
-    """Compile, by calls on next to nothing, what a map of these variables needs beside the kernel of the method.
+    """Compile, by calls on next to nothing, what a map of these variables needs beside the kernel
+    of the method.
 
-    `sample` and its empty `no_rows` are the scene's. While this is done, the map's own process compiles the method's
-    kernel: what it needs at once comes first, and what it waits for last. Yields where the nodes can be assessed.
+    `sample` and its empty `no_rows` are the scene's. While this is done, the map's own process
+    compiles the method's kernel: what it needs at once comes first, and what it waits for last.
+    Yields where the nodes can be assessed.
     """
     sample(no_rows, np.ones(1), np.empty((0, 1, 2, 1)))
     grows = not {"exponent", "exponent_per_orbit"}.isdisjoint(variables)
-    named = {name for name in kernels.FLOATS if name in variables} | ({"exponent"} if grows else set())
+    named = {name for name in kernels.FLOATS if name in variables} | (
+        {"exponent"} if grows else set()
+    )
     answers = Answers(1, Asked(1.0, np.array([name in named for name in kernels.FLOATS])))
     if named <= ANSWERS:
         Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1), None)
         if grows:
-            kernels.exponents(np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.missed)
+            kernels.exponents(
+                np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.missed
+            )
         answers.assess(np.ones((1, RESULTS)), None)
     else:
         Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
         yield  # a few points need no more
-        _factors(np.ones((4, 1, TERMS)), np.ones((4, 1)), np.ones(1), False, np.zeros((5, 1, 2)), 2, False)
+        _factors(
+            np.ones((4, 1, TERMS)),
+            np.ones((4, 1)),
+            np.ones(1),
+            False,
+            np.zeros((5, 1, 2)),
+            2,
+            False,
+        )
 
 
 def solve(problem, method, asked, answers):
@@ -121,7 +145,9 @@ def solve(problem, method, asked, answers):
 
 
 def scattered(box, method, asked, answers, position, p):
-    """Answer points on their own (N each) from the series of their `box`; returns those (N, bool) to be solved."""
+    """Answer points on their own (N each) from the series of their `box`; returns those (N, bool)
+    to be solved.
+    """
     sought, axis, open_points = _sought(asked), _axis(box.line, box.even), np.ones(p.size, np.bool_)
     served = _served_panels(box, method, asked, axis, sought)
     if not sought.factors and any(not bars[0] <= asked.rtol for _, _, _, bars, *_ in served):
@@ -141,28 +167,43 @@ def scattered(box, method, asked, answers, position, p):
             alone = some[-1] - some[0] == some.size - 1
             found, first = (answers, some[0]) if alone else (Answers(some.size, asked), 0)
             if sought.factors:
-                results = _at_points(box, axis, padded, number, bars, turns, across, along, position[some])
+                results = _at_points(
+                    box, axis, padded, number, bars, turns, across, along, position[some]
+                )
                 found.assess(results, None, first=first)
             else:
-                _discriminants_at(found, first, padded[0], number[0], bars[0], np.stack([across, along]), axis.even)
+                _discriminants_at(
+                    found,
+                    first,
+                    padded[0],
+                    number[0],
+                    bars[0],
+                    np.stack([across, along]),
+                    axis.even,
+                )
             own = slice(first, first + some.size)
             if not alone:
                 answers.replace(some, found)
             failed = found.status[own] != status.OK
             open_points[some] = found.missed[own] | failed
-            answers.status[some[failed]] = status.OK  # what this leaves without an answer is solved again
+            # what this leaves without an answer is solved again
+            answers.status[some[failed]] = status.OK
     return open_points
 
 
 def _served_panels(box, method, asked, axis, sought):
     with _ONE_AT_A_TIME:
         return [
-            panel for part in _parts(box.row_axis, sought) for panel in panels(part, method, asked.rtol, axis, sought)
+            panel
+            for part in _parts(box.row_axis, sought)
+            for panel in panels(part, method, asked.rtol, axis, sought)
         ]
 
 
 def _discriminants_at(answers, first, series, number, bar, x, even):
-    """D of the answers from the `first` on, at points x (2, N) across and along, from its series, and the exponent."""
+    """D of the answers from the `first` on, at points x (2, N) across and along, from its series,
+    and the exponent.
+    """
     asked, outputs = answers.asked, (answers.floats, answers.verdict, answers.missed)
     discriminants_at(first, series, number, bar, x, even, asked.rtol, *outputs)
     if asked.wanted[kernels.EXPONENT // 2]:
@@ -170,15 +211,17 @@ def _discriminants_at(answers, first, series, number, bar, x, even):
 
 
 def _parts(row_axis, sought):
-    """The axis in parts: the more points there are, the more of them pay, on which series have fewer terms."""
+    """The axis in parts: the more points there are, the more of them pay, on which series have
+    fewer terms.
+    """
     parts = int(np.clip(row_axis.number // ROWS_PER_PART[sought.factors], 1, MOST_PARTS))
     ends = np.linspace(row_axis.low, row_axis.high, parts + 1)
     return [replace(row_axis, low=float(low), high=float(high)) for low, high in pairwise(ends)]
 
 
 def _shortened(series, bars):
-    """The series (4, across, along) as `points` takes them: the number of terms across that count for each along, and
-    the bounds with what is left out, a tenth of them.
+    """The series (4, across, along) as `points` takes them: the number of terms across that count
+    for each along, and the bounds with what is left out, a tenth of them.
     """
     by_terms = series.transpose(0, 2, 1)
     rest = np.cumsum(abs(by_terms[:, :, ::-1]), axis=2)[:, :, ::-1]
@@ -193,7 +236,11 @@ def _at_points(box, axis, series, number, bars, turns, across, along, position):
     results, nodes = np.empty((position.size, RESULTS)), turns.shape[2] * (2 if axis.even else 1)
     *one, share = _between(across, turns.shape[1], turns.shape[1])
     *other, further = _between(abs(along) if axis.even else along, nodes, turns.shape[2])
-    x, around, shares = np.stack([across, along]), np.stack([*one, *other]), np.stack([share, further])
+    x, around, shares = (
+        np.stack([across, along]),
+        np.stack([*one, *other]),
+        np.stack([share, further]),
+    )
     odd = _odd(box.row_axis, axis, position)
     points(series, number, bars, x, axis.even, odd, turns, around, shares, box.full_period, results)
     return results
@@ -211,7 +258,11 @@ class _Interval:
     @property
     def most(self):
         """The number of DEGREES whose nodes pay."""
-        return int(np.searchsorted(DEGREES, self.number / POINTS_PER_NODE * (2 if self.even else 1), "right"))
+        return int(
+            np.searchsorted(
+                DEGREES, self.number / POINTS_PER_NODE * (2 if self.even else 1), "right"
+            )
+        )
 
 
 def _axis(line, symmetric):
@@ -230,7 +281,9 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
     while (at := int(degree.min(initial=axis.most))) < axis.most:
         rows = np.flatnonzero(degree == at)
         share = NODES_SHARE * asked.rtol
-        values, series, bars, turns, nodal = _series(problem, method, share, rows, int(DEGREES[at]), axis, sought)
+        values, series, bars, turns, nodal = _series(
+            problem, method, share, rows, int(DEGREES[at]), axis, sought
+        )
         served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
         few = np.flatnonzero(served < MOST)
         if nodal is not None and few.size:
@@ -258,12 +311,16 @@ def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, ope
     if wide.any():  # points may miss it: bounds of their own, which cost more
         _discriminants(answers, rows[wide], series[0, wide], None, x, nodal.of(wide))
     if asked.wanted[kernels.EXPONENT // 2]:
-        kernels.exponents(rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.missed)
+        kernels.exponents(
+            rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.missed
+        )
     open_points[rows] = answers.missed.reshape(problem.p.shape)[rows]
 
 
 def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points):
-    """Answer the points x of the rows from the series (4, R, n) of their factors, and `turns` (5, R, nodes)."""
+    """Answer the points x of the rows from the series (4, R, n) of their factors, and `turns` (5,
+    R, nodes).
+    """
     padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
     padded[:, :, : series.shape[2]] = series
     number = turns.shape[2] * (2 if axis.even else 1)
@@ -272,7 +329,15 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
     for part in np.split(np.arange(rows.size), apart):
         for some in (part[i : i + most] for i in range(0, part.size, most)):
             some = slice(some[0], some[-1] + 1)
-            results = _factors(padded[:, some], bars[:, some], x, axis.even, turns[:, some], number, asked.full_period)
+            results = _factors(
+                padded[:, some],
+                bars[:, some],
+                x,
+                axis.even,
+                turns[:, some],
+                number,
+                asked.full_period,
+            )
             answers.assess(results, rule, first=rows[some.start] * x.size)
     # what this leaves without an answer is solved again
     failed = answers.status != status.OK
@@ -281,7 +346,9 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
 
 
 def _factors(series, bars, x, even, turns, number, full_period):
-    """The results (R x, RESULTS) of the points x of rows; the nodes of the `turns` are the first of `number`."""
+    """The results (R x, RESULTS) of the points x of rows; the nodes of the `turns` are the first of
+    `number`.
+    """
     left, right, share = _between(abs(x) if even else x, number, turns.shape[2])
     results = np.empty((turns.shape[1] * x.size, RESULTS))
     series, bars, turns = (np.ascontiguousarray(values) for values in (series, bars, turns))
@@ -290,8 +357,8 @@ def _factors(series, bars, x, even, turns, number, full_period):
 
 
 def _between(x, number, kept):
-    """Which of the `kept` first of `number` nodes are on both sides of x (twice the last where there is none beyond),
-    and the share of the way from one to the other.
+    """Which of the `kept` first of `number` nodes are on both sides of x (twice the last where
+    there is none beyond), and the share of the way from one to the other.
     """
     place = np.arccos(np.clip(np.nan_to_num(x), -1, 1)) * (number / np.pi) - 0.5
     left = np.clip(np.floor(place), 0, kept - 1).astype(np.int64)
@@ -317,7 +384,9 @@ def _padded(series):
 
 @dataclass(frozen=True)
 class Nodal:
-    """How far D from series of R rows may be off: `doubts` (R), and `bars` (R, n) times Lagrange polynomials."""
+    """How far D from series of R rows may be off: `doubts` (R), and `bars` (R, n) times Lagrange
+    polynomials.
+    """
 
     doubts: np.ndarray
     bars: np.ndarray
@@ -328,12 +397,16 @@ class Nodal:
     def between(self):
         """Bounds (R, n) half way from each node to the next."""
         n = self.bars.shape[1]
-        return self.doubts[:, None] + chebyshev.combined(self.bars, chebyshev.lagrange(_half_way(n), n))
+        return self.doubts[:, None] + chebyshev.combined(
+            self.bars, chebyshev.lagrange(_half_way(n), n)
+        )
 
     def across(self, x, doubt):
         """The same of rows at x, from series across these rows, at nodes, that have a doubt of their own."""
         weights = chebyshev.lagrange(x, len(self.doubts))
-        doubts, bars = (chebyshev.combined(values, weights) for values in (self.doubts[None], self.bars.T))
+        doubts, bars = (
+            chebyshev.combined(values, weights) for values in (self.doubts[None], self.bars.T)
+        )
         return Nodal(doubt + doubts[0], bars.T)
 
 
@@ -343,27 +416,48 @@ def _half_way(n):
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     """Answer those `chosen` rows that a series across rows serves; returns the others."""
-    if jit.other_compiler:  # compile this, by a call on nothing, while that process compiles what the nodes need
+    # compile this, by a call on nothing, while that process compiles what the nodes need
+    if jit.other_compiler:
         chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((2, 0)), np.empty((0, 0)))
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
     position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)
     for low, high, series, bars, turns, of_nodes, nodal in served:
         inside = left & (position >= low) & (position <= high)
-        rows, own = chosen[inside], np.empty((len(series), np.count_nonzero(inside), series.shape[2]))
+        rows, own = (
+            chosen[inside],
+            np.empty((len(series), np.count_nonzero(inside), series.shape[2])),
+        )
         if rows.size:
             x = (position[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
             for of, out in zip(series, own, strict=True):
                 chebyshev.restrict(of, x, np.empty((2, series.shape[2])), out)
-            bar, odd = np.repeat(bars[:, None], rows.size, axis=1), _odd(problem.row_axis, axis, position[inside])
-            if (bars > asked.rtol).any():  # points may miss it: bounds of the rows themselves, which cost more
+            bar, odd = (
+                np.repeat(bars[:, None], rows.size, axis=1),
+                _odd(problem.row_axis, axis, position[inside]),
+            )
+            # points may miss it: bounds of the rows themselves, which cost more
+            if (bars > asked.rtol).any():
                 tails, bars_there = of_nodes
-                bar = np.minimum(bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1]))
+                bar = np.minimum(
+                    bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1])
+                )
             if len(own) > 1:
                 own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
             wide = nodal is not None and not (bar[0] <= asked.rtol).all()
             at_rows = nodal.across(x, of_nodes[0][0]) if wide else None
-            _answer(problem, asked, answers, rows, own, bar, _across(turns, x), at_rows, axis, open_points)
+            _answer(
+                problem,
+                asked,
+                answers,
+                rows,
+                own,
+                bar,
+                _across(turns, x),
+                at_rows,
+                axis,
+                open_points,
+            )
         left &= ~inside
     return chosen[left]
 
@@ -374,21 +468,28 @@ def _odd(row_axis, axis, positions):
 
 
 def _across(turns, x):
-    """The `turns` (5, R, m) of rows at x from those (5, n, m) at nodes: means, the least and the largest numbers."""
+    """The `turns` (5, R, m) of rows at x from those (5, n, m) at nodes: means, the least and the
+    largest numbers.
+    """
     if turns is None:
         return None
     left, right, share = _between(x, turns.shape[1], turns.shape[1])
     one, other = turns[:, left], turns[:, right]
-    mean, low, high = one[0] + share[:, None] * (other[0] - one[0]), np.minimum(one, other), np.maximum(one, other)
+    mean, low, high = (
+        one[0] + share[:, None] * (other[0] - one[0]),
+        np.minimum(one, other),
+        np.maximum(one, other),
+    )
     return np.stack([mean, low[1], high[2], low[3], high[4]])
 
 
 @lru_cache(maxsize=64)
 def panels(row_axis, method, rtol, axis, sought):
-    """[(low, high, series (F, n, m), bounds (F), `turns` at nodes, (tails (F), bounds at nodes (F, n)), `Nodal`)] of
-    the panels of rows on which what is sought converges, the same for all blocks.
+    """[(low, high, series (F, n, m), bounds (F), `turns` at nodes, (tails (F), bounds at nodes (F,
+    n)), `Nodal`)] of the panels of rows on which what is sought converges, the same for all blocks.
 
-    The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for it pays.
+    The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for
+    it pays.
     """
     left, found, budget = [(row_axis.low, row_axis.high, 1.0)], [], row_axis.number / ROWS_PER_NODE
     while left:
@@ -407,8 +508,8 @@ def panels(row_axis, method, rtol, axis, sought):
 
 
 def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
-    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at nodes, tails and bounds there, `Nodal`), or
-    None where `rtol` is not met; rows solved, in `budget`).
+    """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at nodes, tails and bounds
+    there, `Nodal`), or None where `rtol` is not met; rows solved, in `budget`).
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
@@ -425,7 +526,9 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
         if sought.factors:
             odd = _odd(row_axis, axis, middle + radius * chebyshev.symmetric_nodes(n))
             series[3], bars[3] = series[3] / odd[:, None], bars[3] / odd
-        surfaces, tails = zip(*(chebyshev.transform(of, matrix, ulps) for of in series), strict=True)
+        surfaces, tails = zip(
+            *(chebyshev.transform(of, matrix, ulps) for of in series), strict=True
+        )
         tails = np.array(tails)
         doubts = tails + chebyshev.lebesgue(n) * bars.max(axis=1)
         served = _served(values, doubts[:, None, None], rtol).mean(axis=(1, 2)).min()
@@ -443,38 +546,46 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
 
 
 def _degrees(problem, axis, rtol, sought):
-    """The index in DEGREES of what each row's D, or its factors, need; beyond DEGREES where none is enough."""
+    """The index in DEGREES of what each row's D, or its factors, need; beyond DEGREES where none is
+    enough.
+    """
     share = 0.5 if sought.factors else 1.0  # they are those of half a period
     if problem.c2:
         least = FACTORS_SHARE * rtol if sought.factors else rtol
         return _enough(share * (2 * problem.span * axis.radius * np.sqrt(problem.c2)), least)
-    # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square root
+    # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square
+    # root
     return _enough(share * (problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1])), rtol)
 
 
 def _enough(kind, rtol):
-    """The index in DEGREES where J_n(kind), about a coefficient, is below rtol; beyond DEGREES where there is none.
+    """The index in DEGREES where J_n(kind), about a coefficient, is below rtol; beyond DEGREES
+    where there is none.
 
     |J_n(x)| <= (x/2)^n / n! (DLMF 10.14.4).
     """
     with np.errstate(divide="ignore"):
-        size = DEGREES * np.log(0.5 * np.e / DEGREES * kind[:, None]) - 0.5 * np.log(2 * np.pi * DEGREES)
+        size = DEGREES * np.log(0.5 * np.e / DEGREES * kind[:, None]) - 0.5 * np.log(
+            2 * np.pi * DEGREES
+        )
     enough = size < np.log(0.01 * rtol)
     return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
 
 
 def _series(problem, method, rtol, rows, n, axis, sought):
-    """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows), and, of factors, the
-    `turns` (5, rows, n) there: rotation numbers, and the least and the largest numbers of zeros of y1, and of y2; of D
-    what is `Nodal`.
+    """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows),
+    and, of factors, the `turns` (5, rows, n) there: rotation numbers, and the least and the largest
+    numbers of zeros of y1, and of y2; of D what is `Nodal`.
 
-    If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 + y2') / 2, y1', y2 and,
-    of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as well as can be; an error bound is not
-    finite where there is none.
+    If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 +
+    y2') / 2, y1', y2 and, of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as
+    well as can be; an error bound is not finite where there is none.
     """
     x = chebyshev.symmetric_nodes(n)
     x = x[: n // 2] if axis.even else x
-    nodes = problem.at(rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy())
+    nodes = problem.at(
+        rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy()
+    )
     finer = Asked(max(rtol, BEST), sought.wanted, together=True, full_period=problem.full_period)
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
@@ -484,7 +595,9 @@ def _series(problem, method, rtol, rows, n, axis, sought):
     turns = None
     if sought.factors:
         zeros = own.results[:, Y1_ZEROS:].T.reshape(2, *nodes.p.shape)
-        turns = np.stack([found[kernels.ROTATION] if sought.turns else zeros[0], *np.repeat(zeros, 2, axis=0)])
+        turns = np.stack(
+            [found[kernels.ROTATION] if sought.turns else zeros[0], *np.repeat(zeros, 2, axis=0)]
+        )
     ulps = (abs(axis.middle) + axis.radius) / axis.radius
     matrix, odd = chebyshev.by_columns(x.size), sought.factors and axis.even
     if odd:

@@ -1,8 +1,10 @@
-"""How a user's function depends on some of its parameters: found by running its code on degrees instead of numbers.
+"""How a user's function depends on some of its parameters: found by running its code on degrees
+instead of numbers.
 
-For each of these parameters a degree is 0 where a value does not depend on it, n where it is a polynomial of degree n
-in it, ENTIRE where it is analytic for all its values, OPAQUE where nothing is known. What is compared or rounded must
-not depend on them: then the code takes the same way for all their values. u is a number, so branches may depend on it.
+For each of these parameters a degree is 0 where a value does not depend on it, n where it is a
+polynomial of degree n in it, ENTIRE where it is analytic for all its values, OPAQUE where nothing
+is known. What is compared or rounded must not depend on them: then the code takes the same way for
+all their values. u is a number, so branches may depend on it.
 """
 
 import math
@@ -13,7 +15,12 @@ from survey.measures.hill import multiprecision
 ENTIRE, OPAQUE = 10**6, math.inf
 # Functions that are analytic everywhere; of others nothing is known.
 ENTIRE_FUNCTIONS = frozenset({"sin", "cos", "sinh", "cosh", "exp", "expm1", "erf", "erfc"})
-OTHER_NAMES = {"fabs": abs, "sign": lambda x: (x > 0) - (x < 0), "power": operator.pow, "mpf": float}
+OTHER_NAMES = {
+    "fabs": abs,
+    "sign": lambda x: (x > 0) - (x < 0),
+    "power": operator.pow,
+    "mpf": float,
+}
 
 
 class Unknown(Exception):
@@ -21,8 +28,8 @@ class Unknown(Exception):
 
 
 class StandIn:
-    """What runs in a user's code instead of numbers and tells something of them in which signs do not matter; a
-    subclass knows sums and products. Code that decides by it is refused.
+    """What runs in a user's code instead of numbers and tells something of them in which signs do
+    not matter; a subclass knows sums and products. Code that decides by it is refused.
     """
 
     __slots__ = ()
@@ -43,7 +50,9 @@ class StandIn:
     def _refused(self, *_):
         raise Unknown("it decides by a parameter")
 
-    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __int__ = __float__ = __index__ = _refused
+    __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __int__ = __float__ = (
+        __index__
+    ) = _refused
     __mod__ = __rmod__ = __floordiv__ = __rfloordiv__ = __round__ = __floor__ = __ceil__ = _refused
     __hash__ = None
 
@@ -93,7 +102,9 @@ def _at_most(degrees, what):
 
 
 class _Functions:
-    """The functions that `multiprecision.lift` gives to the code: those of `math`, of numbers and of degrees."""
+    """The functions that `multiprecision.lift` gives to the code: those of `math`, of numbers and
+    of degrees.
+    """
 
     def __getattr__(self, name):
         plain = OTHER_NAMES.get(name) or getattr(math, name)
@@ -115,11 +126,15 @@ class _Functions:
 
 
 def degrees(function, fixed, at=()):
-    """The highest degree of function(u, p) in each parameter over the u of `at`: 0 of those that are `fixed` (a number,
-    else None). Without `at` the function takes p alone, and may return several numbers. Raises Unknown.
+    """The highest degree of function(u, p) in each parameter over the u of `at`: 0 of those that
+    are `fixed` (a number, else None). Without `at` the function takes p alone, and may return
+    several numbers. Raises Unknown.
     """
     free = [k for k, value in enumerate(fixed) if value is None]
-    p = [Degrees(int(k == i) for i in free) if value is None else value for k, value in enumerate(fixed)]
+    p = [
+        Degrees(int(k == i) for i in free) if value is None else value
+        for k, value in enumerate(fixed)
+    ]
     found = (0,) * len(free)
     try:
         made = multiprecision.lift(function, _Functions())

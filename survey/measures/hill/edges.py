@@ -1,14 +1,16 @@
-"""Edges of the tongues of a Hill problem as points on curves: every zero of the four half-period factors on an axis.
+"""Edges of the tongues of a Hill problem as points on curves: every zero of the four half-period
+factors on an axis.
 
     y1 = 0   even antiperiodic      y2' = 0  odd antiperiodic      y1' = 0  even periodic      y2 = 0  odd periodic
 
-The factors are analytic in every parameter, so on panels short enough each is its Chebyshev series to rounding, and
-the eigenvalues of the series' colleague matrix are all its zeros, double ones too. Each is then bracketed by signs of
-the factor itself that are certain against its error bound. A row is complete when, between its edges and at its ends,
-every factor has the sign that the list implies, and the rotation number counts the same tongues; else its panels are
-halved.
+The factors are analytic in every parameter, so on panels short enough each is its Chebyshev series
+to rounding, and the eigenvalues of the series' colleague matrix are all its zeros, double ones too.
+Each is then bracketed by signs of the factor itself that are certain against its error bound. A row
+is complete when, between its edges and at its ends, every factor has the sign that the list
+implies, and the rotation number counts the same tongues; else its panels are halved.
 
-Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; J. P. Boyd, SIAM J. Numer. Anal. 40 (2002) 1666.
+Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; J. P. Boyd, SIAM J. Numer.
+Anal. 40 (2002) 1666.
 """
 
 from dataclasses import dataclass
@@ -32,7 +34,8 @@ NODES = 24
 CELLS, NEWTON = 192, 5
 # The last coefficients of a converged series, relative to its largest.
 CONVERGED = 1e-9
-# Panels are halved DEEP times; up to DEEPEST about FEW points of a row, where edges accumulate, not where F is noise.
+# Panels are halved DEEP times; up to DEEPEST about FEW points of a row, where edges accumulate, not
+# where F is noise.
 DEEP, DEEPEST, FEW = 13, 45, 4
 HALVINGS = 3
 ROUNDS = 12
@@ -48,7 +51,9 @@ def has_factors(scene):
 
 @dataclass
 class Edges:
-    """Edges by row, ascending: `row`, `position`, its `error`, `kind` (of CLASSES), `index`; and who is `complete`."""
+    """Edges by row, ascending: `row`, `position`, its `error`, `kind` (of CLASSES), `index`; and
+    who is `complete`.
+    """
 
     row: np.ndarray
     position: np.ndarray
@@ -61,7 +66,8 @@ class Edges:
 def find(solve, rows, low, high, panels=4):
     """All edges between `low` and `high` on each of `rows` rows.
 
-    `solve(row, x, wanted)` gives the outputs `wanted`, with their bounds, at x (m, n), one row number for each of m.
+    `solve(row, x, wanted)` gives the outputs `wanted`, with their bounds, at x (m, n), one row
+    number for each of m.
     """
     found, left = [], np.arange(rows)
     complete = np.zeros(rows, np.bool_)
@@ -82,7 +88,9 @@ def find(solve, rows, low, high, panels=4):
 def joined(parts):
     """The Edges of all parts of the same rows, which are complete where each part is."""
     names = ("row", "position", "error", "kind", "index")
-    row, position, *others = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    row, position, *others = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in names
+    )
     order = np.lexsort((position, row))
     complete = np.logical_and.reduce([part.complete for part in parts])
     return Edges(row[order], position[order], *(values[order] for values in others), complete)
@@ -123,14 +131,18 @@ def _halves(one, other):
 def _all_zeros(series):
     """(which series, zero) of all real zeros in [-1, 1] of the series (n, NODES).
 
-    In theta = arccos x a series is seen to have no zero in a cell, or to be monotonic there, from its value and slope
-    in the middle and a bound of its second derivative; where that leaves a cell open, eigenvalues tell.
+    In theta = arccos x a series is seen to have no zero in a cell, or to be monotonic there, from
+    its value and slope in the middle and a bound of its second derivative; where that leaves a cell
+    open, eigenvalues tell.
     """
     k, half = np.arange(NODES), 0.5 * np.pi / CELLS
     edges = np.pi * np.arange(CELLS + 1) / CELLS
     at_edges = series @ np.cos(k[:, None] * edges)
     middle = series @ np.cos(k[:, None] * (edges[:-1] + half))
-    slope, bend = abs(series @ (k[:, None] * np.sin(k[:, None] * (edges[:-1] + half)))), abs(series) @ (k * k)
+    slope, bend = (
+        abs(series @ (k[:, None] * np.sin(k[:, None] * (edges[:-1] + half)))),
+        abs(series) @ (k * k),
+    )
     none = abs(middle) > half * slope + (0.5 * half * half) * bend[:, None]
     changes = (at_edges[:, 1:] < 0) != (at_edges[:, :-1] < 0)
     clear = (none | (slope > half * bend[:, None])).all(axis=1)
@@ -164,7 +176,9 @@ def _close_in(solve, row, kind, x, radius, low, high):
         return of_kind(on_rows(solve, row[who], x, FACTORS), kind[who])
 
     scale = max(abs(low), abs(high))
-    x, width, sure = close_in(function, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x)))
+    x, width, sure = close_in(
+        function, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x))
+    )
     inside = sure & (x >= low) & (x <= high)
     row, kind, x, width = (values[inside] for values in (row, kind, x, width))
     order = np.lexsort((x, kind, row))
@@ -187,7 +201,9 @@ def on_rows(solve, row, x, wanted):
     together[line, slot] = x[order]
     out = solve(row[starts], together.reshape(starts.size, together[:1].size), wanted)
     back = np.argsort(order)
-    return {name: values.reshape(together.shape)[line[back], slot[back]] for name, values in out.items()}
+    return {
+        name: values.reshape(together.shape)[line[back], slot[back]] for name, values in out.items()
+    }
 
 
 def of_kind(out, kind):
@@ -197,16 +213,20 @@ def of_kind(out, kind):
 
 
 def tongue(out, kind):
-    """The tongue's number from the rotation number close by its edge, at m points (n, m), odd where antiperiodic."""
+    """The tongue's number from the rotation number close by its edge, at m points (n, m), odd where
+    antiperiodic.
+    """
     near = np.rint(2 * np.nan_to_num(out["rotation_number"])).astype(int)
     return near[np.arange(kind.size), np.argmax(near % 2 == (kind < 2)[:, None], axis=1)]
 
 
 def close_in(function, x, width, grain, widest=np.inf):
-    """Sharpen simple zeros near x (n) on lines: (x, half width, certain), with opposite, certain signs at its ends.
+    """Sharpen simple zeros near x (n) on lines: (x, half width, certain), with opposite, certain
+    signs at its ends.
 
-    `function(who, x)` gives the functions `who` (m indices into the lines) and their error bounds at x (m, 3);
-    `grain` (n) is the rounding of x; zeros that are not certain between signs `widest` away are given up.
+    `function(who, x)` gives the functions `who` (m indices into the lines) and their error bounds
+    at x (m, 3); `grain` (n) is the rounding of x; zeros that are not certain between signs `widest`
+    away are given up.
     """
     x, width, sure = x.copy(), width.copy(), np.zeros(x.size, np.bool_)
     left = np.arange(x.size)
@@ -221,7 +241,8 @@ def close_in(function, x, width, grain, widest=np.inf):
             step = np.nan_to_num(-f[:, 1] / slope)
             bend = abs((f[:, 2] - f[:, 1]) - (f[:, 1] - f[:, 0])) / abs(f[:, 2] - f[:, 0])
             least = 3 * bar[:, 1] / abs(slope) + 2 * grain[left]
-            reach = np.minimum(least + 4 * bend * step**2 / wide, 0.5 * wide)  # bars, and Newton's error
+            # bars, and Newton's error
+            reach = np.minimum(least + 4 * bend * step**2 / wide, 0.5 * wide)
         better = certain & (abs(step) <= wide) & (least < 0.5 * wide) & (attempt < ROUNDS - 1)
         # the function is far from straight between certain signs: the half that holds the zero
         halved = certain & (abs(step) > wide) & (abs(f[:, 1]) > bar[:, 1]) & (attempt < ROUNDS - 1)
@@ -236,25 +257,36 @@ def close_in(function, x, width, grain, widest=np.inf):
 
 
 def _complete(solve, rows, edges, low, high):
-    """Which rows are complete: the factors' signs and the rotation number are as listed, at the ends and between."""
+    """Which rows are complete: the factors' signs and the rotation number are as listed, at the
+    ends and between.
+    """
     order = np.lexsort((edges[1], edges[0]))
     row, x, width, kind, index = (values[order] for values in edges)
     place = np.searchsorted(rows, row)
-    number, own = np.bincount(place, minlength=rows.size), np.arange(row.size) - np.searchsorted(row, row)
+    number, own = (
+        np.bincount(place, minlength=rows.size),
+        np.arange(row.size) - np.searchsorted(row, row),
+    )
     # of each row both ends, the middles between them and its edges, and its upper end again
     listed = np.full((rows.size, number.max(initial=0) + 2), float(high))
     listed[:, 0], listed[place, own + 1] = low, x
-    points = np.pad(0.5 * (listed[:, :-1] + listed[:, 1:]), ((0, 0), (1, 1)), constant_values=(low, high))
+    points = np.pad(
+        0.5 * (listed[:, :-1] + listed[:, 1:]), ((0, 0), (1, 1)), constant_values=(low, high)
+    )
     out = solve(rows, points, (*FACTORS, *COUNTS))
     known = np.arange(points.shape[1]) < number[:, None] + 3
     last, close = number + 2, np.flatnonzero(own > 0)
     # between edges closer than their errors nothing is known, nor at an end that is an edge
-    known[place[close], own[close] + 1] = np.diff(x)[close - 1] > (width[1:] + width[:-1])[close - 1]
+    known[place[close], own[close] + 1] = (
+        np.diff(x)[close - 1] > (width[1:] + width[:-1])[close - 1]
+    )
     for end, at in ((low, np.zeros_like(last)), (high, last)):
         on = place[abs(x - end) <= width]
         known[on, at[on]] = False
     sound = np.isfinite([out[name] for name in FACTORS]).all(axis=(0, 2))
-    signs = np.stack([np.where(known & (abs(out[n]) > out[f"{n}_error"]), np.sign(out[n]), 0) for n in FACTORS])
+    signs = np.stack(
+        [np.where(known & (abs(out[n]) > out[f"{n}_error"]), np.sign(out[n]), 0) for n in FACTORS]
+    )
     turns = np.zeros(signs.shape, int)
     turns[kind, place, own + 2] = 1
     # the factors change sign at their edges alone
@@ -266,12 +298,20 @@ def _complete(solve, rows, edges, low, high):
     wrong = (before > 0.5) | (after > 0.5) | (before == after)
     sound[place[wrong]] = False
     each = np.arange(rows.size)
-    return sound & ~(abs(band[:, 0] - band[:, 1]) > 0) & ~(abs(band[each, last] - band[each, last - 1]) > 0)
+    return (
+        sound
+        & ~(abs(band[:, 0] - band[:, 1]) > 0)
+        & ~(abs(band[each, last] - band[each, last - 1]) > 0)
+    )
 
 
 def _band(out):
-    """2 theta / 2 pi to the half: n in the gap of tongue n, n + 1/2 in the band above it; NaN where it is not known."""
+    """2 theta / 2 pi to the half: n in the gap of tongue n, n + 1/2 in the band above it; NaN where
+    it is not known.
+    """
     turns, bar = 2 * out["rotation_number"], 2 * out["rotation_number_error"]
     nearest = np.rint(turns)
     inside = (out["verdict"] == STABLE) & (abs(turns - nearest) > bar)
-    return np.where(out["verdict"] == UNSTABLE, nearest, np.where(inside, np.floor(turns) + 0.5, np.nan))
+    return np.where(
+        out["verdict"] == UNSTABLE, nearest, np.where(inside, np.floor(turns) + 0.5, np.nan)
+    )

@@ -1,4 +1,5 @@
-"""A factor F of Hill's problem near positions on a map: value and derivatives, and what follows for the curve F = 0.
+"""A factor F of Hill's problem near positions on a map: value and derivatives, and what follows for
+the curve F = 0.
 
 Positions are those of `survey.measures.square`.
 """
@@ -50,7 +51,9 @@ def expander(solve, square):
     """The function that expands F (see `curves.trace` for `solve`)."""
 
     def expansion(x, kind, length, low, high, count=True):
-        """The Expansion at positions x, from nine points that are close against a step of `length`, in low ... high."""
+        """The Expansion at positions x, from nine points that are close against a step of `length`,
+        in low ... high.
+        """
         spacing = np.minimum(np.maximum(SPACING * length, LEAST)[:, None], 0.2 * (high - low))
         middle = np.clip(x, low + spacing, high - spacing)
         nine = square.parameters(middle[:, None] + spacing[:, None] * STENCIL[:, None])
@@ -59,12 +62,18 @@ def expander(solve, square):
         out = on_rows(lambda own, x, names: solve(q[own, None], x, names), row.ravel(), p, wanted)
         f, _ = of_kind({name: values.reshape(-1, 3, 3) for name, values in out.items()}, kind)
         h, k = spacing.T
-        gradient = np.stack([(f[:, 2, 1] - f[:, 0, 1]) / (2 * h), (f[:, 1, 2] - f[:, 1, 0]) / (2 * k)], axis=1)
+        gradient = np.stack(
+            [(f[:, 2, 1] - f[:, 0, 1]) / (2 * h), (f[:, 1, 2] - f[:, 1, 0]) / (2 * k)], axis=1
+        )
         qq = (f[:, 2, 1] - 2 * f[:, 1, 1] + f[:, 0, 1]) / h**2
         pp = (f[:, 1, 2] - 2 * f[:, 1, 1] + f[:, 1, 0]) / k**2
         qp = (f[:, 2, 2] - f[:, 2, 0] - f[:, 0, 2] + f[:, 0, 0]) / (4 * h * k)
         second = np.stack([qq, qp, qp, pp], axis=1).reshape(-1, 2, 2)
-        turns = 2 * out["rotation_number"].reshape(f.shape)[:, 1, 1] if count else np.full(kind.size, np.nan)
+        turns = (
+            2 * out["rotation_number"].reshape(f.shape)[:, 1, 1]
+            if count
+            else np.full(kind.size, np.nan)
+        )
         return Expansion(f[:, 1, 1], gradient, second, turns).moved(x - middle)
 
     return expansion

@@ -1,8 +1,10 @@
-"""Folds of edge curves: points where F = 0 and dF/dp = 0, so that two edges of a row meet and vanish.
+"""Folds of edge curves: points where F = 0 and dF/dp = 0, so that two edges of a row meet and
+vanish.
 
-On a short panel of p about a curve's turn, F(q, .) is its Chebyshev series to rounding. Its stationary value g(q) there
-is analytic with a simple zero at the fold, which is bracketed by certain signs of g. Its p is where the derivative of
-the series vanishes; its error bound is that of the derivative (Bernstein's inequality) over the second derivative.
+On a short panel of p about a curve's turn, F(q, .) is its Chebyshev series to rounding. Its
+stationary value g(q) there is analytic with a simple zero at the fold, which is bracketed by
+certain signs of g. Its p is where the derivative of the series vanishes; its error bound is that of
+the derivative (Bernstein's inequality) over the second derivative.
 
 Sources: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3 and 15;
 P. Borwein, T. Erdelyi, Polynomials and Polynomial Inequalities (1995), section 5.1.
@@ -28,7 +30,9 @@ WIDER = (1, 4, 16)  # panels: times the step at the turn
 
 @dataclass
 class Folds:
-    """`curve` of each fold, its position `x` (m, 2) in the square and the `error` (m, 2) of both coordinates."""
+    """`curve` of each fold, its position `x` (m, 2) in the square and the `error` (m, 2) of both
+    coordinates.
+    """
 
     curve: np.ndarray
     x: np.ndarray
@@ -48,15 +52,24 @@ def find(solve, square, curves):
     kind = curves.kind[whose[at]]
 
     def stationary(who, q, start, wider=1):
-        """(p, value, its bound, bound of p) where F(q, .) is stationary near p = start (m), on each panel; q (m, n)."""
+        """(p, value, its bound, bound of p) where F(q, .) is stationary near p = start (m), on each
+        panel; q (m, n).
+        """
         half = np.minimum(wider * radius[who], 0.5)
         middle = np.clip(start, half, 1 - half)
         p = (middle[:, None] + half[:, None] * X)[:, None]
         here = square.parameters(np.stack(np.broadcast_arrays(q[..., None], p), axis=-1))
         out = solve(here[..., 0, 0].reshape(-1, 1), here[..., 1].reshape(-1, NODES), FACTORS)
-        f, bar = of_kind({name: values.reshape(*q.shape, NODES) for name, values in out.items()}, kind[who])
+        f, bar = of_kind(
+            {name: values.reshape(*q.shape, NODES) for name, values in out.items()}, kind[who]
+        )
         x, value, bar, off = _stationary(f, bar, ((start - middle) / half)[:, None])
-        return middle[:, None] + half[:, None] * x, value, bar, np.where(abs(x) < 1, half[:, None] * off, np.inf)
+        return (
+            middle[:, None] + half[:, None] * x,
+            value,
+            bar,
+            np.where(abs(x) < 1, half[:, None] * off, np.inf),
+        )
 
     q, width, sure = close_in(
         lambda who, q: stationary(who, q, guess[who, 1])[1:3],
@@ -66,7 +79,8 @@ def find(solve, square, curves):
     )
     sides = q[:, None] + width[:, None] * np.array([-1.0, 0.0, 1.0])
     p, error = guess[:, 1], np.full(at.size, np.inf)
-    for wider in WIDER:  # the series' derivative is sharper on a longer panel, as long as the series converges
+    # the series' derivative is sharper on a longer panel, as long as the series converges
+    for wider in WIDER:
         new, _, _, off = stationary(np.arange(at.size), sides, p, wider)
         off = off.max(axis=1) + np.ptp(new, axis=1) + square.grain
         better = (off < error) & (abs(new[:, 1] - p) <= error + off)  # not another stationary point
@@ -77,9 +91,15 @@ def find(solve, square, curves):
 
 
 def _stationary(f, bar, x):
-    """Where the series through f (..., NODES) is stationary near x: (x, value, its bound, bound of x), x in [-1, 1]."""
+    """Where the series through f (..., NODES) is stationary near x: (x, value, its bound, bound of
+    x), x in [-1, 1].
+    """
     series = f @ TO_SERIES.T
-    bar = LEBESGUE * bar.max(axis=-1) + 2 * abs(series[..., -2:]).sum(axis=-1) + 4 * EPS * abs(series).sum(axis=-1)
+    bar = (
+        LEBESGUE * bar.max(axis=-1)
+        + 2 * abs(series[..., -2:]).sum(axis=-1)
+        + 4 * EPS * abs(series).sum(axis=-1)
+    )
     columns = np.moveaxis(series, -1, 0)
     first, second = chebyshev.chebder(columns), chebyshev.chebder(columns, 2)
     x = x + np.zeros(bar.shape)

@@ -1,4 +1,5 @@
-"""Hill's question: is y'' + z(t) y = 0, z even and of period T, stable? Half-period factors, verdict, Floquet data.
+"""Hill's question: is y'' + z(t) y = 0, z even and of period T, stable? Half-period factors,
+verdict, Floquet data.
 
 With y1, y2 the solutions with y1(0) = y2'(0) = 1, y1'(0) = y2(0) = 0, and everything at T/2:
 
@@ -46,10 +47,12 @@ OUTPUTS = (
 
 @dataclass(frozen=True)
 class RowAxis:
-    """An axis of `number` rows from position `low` to `high`; equal keys, and so equal axes, mean the same equations.
+    """An axis of `number` rows from position `low` to `high`; equal keys, and so equal axes, mean
+    the same equations.
 
-    The factors are analytic in the position; `at(positions)` is the Problem of rows there, without points of its own.
-    Where p -> -p exchanges y1 and y2', y1 - y2' is analytic when divided by `odd(positions)`, if that is given.
+    The factors are analytic in the position; `at(positions)` is the Problem of rows there, without
+    points of its own. Where p -> -p exchanges y1 and y2', y1 - y2' is analytic when divided by
+    `odd(positions)`, if that is given.
     """
 
     key: Hashable
@@ -62,8 +65,9 @@ class RowAxis:
 
 @dataclass(frozen=True)
 class Box:
-    """Where points on their own lie: between the ends of `row_axis`, and of `line` (number, least, greatest) of p;
-    `number`s that stand for as many points on a map. `even` and `full_period` as of a Problem.
+    """Where points on their own lie: between the ends of `row_axis`, and of `line` (number, least,
+    greatest) of p; `number`s that stand for as many points on a map. `even` and `full_period` as of
+    a Problem.
     """
 
     row_axis: RowAxis
@@ -73,13 +77,16 @@ class Box:
 
 
 def boxed(points):
-    """The number of rows, and of points in each, that stand for so many `points` on their own; None if they are few."""
+    """The number of rows, and of points in each, that stand for so many `points` on their own; None
+    if they are few.
+    """
     return int(1.5 * points**0.5) if points >= FEWEST else None
 
 
 @dataclass(frozen=True)
 class Problem:
-    """R rows of L points: y'' + (c0(t) + p c1(t) + p^2 c2) y = 0 on half a period, p varying along the row.
+    """R rows of L points: y'' + (c0(t) + p c1(t) + p^2 c2) y = 0 on half a period, p varying along
+    the row.
 
     `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
     (rows, steps, 2, nodes); `walk(rows, p, tolerance)`, for adaptive methods, gives the results of a chain for
@@ -115,7 +122,9 @@ class Problem:
     p_low: np.ndarray | None = None
 
     def lengths(self, rows, steps):
-        """Lengths of the steps (rows, steps), some an ulp longer or shorter, evenly spread, to fill the half period."""
+        """Lengths of the steps (rows, steps), some an ulp longer or shorter, evenly spread, to fill
+        the half period.
+        """
         if self.cut:
             return self.cut(rows, steps)
         span = self.span[rows]
@@ -128,7 +137,9 @@ class Problem:
         return h[:, None] + ulp[:, None] * np.diff(ulps, axis=1)
 
     def at(self, rows, p, rule=None):
-        """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say of them."""
+        """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say
+        of them.
+        """
         span_low = None if self.span_low is None else self.span_low[rows]
         return replace(
             self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
@@ -140,9 +151,11 @@ class Problem:
 
 
 def of_rows(rows, sample, walk, exact=None):
-    """The functions of a Problem from a scene's kernels, which take some of its `rows` (R, ...) and fill `out`.
+    """The functions of a Problem from a scene's kernels, which take some of its `rows` (R, ...) and
+    fill `out`.
 
-    `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, low, steps, out)` or None.
+    `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, low,
+    steps, out)` or None.
     """
 
     def samples(used, nodes, steps):
@@ -169,7 +182,11 @@ def solve(problem, method, rtol, wanted=()):
     `method` is the name of a method, or "auto" (see `auto`); points climb its ladder until
     `rtol` is met or more work is of no use.
     """
-    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]), full_period=problem.full_period)
+    asked = Asked(
+        rtol,
+        np.array([name in wanted or not wanted for name in FLOATS]),
+        full_period=problem.full_period,
+    )
     answers = Answers(problem.p.size, asked)
     if method == "auto":
         decide = not wanted or not DECIDED.isdisjoint(wanted)
@@ -182,20 +199,29 @@ def solve(problem, method, rtol, wanted=()):
 def _outputs(answers, asked, shape):
     out = {"verdict": answers.verdict.reshape(shape), "status": answers.status.reshape(shape)}
     for i in np.flatnonzero(asked.wanted):
-        out[FLOATS[i]], out[f"{FLOATS[i]}_error"] = answers.floats[2 * i : 2 * i + 2].reshape(2, *shape)
+        out[FLOATS[i]], out[f"{FLOATS[i]}_error"] = answers.floats[2 * i : 2 * i + 2].reshape(
+            2, *shape
+        )
     return out
 
 
 def cost(rows, points):
-    """Seconds per point of `rows` rows of `points` each, all outputs; measured on one thread of a Xeon of 2023."""
+    """Seconds per point of `rows` rows of `points` each, all outputs; measured on one thread of a
+    Xeon of 2023.
+    """
     return SECONDS[bool(points >= DENSE) + bool(rows >= DENSE and points >= DENSE)]
 
 
 def solve_scattered(box, position, p, problem_of, rtol, wanted=()):
-    """As `solve` by "auto", (N, 1), of points on their own at `position` and `p` (N each; NaN where no series serves):
-    from series on their `box`; `problem_of(points)` is the Problem of those that are left.
+    """As `solve` by "auto", (N, 1), of points on their own at `position` and `p` (N each; NaN where
+    no series serves): from series on their `box`; `problem_of(points)` is the Problem of those that
+    are left.
     """
-    asked = Asked(rtol, np.array([name in wanted or not wanted for name in FLOATS]), full_period=box.full_period)
+    asked = Asked(
+        rtol,
+        np.array([name in wanted or not wanted for name in FLOATS]),
+        full_period=box.full_period,
+    )
     answers = Answers(p.size, asked)
     left = np.flatnonzero(auto.scattered(box, asked, answers, position, p))
     if left.size:
@@ -206,7 +232,9 @@ def solve_scattered(box, position, p, problem_of, rtol, wanted=()):
 
 
 def overflow(out, where):
-    """Take back the answers of the points `where` a value or bound lies beyond the range of floats; changes `out`."""
+    """Take back the answers of the points `where` a value or bound lies beyond the range of floats;
+    changes `out`.
+    """
     if where.any():
         failed = (out["status"] == status.OK) & where
         out["status"] = np.where(failed, status.OVERFLOW, out["status"]).astype(np.int8)

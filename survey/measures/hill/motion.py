@@ -1,4 +1,6 @@
-"""The solutions y1, y2 of Hill's equation over some periods, and its multipliers: the trajectory of a point."""
+"""The solutions y1, y2 of Hill's equation over some periods, and its multipliers: the trajectory of
+a point.
+"""
 
 from math import ceil
 
@@ -9,13 +11,16 @@ from survey.measures import linear_motion
 from survey.scene import Trajectory
 
 PERIODS, GROWTH = 6, 7.0  # number of periods, unless the solution grows beyond e^7
-PHASE, LEAST, MOST = 0.05, 240, 20_000  # radians per step; steps per period, and half of them, are even
+# radians per step; steps per period, and half of them, are even
+PHASE, LEAST, MOST = 0.05, 240, 20_000
 
 
 def solve(problem, answer, time, name="t", damping=0.0):
-    """The Trajectory of a Problem of one point, of which `answer` is known, up to the time `time` (or what suits).
+    """The Trajectory of a Problem of one point, of which `answer` is known, up to the time `time`
+    (or what suits).
 
-    With `damping` c that of y'' + 2 c y' + z y = 0, whose multipliers are e^(-c T) times a pair l, 1 / l.
+    With `damping` c that of y'' + 2 c y' + z y = 0, whose multipliers are e^(-c T) times a pair l,
+    1 / l.
     """
     period = float(answer["period"])
     periods = _number(float(answer["exponent"])) if time is None else max(1, ceil(time / period))
@@ -26,11 +31,16 @@ def solve(problem, answer, time, name="t", damping=0.0):
     matrices[..., 0, 1], matrices[..., 1, 0], matrices[..., 1, 1] = 1.0, -z, -2.0 * damping
     terms = abs(matrices[:, 0])
     terms[:, 1, 0] = size
-    t, y, bars = linear_motion.fundamental(matrices, lengths, periods, np.array([1.0, max(fastest, 1.0)]), terms)
+    t, y, bars = linear_motion.fundamental(
+        matrices, lengths, periods, np.array([1.0, max(fastest, 1.0)]), terms
+    )
     if time is not None:
         kept = t <= time * (1 + 1e-12)
         t, y, bars = t[kept], y[kept], bars[kept]
-    loss, trace = np.exp(-damping * period), np.array([answer["discriminant"], answer["discriminant_error"]], float)
+    loss, trace = (
+        np.exp(-damping * period),
+        np.array([answer["discriminant"], answer["discriminant_error"]], float),
+    )
     pair, off = linear_motion.of_trace(*trace / loss)
     slack = 16 * EPS * abs(damping * period)  # of e^(-c T), relative, and so of both
     pair, off = loss * pair, loss * (off * (1 + 2 * slack) + 2 * slack * abs(pair) * bool(damping))
@@ -41,7 +51,9 @@ def solve(problem, answer, time, name="t", damping=0.0):
     }
     for i in range(2):
         words = f"solution with y(0) = {1 - i}, y'(0) = {i}"
-        data |= linear_motion.value(name, f"y{i + 1}", f"y_{i + 1}", words, y[:, 0, i], bars[:, 0, i])
+        data |= linear_motion.value(
+            name, f"y{i + 1}", f"y_{i + 1}", words, y[:, 0, i], bars[:, 0, i]
+        )
     return Trajectory(data, (("lines", name, "y1", "y2"), ("multipliers",)))
 
 
@@ -51,7 +63,9 @@ def _number(exponent):
 
 
 def _sampled(problem, steps):
-    """z at the nodes of all steps of a period (steps, 9), the size of the terms whose sum it is, and their lengths."""
+    """z at the nodes of all steps of a period (steps, 9), the size of the terms whose sum it is,
+    and their lengths.
+    """
     c0, c1 = problem.sample(np.array([0]), linear_motion.NODES, steps)[0].transpose(1, 0, 2)
     p, lengths = problem.p[0, 0], problem.lengths(np.array([0]), steps)[0]
     z = c0 + p * c1 + p * p * problem.c2

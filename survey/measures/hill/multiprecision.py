@@ -1,9 +1,12 @@
-"""A user's function in more digits: its own Python code, with mpmath's functions instead of those of math and numpy.
+"""A user's function in more digits: its own Python code, with mpmath's functions instead of those
+of math and numpy.
 
-Numbers that stand in the code, or beside it, are the binary64 numbers that they are; what is computed from them, the
-parameters and u is computed with PRECISION bits. What cannot be run so raises Unsupported, whose text says why.
+Numbers that stand in the code, or beside it, are the binary64 numbers that they are; what is
+computed from them, the parameters and u is computed with PRECISION bits. What cannot be run so
+raises Unsupported, whose text says why.
 
-Source: F. Johansson and others, mpmath: a Python library for arbitrary-precision floating-point arithmetic.
+Source: F. Johansson and others, mpmath: a Python library for arbitrary-precision floating-point
+arithmetic.
 """
 
 import builtins
@@ -29,7 +32,19 @@ SAME = frozenset(
     "sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh atanh exp expm1 log log1p log10 sqrt cbrt fabs hypot "
     "floor ceil gamma erf erfc degrees radians power sign".split()
 )
-BUILTINS = ("abs", "bool", "int", "len", "max", "min", "pow", "range", "sum", "ArithmeticError", "ValueError")
+BUILTINS = (
+    "abs",
+    "bool",
+    "int",
+    "len",
+    "max",
+    "min",
+    "pow",
+    "range",
+    "sum",
+    "ArithmeticError",
+    "ValueError",
+)
 LOCK = threading.Lock()  # mpmath's numbers are not for two threads at a time
 DISPATCHER = type(fresh(lambda: None))
 
@@ -55,7 +70,9 @@ def lifted(function):
     def call(*arguments):
         try:
             value = made(*arguments)
-            return mp.mpf(value) if isinstance(value, (bool, int, float, mp.mpf)) else _numbers(value)
+            return (
+                mp.mpf(value) if isinstance(value, (bool, int, float, mp.mpf)) else _numbers(value)
+            )
         except Unsupported:
             raise
         except Exception as error:
@@ -65,14 +82,18 @@ def lifted(function):
 
 
 def lift(function, mp):
-    """The same function on the numbers that the context `mp` makes: with its functions, named as mpmath names them."""
+    """The same function on the numbers that the context `mp` makes: with its functions, named as
+    mpmath names them.
+    """
     return _lift(function, {}, mp)
 
 
 def _numbers(values):
     """A tuple or list of numbers as numbers of `context`."""
     mp = context()
-    if isinstance(values, (list, tuple)) and all(isinstance(v, (int, float, mp.mpf)) for v in values):
+    if isinstance(values, (list, tuple)) and all(
+        isinstance(v, (int, float, mp.mpf)) for v in values
+    ):
         return [mp.mpf(value) for value in values]
     raise Unsupported(f"it returns {type(values).__name__}, which is not a real number")
 
@@ -157,7 +178,10 @@ OTHERS = {  # of a context
 
 def _function(function, seen, mp):
     """A copy of a Python function whose names mean lifted values."""
-    code, scope = function.__code__, {"__builtins__": {name: getattr(builtins, name) for name in BUILTINS}}
+    code, scope = (
+        function.__code__,
+        {"__builtins__": {name: getattr(builtins, name) for name in BUILTINS}},
+    )
     scope["__builtins__"]["float"] = mp.mpf
     cells = tuple(CellType() for _ in function.__closure__ or ())
     made = FunctionType(code, scope, function.__name__, None, cells)
@@ -179,17 +203,21 @@ def _names(code):
 
 
 def series(z, edges, start, nodes):
-    """What `sampled_double` needs of z(u), steps beginning at `start`, ends of pieces at `edges`, numbers of `context`.
+    """What `sampled_double` needs of z(u), steps beginning at `start`, ends of pieces at `edges`,
+    numbers of `context`.
 
-    Power series (steps, nodes, 2) and lengths (steps, 2) as double-doubles, the sizes of the last four Chebyshev
-    coefficients pair by pair and of z (3, steps), and u and z at the nodes (steps, nodes). None where z cannot be run.
+    Power series (steps, nodes, 2) and lengths (steps, 2) as double-doubles, the sizes of the last
+    four Chebyshev coefficients pair by pair and of z (3, steps), and u and z at the nodes (steps,
+    nodes). None where z cannot be run.
     """
     mp = context()
     ends = [mp.mpf(float(u)) for u in start] + [edges[-1]]
     for edge in edges[1:-1]:
         ends[int(abs(start - float(edge)).argmin())] = edge
     lengths = [high - low for low, high in pairwise(ends)]
-    points = [[low + h * x for x in _nodes(nodes)] for low, h in zip(ends[:-1], lengths, strict=True)]
+    points = [
+        [low + h * x for x in _nodes(nodes)] for low, h in zip(ends[:-1], lengths, strict=True)
+    ]
     try:
         values = [[z(u) for u in step] for step in points]
     except Unsupported:
@@ -198,7 +226,13 @@ def series(z, edges, start, nodes):
         return None
     found, sizes = zip(*(_polynomial(step) for step in values), strict=True)
     lengths = np.array([_two(h) for h in lengths])
-    return np.array(found), lengths, np.array(sizes).T, np.array(points, float), np.array(values, float)
+    return (
+        np.array(found),
+        lengths,
+        np.array(sizes).T,
+        np.array(points, float),
+        np.array(values, float),
+    )
 
 
 def _polynomial(values):
@@ -236,16 +270,21 @@ def _nodes(number):
 
 @cache
 def _transforms(number):
-    """From values at `_nodes`: rows that give the power series, and the last four Chebyshev coefficients, 2^BITS times.
+    """From values at `_nodes`: rows that give the power series, and the last four Chebyshev
+    coefficients, 2^BITS times.
 
-    T_j(2 x - 1) has integer coefficients (of x^n, below 6^j): the digits that they cost are among BITS.
+    T_j(2 x - 1) has integer coefficients (of x^n, below 6^j): the digits that they cost are among
+    BITS.
     """
     from mpmath.libmp import to_fixed
 
     mp = type(context())()
     mp.prec = BITS + 64
     cosines = [
-        [(1 + (j > 0)) * mp.cos(mp.pi * j * (number - i - 0.5) / number) / number for i in range(number)]
+        [
+            (1 + (j > 0)) * mp.cos(mp.pi * j * (number - i - 0.5) / number) / number
+            for i in range(number)
+        ]
         for j in range(number)
     ]
     shifted = [[1], [-1, 2]]
@@ -254,6 +293,9 @@ def _transforms(number):
         up, same = [0, *one], [*one, 0]
         shifted.append([4 * u - 2 * s - b for u, s, b in zip(up, same, before, strict=True)])
     power = [
-        [sum(shifted[j][n] * cosines[j][i] for j in range(n, number)) for i in range(number)] for n in range(number)
+        [sum(shifted[j][n] * cosines[j][i] for j in range(n, number)) for i in range(number)]
+        for n in range(number)
     ]
-    return tuple([[to_fixed(x._mpf_, BITS) for x in row] for row in rows] for rows in (power, cosines[-4:]))
+    return tuple(
+        [[to_fixed(x._mpf_, BITS) for x in row] for row in rows] for rows in (power, cosines[-4:])
+    )

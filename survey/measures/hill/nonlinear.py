@@ -1,11 +1,14 @@
-"""Nonlinear stability of a satellite's planar motions where linear motion across the plane is stable.
+"""Nonlinear stability of a satellite's planar motions where linear motion across the plane is
+stable.
 
-With the spin's integral the body has two degrees of freedom, so that Arnold's and Moser's theorem holds on every level
-of energy: where the twist of the isoenergetic map is not 0, closed curves about the motion bound all that starts near
-it. The map is odd in the angle from the plane: it has no terms of order 2, and third-order resonance no effect; at that
-of order 4 the twist must outweigh the resonant term.
+With the spin's integral the body has two degrees of freedom, so that Arnold's and Moser's theorem
+holds on every level of energy: where the twist of the isoenergetic map is not 0, closed curves
+about the motion bound all that starts near it. The map is odd in the angle from the plane: it has
+no terms of order 2, and third-order resonance no effect; at that of order 4 the twist must outweigh
+the resonant term.
 
-Source: C. L. Siegel, J. K. Moser, Lectures on Celestial Mechanics (1971), 32, 34; `scenes/satellite.md`.
+Source: C. L. Siegel, J. K. Moser, Lectures on Celestial Mechanics (1971), 32, 34;
+`scenes/satellite.md`.
 """
 
 import numpy as np
@@ -29,7 +32,9 @@ NAMES = {output.name for output in OUTPUTS}
 
 
 def solve(row, rho, found):
-    """{name: values, name_error: bars} of all OUTPUTS at rho (n, m); `found` has `verdict`, `discriminant` and bars."""
+    """{name: values, name_error: bars} of all OUTPUTS at rho (n, m); `found` has `verdict`,
+    `discriminant` and bars.
+    """
     c0 = 0.0 if row.oblate else 1.0
     k = np.broadcast_to(row.k[:, None], rho.shape)
     half = np.broadcast_to(row.half[0][:, None], rho.shape)

@@ -1,7 +1,8 @@
-"""Points of a Hill problem solved one by one, by a method, on the rungs of its ladder (`survey.measures.answers`).
+"""Points of a Hill problem solved one by one, by a method, on the rungs of its ladder
+(`survey.measures.answers`).
 
-Points of a row with the same number of steps share the row's samples; rows with the same number go through one kernel
-call of at most about a second.
+Points of a row with the same number of steps share the row's samples; rows with the same number go
+through one kernel call of at most about a second.
 """
 
 import numpy as np
@@ -14,8 +15,8 @@ from survey.measures.answers import Ladder
 from survey.measures.hill.answers import Answers
 
 BOUNDS = slice(Y1_BAR, DY2_BAR + 1)
-# Numbers of steps: even, so that a half period's middle falls between steps; four to the octave from 8 on. A point
-# climbs to 1.4 times as many at least.
+# Numbers of steps: even, so that a half period's middle falls between steps; four to the octave
+# from 8 on. A point climbs to 1.4 times as many at least.
 _NUMBERS = np.array([4, 6, *((4 + i % 4) << (i // 4 + 1) for i in range(57))])
 STEPS = Ladder(_NUMBERS, np.searchsorted(_NUMBERS, 1.4 * _NUMBERS), BOUNDS, most=len(_NUMBERS))
 # Of adaptive methods: tolerances of a step, 10^(-3 - i / 2).
@@ -37,7 +38,8 @@ def solve(problem, method, asked, answers, where=None):
     inside = where.reshape(problem.p.shape)
     rows = np.flatnonzero(inside.any(axis=1))  # leave out those that have no such point
     count = inside[rows].sum(axis=1)
-    chosen = np.arange(count.max(initial=1)) < count[:, None]  # the points of each row, side by side
+    # the points of each row, side by side
+    chosen = np.arange(count.max(initial=1)) < count[:, None]
     p, points = np.full(chosen.shape, np.nan), np.flatnonzero(where)
     p[chosen] = problem.p.reshape(-1)[points]
     rule = None
@@ -53,7 +55,9 @@ def _solve(problem, method, asked, answers, chosen):
     """The answers of the `chosen` points of the flat problem."""
     adaptive = methods.adaptive(method)
     run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
-    first = _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked)
+    first = (
+        _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked)
+    )
     rung = first.reshape(-1)[chosen].copy()
     rule = None if problem.rule is None else problem.rule.reshape(-1)[chosen]
 
@@ -75,29 +79,38 @@ def _solve(problem, method, asked, answers, chosen):
     answers.status[rung == UNTRIED] = status.INVALID_PARAMETERS
     answers.status[rung > ladder.top] = status.STEP_LIMIT
     results = run_at(chosen, rung)
-    answers.status[(answers.status == status.OK) & np.isnan(results[:, Y1_ZEROS])] = status.STEP_LIMIT
+    answers.status[(answers.status == status.OK) & np.isnan(results[:, Y1_ZEROS])] = (
+        status.STEP_LIMIT
+    )
     answers.assess(results, rule)
     ladder.climb(rung, results, answers, again, assess)
     answers.results = results
 
 
 def _first_steps(problem, method, asked):
-    """The first rung (R, L) with as many steps as the method asks for; above the top where none has; UNTRIED at NaN."""
+    """The first rung (R, L) with as many steps as the method asks for; above the top where none
+    has; UNTRIED at NaN.
+    """
     phase, distance = method.hill_density(asked.rtol)
     phase = max(phase, 1 / LONGEST)
     if not asked.together:
         return _first_rungs(problem, phase, distance)
     known = np.isfinite(problem.p)
     size = abs(np.where(known, problem.p, 0.0)).max(axis=1)
-    frequency = np.sqrt(problem.bound[:, 0] + size * (problem.bound[:, 1] + size * problem.bound[:, 2]))
+    frequency = np.sqrt(
+        problem.bound[:, 0] + size * (problem.bound[:, 1] + size * problem.bound[:, 2])
+    )
     steps = np.maximum(phase * frequency * problem.span, distance * problem.rate * problem.span)
-    return np.where(known & np.isfinite(steps)[:, None], np.searchsorted(STEPS.rungs, steps)[:, None], UNTRIED)
+    return np.where(
+        known & np.isfinite(steps)[:, None], np.searchsorted(STEPS.rungs, steps)[:, None], UNTRIED
+    )
 
 
 def _first_tolerance(problem, rtol):
     """The first rung (R, L) whose tolerance is a share of rtol, or the top one; UNTRIED at NaN.
 
-    The share falls as the number of steps grows whose errors add up: with rtol^(-1/8) for a method of order 8.
+    The share falls as the number of steps grows whose errors add up: with rtol^(-1/8) for a method
+    of order 8.
     """
     tolerance = 0.03 * rtol**1.125
     first = int(np.searchsorted(-TOLERANCES.rungs, -max(tolerance, TOLERANCES.rungs[-1])))
@@ -106,12 +119,16 @@ def _first_tolerance(problem, rtol):
 
 def _first_rungs(problem, phase, distance):
     rung = np.empty(problem.p.shape, np.int64)
-    first_rungs(problem.p, problem.bound, problem.span, problem.rate, phase, distance, STEPS.rungs, rung)
+    first_rungs(
+        problem.p, problem.bound, problem.span, problem.rate, phase, distance, STEPS.rungs, rung
+    )
     return rung
 
 
 def _walk(problem, method, rung, out):
-    """Points one by one, each with its tolerance; results are NaN (zeros too) where the end was not reached."""
+    """Points one by one, each with its tolerance; results are NaN (zeros too) where the end was not
+    reached.
+    """
     points = np.flatnonzero(rung >= 0)
     rows, tolerance = points // rung.shape[1], TOLERANCES.rungs[rung.reshape(-1)[points]]
     results, reached = problem.walk(rows, problem.p.reshape(-1)[points], tolerance)
@@ -119,7 +136,9 @@ def _walk(problem, method, rung, out):
 
 
 def _chain(problem, method, rung, out):
-    """Points solved by fixed steps: those with the same number of steps together, in calls of bounded work."""
+    """Points solved by fixed steps: those with the same number of steps together, in calls of
+    bounded work.
+    """
     order, rows, on_rung, starts, ends = _segments(rung)
     nodes, p = np.array(method.NODES), problem.p.reshape(-1)
     scattered = rung.shape[1] < LANES_PER_ROW
@@ -130,12 +149,15 @@ def _chain(problem, method, rung, out):
         else:
             method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
 
-    if jit.other_compiler:  # compile this, by calls on nothing, while that process compiles the rest
+    # compile this, by calls on nothing, while that process compiles the rest
+    if jit.other_compiler:
         compose(np.empty((0, 0, 2, nodes.size)), np.empty((0, 0)), starts[:0], ends[:0])
     for at in np.flatnonzero(np.bincount(on_rung)):
         steps, own = int(STEPS.rungs[at]), on_rung == at
         segment = rows[own], starts[own], ends[own]
-        for used, first, last in _calls(*(_by_point(*segment) if scattered else segment), steps, nodes.size):
+        for used, first, last in _calls(
+            *(_by_point(*segment) if scattered else segment), steps, nodes.size
+        ):
             compose(problem.sample(used, nodes, steps), problem.lengths(used, steps), first, last)
 
 
@@ -172,6 +194,8 @@ def _calls(rows, starts, ends, steps, nodes):
     most_rows, first = max(1, CALL_SAMPLES // (steps * nodes)), 0
     while first < rows.size:
         done = total[first - 1] if first else 0
-        last = max(first + 1, min(first + most_rows, int(np.searchsorted(total, done + most, "right"))))
+        last = max(
+            first + 1, min(first + most_rows, int(np.searchsorted(total, done + most, "right")))
+        )
         yield rows[first:last], starts[first:last], ends[first:last]
         first = last

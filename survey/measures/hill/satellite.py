@@ -1,4 +1,6 @@
-"""Planar motions of a satellite, a row each: from what is given to moduli, periods and rho, and no digit is lost."""
+"""Planar motions of a satellite, a row each: from what is given to moduli, periods and rho, and no
+digit is lost.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,18 +17,25 @@ CLOSE = 1e-17  # of means: what is left of their difference
 
 
 def moduli(point):
-    """k, the complement (of 1/k for rotations), what was given, and which it is: no digit is lost near k = 1.
+    """k, the complement (of 1/k for rotations), what was given, and which it is: no digit is lost
+    near k = 1.
 
     From k, from 1 - k, or from the amplitude asin k.
     """
     if "amplitude" in point:
         amplitude = np.asarray(point["amplitude"], dtype=float)
-        return np.sin(amplitude), np.cos(amplitude), amplitude, np.full_like(amplitude, motion.AMPLITUDE)
+        return (
+            np.sin(amplitude),
+            np.cos(amplitude),
+            amplitude,
+            np.full_like(amplitude, motion.AMPLITUDE),
+        )
     with np.errstate(all="ignore"):
         if "one_minus_k" in point:
             given = short = np.asarray(point["one_minus_k"], dtype=float)
             which, high = motion.ONE_MINUS_K, 1 - short
-            k = np.where(short < 0, np.maximum(high, np.nextafter(1, 2)), high)  # a rotation remains one
+            # a rotation remains one
+            k = np.where(short < 0, np.maximum(high, np.nextafter(1, 2)), high)
         else:
             given = k = np.asarray(point["k"], dtype=float)
             which, short = motion.K, 1 - k
@@ -38,7 +47,8 @@ def moduli(point):
 
 
 def planar_angle(u, k, kc):
-    """The angle x (m) of a planar motion at u (m), sin x = k sn(u, k) or x = am(k u, 1/k), and bounds of its error.
+    """The angle x (m) of a planar motion at u (m), sin x = k sn(u, k) or x = am(k u, 1/k), and
+    bounds of its error.
 
     kc is the complement, of 1/k for rotations. DLMF 22.20(ii): am by descending means of 1 and kc.
     """
@@ -61,7 +71,8 @@ def rates(inertia_ratio, direction):
     """rho = +-1 / sqrt(3 |1 - alpha|) rounded, and what float64 took from it."""
     with np.errstate(all="ignore"):
         short = 1 - inertia_ratio
-        rest = (1 - (short - (short - 1))) - (inertia_ratio + (short - 1))  # the rounding of 1 - alpha, exactly (Knuth)
+        # the rounding of 1 - alpha, exactly (Knuth)
+        rest = (1 - (short - (short - 1))) - (inertia_ratio + (short - 1))
         short, rest = abs(short), np.sign(short) * rest
         rho = 1 / np.sqrt(3 * short)
         # one step of Newton's: 1 - 3 rho^2 (short + rest), each product with its own rounding
@@ -69,7 +80,9 @@ def rates(inertia_ratio, direction):
         triple = 3 * square
         triple_rest = split_error(3.0, square, triple) + 3 * split_error(rho, rho, square)
         total = triple * short
-        missing = (1 - total) - (split_error(triple, short, total) + (triple * rest + triple_rest * short))
+        missing = (1 - total) - (
+            split_error(triple, short, total) + (triple * rest + triple_rest * short)
+        )
         low = 0.5 * rho * missing
         high = rho + low
         return float(direction) * high, float(direction) * (low - (high - rho))
@@ -77,7 +90,9 @@ def rates(inertia_ratio, direction):
 
 @dataclass(frozen=True)
 class Motion:
-    """The planar motions of the rows: k, the complement, what was given and which, and what follows from them."""
+    """The planar motions of the rows: k, the complement, what was given and which, and what follows
+    from them.
+    """
 
     k: np.ndarray
     kc: np.ndarray
@@ -110,7 +125,9 @@ class Motion:
         return np.maximum(self.k, 1) / conjugate
 
     def lyapunov(self, rho, period):
-        """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability, rounding aside?"""
+        """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability,
+        rounding aside?
+        """
         total, bar = self.lyapunov_integral(rho, period)
         return (total <= 4 - bar) & (self._nonnegative(rho) if self.oblate else True)
 
@@ -119,7 +136,8 @@ class Motion:
         k, period, rotates = self.k[:, None], period[:, None], self.rotates[:, None]
         first, second = (values[:, None] for values in self.integrals)
         squares = np.where(rotates, 2 * k * second, 4 * (second - self.kc[:, None] ** 2 * first))
-        drift = np.where(rotates, pi * rho, 0.0)  # integral of w over T, times rho: am advances by pi
+        # integral of w over T, times rho: am advances by pi
+        drift = np.where(rotates, pi * rho, 0.0)
         c = -k * k if self.oblate else (1 - k) * (1 + k)
         size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
         return period * (2 * squares + 2 * drift + (rho * rho + c) * period), 100 * EPS * size
@@ -145,7 +163,9 @@ class Motion:
         return (least > bar) & (unit * greatest + off < (n + 1) ** 2)
 
     def _nonnegative(self, rho):
-        """z > 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over the range of w."""
+        """z > 0 all along an oblate body's motion: the least of 2 w^2 + 2 rho w + rho^2 - k^2 over
+        the range of w.
+        """
         k = self.k[:, None]
         low = np.where(self.rotates[:, None], k * self.kc[:, None], -k)
         w = np.clip(-rho / 2, low, k)

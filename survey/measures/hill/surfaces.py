@@ -1,4 +1,5 @@
-"""The surfaces that [boundaries] draws in a box of three parameters of Hill's equation: the edges of its tongues.
+"""The surfaces that [boundaries] draws in a box of three parameters of Hill's equation: the edges
+of its tongues.
 
 They are zeros of the four factors at half a period, as the edges on rows are (see `edges`).
 """
@@ -11,7 +12,8 @@ from survey.scene import Request
 __all__ = ["ALONG", "CLASSES", "TITLE", "Functions"]
 TITLE = "kind of the periodic solution at the edge"
 ALONG = ()
-RTOL, ROUGH = 1e-11, 1e-9  # of the factors at corners of triangles, and to see where the surfaces are
+# of the factors at corners of triangles, and to see where the surfaces are
+RTOL, ROUGH = 1e-11, 1e-9
 
 
 class Functions:
@@ -37,5 +39,7 @@ class Functions:
         values = self.box.parameters(x)
         point = self.fixed | {name: values[:, k] for k, name in enumerate(self.axes)}
         with np.errstate(all="ignore"):
-            out = self.scene.solve(point, Request(self.options, self.method, rtol, frozenset(names)))
+            out = self.scene.solve(
+                point, Request(self.options, self.method, rtol, frozenset(names))
+            )
         return {FACTORS.index(name): (out[name], out[f"{name}_error"]) for name in names}

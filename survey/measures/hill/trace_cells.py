@@ -1,4 +1,5 @@
-"""The cells of [refine] of Hill's equations that are not even, from the trace D of the monodromy matrix.
+"""The cells of [refine] of Hill's equations that are not even, from the trace D of the monodromy
+matrix.
 
 Stable where 2 - D and 2 + D are both positive, unstable where one is negative; both are analytic in the parameters (see
 `survey.measures.sign_cells`). A tongue in which |D| exceeds 2 by less than what the series leave out stays undecided.

@@ -1,17 +1,19 @@
-"""The curves that [boundaries] draws of Hill's equations without factors at T/2: z is not even, or there is damping.
+"""The curves that [boundaries] draws of Hill's equations without factors at T/2: z is not even, or
+there is damping.
 
 Without damping the monodromy matrix over one period T has determinant 1, so that with its trace D
 
     1 - D^2 / 4 = t^2 - r^2,   t = (y2 - y1') / 2,   r^2 = ((y1 - y2') / 2)^2 + ((y2 + y1') / 2)^2.
 
-Of the edges of tongues, which have D = 2 or -2, one has t = r, the other one t = -r. Where a tongue is narrow t - r and
-t + r have simple zeros, as t changes sign inside it, but D lies beyond 2 or -2 by r^2 only; where a band between
-tongues is narrow D - 2 and D + 2 have them, but t exceeds r only a little. Of both together an edge is a simple zero
-wherever it is, with a sign by the number of edges that have been passed, which verdict and rotation number tell.
+Of the edges of tongues, which have D = 2 or -2, one has t = r, the other one t = -r. Where a tongue
+is narrow t - r and t + r have simple zeros, as t changes sign inside it, but D lies beyond 2 or -2
+by r^2 only; where a band between tongues is narrow D - 2 and D + 2 have them, but t exceeds r only
+a little. Of both together an edge is a simple zero wherever it is, with a sign by the number of
+edges that have been passed, which verdict and rotation number tell.
 
-In y'' + 2 c y' + z y = 0 a multiplier is 1 or -1 where the trace is plus or minus 1 + e^(-2 c T). All these zeros are
-searched for as those of linear periodic systems are: see `survey.measures.floquet.curves`, also about what may be
-missed. There are no edges of rows.
+In y'' + 2 c y' + z y = 0 a multiplier is 1 or -1 where the trace is plus or minus 1 + e^(-2 c T).
+All these zeros are searched for as those of linear periodic systems are: see
+`survey.measures.floquet.curves`, also about what may be missed. There are no edges of rows.
 """
 
 from dataclasses import replace
@@ -54,7 +56,9 @@ class _System:
     def solved(self, point, request, *wanted):
         """These outputs of the scene."""
         # `auto` would go on to more digits beside the curves, which are of no use here
-        return self.scene.solve(point, replace(request, method="taylor16", variables=frozenset(wanted)))
+        return self.scene.solve(
+            point, replace(request, method="taylor16", variables=frozenset(wanted))
+        )
 
 
 class _Undamped(_System):
@@ -64,16 +68,24 @@ class _Undamped(_System):
 
     def functions(self, _n):
         """[(class of the zeros, function of what `solve` gives -> (values, error bounds))]."""
-        return [(PLUS_ONE if which in (0, 3) else MINUS_ONE, partial(_edge, which)) for which in range(4)]
+        return [
+            (PLUS_ONE if which in (0, 3) else MINUS_ONE, partial(_edge, which))
+            for which in range(4)
+        ]
 
     def passed(self, edges, doubt):
         """{class: how many of its edges have been passed (N)}, UNKNOWN where that is not certain."""
         plus = (edges + 3) // 4 + edges // 4
         counts = {PLUS_ONE: plus, MINUS_ONE: edges - plus}
-        return {kind: np.where(doubt == 0.0, count, UNKNOWN).astype(int) for kind, count in counts.items()}
+        return {
+            kind: np.where(doubt == 0.0, count, UNKNOWN).astype(int)
+            for kind, count in counts.items()
+        }
 
     def solve(self, point, request):
-        """{"monodromy": (N, 2, 2), "edges": how many edges of tongues have been passed (N), and "_error" of both}."""
+        """{"monodromy": (N, 2, 2), "edges": how many edges of tongues have been passed (N), and
+        "_error" of both}.
+        """
         out = self.solved(point, request, *ENTRIES, *COUNTS, "period")
         M, E = (np.stack([out[name + end] for name in ENTRIES], axis=-1) for end in ("", "_error"))
         unit = (out["period"] / np.pi)[:, None] ** np.array([0.0, -1.0, 1.0, 0.0])
@@ -98,23 +110,29 @@ class _Damped(_System):
 
 
 def _passed(M, out):
-    """How many edges have been passed, 2 n in tongue n and 2 n + 1 above it, and by how many this may be wrong."""
+    """How many edges have been passed, 2 n in tongue n and 2 n + 1 above it, and by how many this
+    may be wrong.
+    """
     turns, bar = 2.0 * out["rotation_number"], 2.0 * out["rotation_number_error"]
     nearest = np.rint(turns)
     # t > 0 above even tongues: next to an edge the rotation number alone leaves two bands open
     even = M[:, 0, 1] > M[:, 1, 0]
-    band = np.where(abs(turns - nearest) > bar, np.floor(turns), nearest - ((nearest % 2 == 0) != even))
+    band = np.where(
+        abs(turns - nearest) > bar, np.floor(turns), nearest - ((nearest % 2 == 0) != even)
+    )
     stable, unstable = out["verdict"] == STABLE, out["verdict"] == UNSTABLE
     edges = np.where(stable, 2.0 * band + 1.0, 2.0 * nearest)
     return edges, np.where((stable | unstable) & (bar < 0.5), 0.0, np.inf)
 
 
 def _edge(which, M, E, edges, doubt):
-    """A function that changes sign at edge number `which` of four, 0 being that above tongue 0, and at every fourth one
-    from there: the distance from t = r or t = -r and D = 2 or -2, which is 0 there alone, and its bounds.
+    """A function that changes sign at edge number `which` of four, 0 being that above tongue 0, and
+    at every fourth one from there: the distance from t = r or t = -r and D = 2 or -2, which is 0
+    there alone, and its bounds.
     """
     plus = which in (0, 3)
-    # the number of the tongue: what moves there is nearly cos(tongue time), and r is small in units of 1 / tongue
+    # the number of the tongue: what moves there is nearly cos(tongue time), and r is small in units
+    # of 1 / tongue
     tongue = 2.0 * np.rint(0.5 * (0.5 * edges - (not plus))) + (not plus)
     unit = np.maximum(tongue, 1.0)
     half = 0.5 * (1.0 + 8.0 * EPS)

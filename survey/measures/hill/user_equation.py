@@ -1,6 +1,8 @@
-"""A user's z(u, p) as a Hill problem: every point a row of its own, and what its steps need measured from z itself.
+"""A user's z(u, p) as a Hill problem: every point a row of its own, and what its steps need
+measured from z itself.
 
-z is sampled at Chebyshev points on each piece between its breaks. From the coefficients c_k on a piece of length 2 L:
+z is sampled at Chebyshev points on each piece between its breaks. From the coefficients c_k on a
+piece of length 2 L:
 
     rate    max over k of (k / L) / (1 + ln(max |c| / |c_k|)): 1 / distance of the nearest singularity where c_k falls
             geometrically, the highest frequency that matters where z is entire
@@ -9,7 +11,8 @@ z is sampled at Chebyshev points on each piece between its breaks. From the coef
 The noise enters the bounds: z is passed on as (z - B) + B, so that its rounding counts relative to B >= max |z|, and
 B is as large as the noise asks. All depends on the point alone.
 
-Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and 8.
+Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 3, 7 and
+8.
 """
 
 from functools import cache, lru_cache
@@ -24,8 +27,9 @@ from survey.kernels.lanes import RESULTS
 from survey.measures.hill import bands, monodromy, multiprecision, pointwise
 
 SIZES = (65, 513, 4097)
-# Evenly spread points of the part that is solved at which z is probed, however smooth it seems; those when a scene is
-# checked; and the least number between two breaks. All but the fewest Chebyshev points lie closer than PROBES.
+# Evenly spread points of the part that is solved at which z is probed, however smooth it seems;
+# those when a scene is checked; and the least number between two breaks. All but the fewest
+# Chebyshev points lie closer than PROBES.
 PROBES, CHECKED, LEAST_PROBES = 128, 16384, 8
 # Relative to max |z|: z is resolved where its last coefficients are below the first, rough where above the second.
 RESOLVED, ROUGH = 1e-14, 1e-8
@@ -33,25 +37,28 @@ RESOLVED, ROUGH = 1e-14, 1e-8
 MIRRORED = 1e-8
 # What the bars of every method allow at least for the rounding of z, relative to B.
 ROUNDING = 8.8e-16
-# z is asked for no nearer to a break than this share of the period: rounding decides there on which side.
+# z is asked for no nearer to a break than this share of the period: rounding decides there on which
+# side.
 SLACK = 2.0**-50
 # Steps are distributed by rate, and by frequency at this share of it.
 BY_PHASE = 0.15
-# DOP853 makes no step longer than this share of the distance to a singularity: it would pass a spike unseen.
+# DOP853 makes no step longer than this share of the distance to a singularity: it would pass a
+# spike unseen.
 STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
 # So few points are asked one by one whether z may have spikes.
 FEW = 8
 # The most steps in double-double: 20 ms a hundred.
 EXACT_STEPS = 2000
-# z in float64 and with more digits may differ by this many times the rounding that the bounds allow for.
+# z in float64 and with more digits may differ by this many times the rounding that the bounds allow
+# for.
 SAME_Z = 1000
 
 
 @lru_cache(maxsize=32)
 def kernels(z):
-    """Kernels of the function z(u, p): `sample(points, u, out)`, z at u (N, M); `probe`, z between these; `walk`,
-    DOP853 point by point.
+    """Kernels of the function z(u, p): `sample(points, u, out)`, z at u (N, M); `probe`, z between
+    these; `walk`, DOP853 point by point.
     """
     z = inline(getattr(z, "py_func", z))
 
@@ -63,10 +70,11 @@ def kernels(z):
 
     @fresh
     def probe(points, ends, values, size, x, number, missed):
-        """How far z (N, M) at the points x of ends (N, 2) misses z at the one of `number` points most unlike the rest.
+        """How far z (N, M) at the points x of ends (N, 2) misses z at the one of `number` points
+        most unlike the rest.
 
-        That is where the sixth differences of z at evenly spread points are largest: in the middle of seven. Where all
-        are below ROUGH times the `size` of z there is none.
+        That is where the sixth differences of z at evenly spread points are largest: in the middle
+        of seven. Where all are below ROUGH times the `size` of z there is none.
         """
         for i in range(len(points)):
             low, step = ends[i, 0], (ends[i, 1] - ends[i, 0]) / number[i]
@@ -124,17 +132,26 @@ def at(z, points, u):
 
 
 class Steps:
-    """How the steps of rows are distributed over the pieces between breaks: by `size` and `rate` of z (R, P)."""
+    """How the steps of rows are distributed over the pieces between breaks: by `size` and `rate` of
+    z (R, P).
+    """
 
     def __init__(self, edges, slack, size, rate):
         self.edges, self.slack, self.rate = edges, slack, rate
         self.length, self.end = np.diff(edges, axis=1), edges[:, -1]
         self.pieces = np.count_nonzero(self.length > 0, axis=1)
         self.more = np.where(self.pieces > 1, self.pieces, 0) / self.end
-        # Each piece gets steps by its weight: enough in all that each has what it needs, and one more.
-        self.weight = self.length * np.maximum(np.maximum(BY_PHASE * np.sqrt(size), rate), 1 / self.end[:, None])
+        # Each piece gets steps by its weight: enough in all that each has what it needs, and one
+        # more.
+        self.weight = self.length * np.maximum(
+            np.maximum(BY_PHASE * np.sqrt(size), rate), 1 / self.end[:, None]
+        )
         self.total = np.cumsum(self.weight, axis=1)[:, -1:]
-        self.need = self.length * self.total / (np.where(self.weight > 0, self.weight, 1) * self.end[:, None])
+        self.need = (
+            self.length
+            * self.total
+            / (np.where(self.weight > 0, self.weight, 1) * self.end[:, None])
+        )
 
     def frequency(self, size):
         """What stands for the fastest phase of a whole row with this `size` of z."""
@@ -146,7 +163,9 @@ class Steps:
         return (self.need * self.rate).max(axis=1) + 2 * self.more
 
     def of(self, rows, number):
-        """Starts and lengths of the steps (rows, number), and the ends between which z may be asked for in each."""
+        """Starts and lengths of the steps (rows, number), and the ends between which z may be asked
+        for in each.
+        """
         i, length, weight = np.arange(rows.size)[:, None], self.length[rows], self.weight[rows]
         share = (number - self.pieces[rows, None]) * (weight / self.total[rows])
         count = np.floor(share).astype(int) + (length > 0)
@@ -164,12 +183,15 @@ class Steps:
 
 
 def problem(z, points, edges, period, slack, even, exact=None):
-    """The Hill problem of z at the points (N, n), and where z is `rough`, not smooth between its breaks.
+    """The Hill problem of z at the points (N, n), and where z is `rough`, not smooth between its
+    breaks.
 
-    `exact(point, edges)`, if given, says z(u) and the `edges` (P + 1) of a point in more digits (`multiprecision`).
+    `exact(point, edges)`, if given, says z(u) and the `edges` (P + 1) of a point in more digits
+    (`multiprecision`).
 
-    `edges` (N, P + 1): 0, the breaks, and the end of the part that is solved, T/2 if `even`, else T; where a point has
-    fewer, its last one repeated. Points whose z is rough, not finite, or not even where it should be, have span NaN.
+    `edges` (N, P + 1): 0, the breaks, and the end of the part that is solved, T/2 if `even`, else
+    T; where a point has fewer, its last one repeated. Points whose z is rough, not finite, or not
+    even where it should be, have span NaN.
     """
     size, rate, scale, rough = measured(z, points, edges, period if even else None, slack)
     steps = Steps(edges, slack, size, rate)
@@ -198,7 +220,9 @@ def problem(z, points, edges, period, slack, even, exact=None):
 
 
 def walked(z, points, rows, steps, scale, tolerance):
-    """The results of the `points`, each of one of the `rows`, by DOP853, and which of them reached the end."""
+    """The results of the `points`, each of one of the `rows`, by DOP853, and which of them reached
+    the end.
+    """
     out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
     stride = STRIDE / steps.rate[rows].max(axis=1)
     own = points, steps.edges[rows], steps.pieces[rows], steps.slack[rows], stride, scale[rows]
@@ -212,7 +236,9 @@ def solved_exactly(z, points, rows, steps, scale, even, exact, number):
     for i in np.flatnonzero(number <= EXACT_STEPS):
         start = steps.of(rows[i : i + 1], number[i])[0][0]
         with multiprecision.LOCK:
-            found = multiprecision.series(*exact(points[i], steps.edges[rows[i]]), start, sampled_double.NODES)
+            found = multiprecision.series(
+                *exact(points[i], steps.edges[rows[i]]), start, sampled_double.NODES
+            )
         if found is None or not _agree(z, points[i], scale[rows[i]], *found[3:]):
             continue
         terms, lengths, sizes = found[:3]
@@ -227,7 +253,9 @@ def _agree(z, point, scale, u, values):
 
 
 def unprobed(z, points, edges, slack, size):
-    """Which points (N), whose z is of this `size` (N), are known to have no spikes between samples (see `bands`)."""
+    """Which points (N), whose z is of this `size` (N), are known to have no spikes between samples
+    (see `bands`).
+    """
     if not len(points) or edges.shape[1] != 2 or slack.any():
         return np.zeros(len(points), np.bool_)
     most, end = np.nan_to_num(abs(points)), float(np.nan_to_num(edges[:, -1]).max())
@@ -235,16 +263,22 @@ def unprobed(z, points, edges, slack, size):
     known = found <= 10 * RESOLVED * size
     if isfinite(found):  # where z is small by its parameters, each for itself
         for i in np.flatnonzero(~known)[:FEW]:
-            known[i] = bands.missed(z, tuple(most[i].tolist()), end, SIZES[0]) <= 10 * RESOLVED * size[i]
+            known[i] = (
+                bands.missed(z, tuple(most[i].tolist()), end, SIZES[0]) <= 10 * RESOLVED * size[i]
+            )
     return known
 
 
 def measured(z, points, edges, period, slack, probes=PROBES):
     """Of each piece `size` = max |z| and `rate` (N, P); of each point `scale` = B, NaN if z is not finite, and `rough`.
 
-    With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ. `probes` as PROBES.
+    With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ.
+    `probes` as PROBES.
     """
-    shape, owner = (len(points), edges.shape[1] - 1), np.repeat(np.arange(len(points)), edges.shape[1] - 1)
+    shape, owner = (
+        (len(points), edges.shape[1] - 1),
+        np.repeat(np.arange(len(points)), edges.shape[1] - 1),
+    )
     left, right = edges[:, :-1].reshape(-1, 1), edges[:, 1:].reshape(-1, 1)
 
     def values(pieces, number, mirrored=False):
@@ -257,10 +291,16 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         """The points, the ends (N, 2) and the number of probes of each piece."""
         ends, own = np.concatenate([left[pieces], right[pieces]], axis=1), owner[pieces]
         share = np.diff(ends, axis=1)[:, 0] / edges[own, -1]
-        return points[own], ends, np.maximum(np.ceil(probes * np.nan_to_num(share)), LEAST_PROBES).astype(np.int64)
+        return (
+            points[own],
+            ends,
+            np.maximum(np.ceil(probes * np.nan_to_num(share)), LEAST_PROBES).astype(np.int64),
+        )
 
     def between(pieces, known, size):
-        """How far z is from its interpolant at the probes: few Chebyshev points lie further apart than these."""
+        """How far z is from its interpolant at the probes: few Chebyshev points lie further apart
+        than these.
+        """
         own, ends, number = probed(pieces)
         out = np.empty(len(pieces))
         for count in np.unique(number):
@@ -286,13 +326,18 @@ def measured(z, points, edges, period, slack, probes=PROBES):
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
             if number == SIZES[0]:
                 own = owner[some[smooth]]
-                smooth = smooth[~unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])]
+                smooth = smooth[
+                    ~unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])
+                ]
             some = some[smooth]
             if not some.size:
                 continue
             hidden = (between if number == SIZES[0] else missed)(some, known[smooth], size[some])
             hidden[~(hidden > 10 * RESOLVED * size[some] + 4 * noise[some])] = 0
-            noise[some], last[some] = np.maximum(noise[some], hidden), np.maximum(last[some], hidden)
+            noise[some], last[some] = (
+                np.maximum(noise[some], hidden),
+                np.maximum(last[some], hidden),
+            )
         unresolved = unresolved[last[unresolved] > RESOLVED * size[unresolved]]
         if not unresolved.size:
             break
@@ -301,14 +346,27 @@ def measured(z, points, edges, period, slack, probes=PROBES):
     size, rate, noise, last, off = (a.reshape(shape) for a in (size, rate, noise, last, off))
     scale, off = size.max(axis=1), off.max(axis=1)
     known = np.maximum(scale, np.maximum(noise.max(axis=1), off) / ROUNDING)
-    return size, rate, np.where(off <= MIRRORED * scale, known, np.nan), (last > ROUGH * size).any(axis=1)
+    return (
+        size,
+        rate,
+        np.where(off <= MIRRORED * scale, known, np.nan),
+        (last > ROUGH * size).any(axis=1),
+    )
 
 
 def unlike(z, points, ends, known, size, number):
     """See `probe` of `kernels`: `known` (N, M) are values of z at Chebyshev points between `ends` (N, 2)."""
     out = np.empty(len(points))
     try:
-        kernels(z).probe(np.ascontiguousarray(points), ends, known, size, chebyshev_points(known.shape[1]), number, out)
+        kernels(z).probe(
+            np.ascontiguousarray(points),
+            ends,
+            known,
+            size,
+            chebyshev_points(known.shape[1]),
+            number,
+            out,
+        )
     except Exception as error:
         raise Raised from error
     return out
@@ -359,7 +417,9 @@ def interpolated(values, x, u):
 
 
 def spectrum(values):
-    """max |z|, rate (on [-1, 1]), noise and the largest of the last coefficients, from z at Chebyshev points (n, M)."""
+    """max |z|, rate (on [-1, 1]), noise and the largest of the last coefficients, from z at
+    Chebyshev points (n, M).
+    """
     size, rate, noise, last = np.empty((4, len(values)))
     if values.shape[1] == SIZES[0]:
         series = np.empty((0, SIZES[0]))
@@ -372,7 +432,9 @@ def spectrum(values):
 
 @kernel
 def fall(values, series, transform, size, rate, noise, last):
-    """See `spectrum`: from the sizes of the coefficients, `series`, or, if that is empty, by `transform` (M, M)."""
+    """See `spectrum`: from the sizes of the coefficients, `series`, or, if that is empty, by
+    `transform` (M, M).
+    """
     count = values.shape[1]
     own, n = np.empty(count), count - 1
     for i in range(len(values)):

@@ -1,8 +1,9 @@
-"""A user's z(u, p) as rows of a Hill problem: z = c0(u) + p_k c1(u) along the axis of a parameter on which it depends
-linearly (`dependence`), and series across the axis of another one on which it depends analytically.
+"""A user's z(u, p) as rows of a Hill problem: z = c0(u) + p_k c1(u) along the axis of a parameter
+on which it depends linearly (`dependence`), and series across the axis of another one on which it
+depends analytically.
 
-c0 and c1 follow from z at both ends of the axis of p_k, between which z is a mean of the two: so are bounds of its size
-and of its noise. All depends on the row and on the axes, never on the block.
+c0 and c1 follow from z at both ends of the axis of p_k, between which z is a mean of the two: so
+are bounds of its size and of its noise. All depends on the row and on the axes, never on the block.
 """
 
 from dataclasses import dataclass
@@ -15,8 +16,8 @@ from survey.measures.hill.user_equation import Steps, at, measured
 
 @dataclass(frozen=True)
 class Axes:
-    """The parameter `lane` (its index) along the rows, and its axis `line`; `across` is the one, if any, across them,
-    and `row_line` its axis.
+    """The parameter `lane` (its index) along the rows, and its axis `line`; `across` is the one, if
+    any, across them, and `row_line` its axis.
     """
 
     lane: int
@@ -26,16 +27,21 @@ class Axes:
 
 
 def problem(z, key, axes, points, lanes, ranges, even, exact=None):
-    """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), and where a row is `rough` (R).
+    """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), and where a row is
+    `rough` (R).
 
-    `ranges(points)` gives periods, edges and slack as `user_equation` takes them; what it gives, and z, is named by
-    the hashable `key`.
+    `ranges(points)` gives periods, edges and slack as `user_equation` takes them; what it gives,
+    and z, is named by the hashable `key`.
     """
     period, edges, slack = ranges(points)
     ends = [_with(points, axes.lane, end) for end in axes.line[1:]]
     both = np.concatenate(ends)
-    known = measured(z, both, np.tile(edges, (2, 1)), np.tile(period, 2) if even else None, np.tile(slack, 2))
-    sizes, rate, scale, rough = (values.reshape(2, len(points), *values.shape[1:]) for values in known)
+    known = measured(
+        z, both, np.tile(edges, (2, 1)), np.tile(period, 2) if even else None, np.tile(slack, 2)
+    )
+    sizes, rate, scale, rough = (
+        values.reshape(2, len(points), *values.shape[1:]) for values in known
+    )
     rate, scale, rough = rate.max(axis=0), scale.max(axis=0), rough.any(axis=0)
     steps = Steps(edges, slack, sizes.max(axis=0), rate)
 
@@ -49,7 +55,9 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None):
         return out
 
     def walk(rows, p, tolerance):
-        return user_equation.walked(z, _with(points[rows], axes.lane, p), rows, steps, scale, tolerance)
+        return user_equation.walked(
+            z, _with(points[rows], axes.lane, p), rows, steps, scale, tolerance
+        )
 
     def exactly(rows, p, low, number):
         own = _with(points[rows], axes.lane, p)
@@ -73,20 +81,26 @@ def _row_axis(z, key, axes, points, ranges, even):
 
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
-        return problem(z, key, Axes(axes.lane, axes.line), own, np.zeros((positions.size, 0)), ranges, even)[0]
+        return problem(
+            z, key, Axes(axes.lane, axes.line), own, np.zeros((positions.size, 0)), ranges, even
+        )[0]
 
     return monodromy.RowAxis((key, axes, others), *axes.row_line, at=rows_at)
 
 
 def box(z, key, axes, point, ranges, even):
-    """The box of points on their own between the ends of both axes; all other parameters are those of a `point`."""
+    """The box of points on their own between the ends of both axes; all other parameters are those
+    of a `point`.
+    """
     point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
     row_axis = _row_axis(z, key, axes, point, ranges, even)
     return monodromy.Box(row_axis, axes.line, full_period=not even)
 
 
 def _bound(low_square, high_square, low, high):
-    """Bounds (R, 3) of z by |p|, of what is at most these squares of frequencies at both ends, and a mean between."""
+    """Bounds (R, 3) of z by |p|, of what is at most these squares of frequencies at both ends, and
+    a mean between.
+    """
     slope = (high_square - low_square) / (high - low)
     if low >= 0 or high <= 0:
         slope = slope if low >= 0 else -slope

@@ -1,4 +1,6 @@
-"""Why a point of Hill's equation has its verdict, in a sentence: which factor decided, against which error bar."""
+"""Why a point of Hill's equation has its verdict, in a sentence: which factor decided, against
+which error bar.
+"""
 
 from survey.measures.hill.edges import FACTORS
 from survey.scene import plus_minus
@@ -37,13 +39,17 @@ def _by_trace(answer):
     elif off > bar:
         side = f"{_times(off, bar)} its error bar: " + ("|D| > 2" if abs(d) > 2 else "|D| < 2")
     else:
-        side = "less than its error bar: the factors at T/2, more digits of D or an exact rule decide"
+        side = (
+            "less than its error bar: the factors at T/2, more digits of D or an exact rule decide"
+        )
     return f"D = {plus_minus(d, bar)}, {off:.2g} from |D| = 2, {side}"
 
 
 def _product(answer, one, other):
     """The product of two factors and its error bound."""
-    (x, dx), (y, dy) = ((float(answer[name]), float(answer[f"{name}_error"])) for name in (one, other))
+    (x, dx), (y, dy) = (
+        (float(answer[name]), float(answer[f"{name}_error"])) for name in (one, other)
+    )
     return x * y, abs(x) * dy + abs(y) * dx + dx * dy
 
 

@@ -24,7 +24,9 @@ class Answers(answers.Answers):
     def inaccurate(self, rtol):
         """Whose error bounds exceed rtol (1 + |value|), or who has no answer (N)."""
         a, a_bar, b, b_bar = self.floats[[SUM, SUM_BAR, PAIRS, PAIRS_BAR]]
-        return ~((a_bar <= rtol * (1 + abs(a))) & (b_bar <= rtol * (1 + abs(b)))) | (self.status != status.OK)
+        return ~((a_bar <= rtol * (1 + abs(a))) & (b_bar <= rtol * (1 + abs(b)))) | (
+            self.status != status.OK
+        )
 
     @property
     def unsettled(self):

@@ -1,8 +1,9 @@
-"""Danby's map everywhere in cells of mu and e: the verdict of whole cells, and the area of each verdict.
+"""Danby's map everywhere in cells of mu and e: the verdict of whole cells, and the area of each
+verdict.
 
-The traces a and b are analytic in mu and e, and with them P = b + 2a + 2, Q = b - 2a + 2, K = a^2 - 4b + 8 and 4 -+ a:
-stable where all five are positive, unstable where one is negative (`scenes/libration_elliptic.md`, section 3): see
-`survey.measures.sign_cells`.
+The traces a and b are analytic in mu and e, and with them P = b + 2a + 2, Q = b - 2a + 2, K = a^2 -
+4b + 8 and 4 -+ a: stable where all five are positive, unstable where one is negative
+(`scenes/libration_elliptic.md`, section 3): see `survey.measures.sign_cells`.
 """
 
 import numpy as np

@@ -1,8 +1,10 @@
-"""The mass ratios at which the verdict on the triangular points of the circular problem changes; there are no others.
+"""The mass ratios at which the verdict on the triangular points of the circular problem changes;
+there are no others.
 
-Each from its equation in x = (27/4) mu (1 - mu) = v (1 - v), v = omega2^2 (`scenes/libration.md`): Routh's mu_R, x =
-1/4; mu1 and mu2, x = 4/25 and 9/100, at which alone omega1 = 2 omega2 and 3 omega2; mu_c and mu_d, the only zeros of D4
-and a02 in 0 < mu < mu_R (Sturm). Between these no verdict changes.
+Each from its equation in x = (27/4) mu (1 - mu) = v (1 - v), v = omega2^2 (`scenes/libration.md`):
+Routh's mu_R, x = 1/4; mu1 and mu2, x = 4/25 and 9/100, at which alone omega1 = 2 omega2 and 3
+omega2; mu_c and mu_d, the only zeros of D4 and a02 in 0 < mu < mu_R (Sturm). Between these no
+verdict changes.
 """
 
 from decimal import Decimal, localcontext
@@ -31,7 +33,11 @@ def ratios():
         exact = {name: _mass(value) for name, value in x.items()}
         noise = context.power(10, 10 - DIGITS)
         return [
-            (CLASSES[name], float(mu), float(np.nextafter(float(abs(mu - Decimal(float(mu))) + noise), 1.0)))
+            (
+                CLASSES[name],
+                float(mu),
+                float(np.nextafter(float(abs(mu - Decimal(float(mu))) + noise), 1.0)),
+            )
             for name, mu in sorted(exact.items(), key=lambda item: item[1])
         ]
 

@@ -1,9 +1,11 @@
-"""The boundaries of the triangular points: critical mass ratios; of the elliptic problem, curves on maps of mu and e.
+"""The boundaries of the triangular points: critical mass ratios; of the elliptic problem, curves on
+maps of mu and e.
 
-Of the circular problem they are the numbers of `critical`. Of the elliptic one they are Danby's A and B, and KC: on A
-and B a pair of multipliers meets at -1, on KC two pairs of unlike kind meet on the unit circle. They are zeros of the
-half-period factors A and B, and of K, where 0 < t < 2 (`scenes/libration_elliptic.md`, section 3), searched for on
-LINES lines of the map each way; every point is bracketed on its line by certain signs.
+Of the circular problem they are the numbers of `critical`. Of the elliptic one they are Danby's A
+and B, and KC: on A and B a pair of multipliers meets at -1, on KC two pairs of unlike kind meet on
+the unit circle. They are zeros of the half-period factors A and B, and of K, where 0 < t < 2
+(`scenes/libration_elliptic.md`, section 3), searched for on LINES lines of the map each way; every
+point is bracketed on its line by certain signs.
 """
 
 import numpy as np
@@ -24,7 +26,11 @@ LINES = 129
 def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if scene.FAMILY == "normal_form":
-        return None if list(axes) == ["mu"] else f"boundaries are known along mu alone, not on {', '.join(axes)}"
+        return (
+            None
+            if list(axes) == ["mu"]
+            else f"boundaries are known along mu alone, not on {', '.join(axes)}"
+        )
     if set(axes) == set(AXES) and len(axes) == 2:
         return None
     return f"curves are known on the axes mu and e of libration_elliptic, not on {', '.join(axes) or 'none'}"
@@ -56,7 +62,12 @@ def _of_circular(square):
     low, high = square.low[0], square.high[0]
     across = [(kind, mu, bar) for kind, mu, bar in critical.ratios() if low <= mu <= high]
     found = [
-        (kind, np.array([[mu, square.low[1]], [mu, square.high[1]]]), np.full(2, bar / (high - low)), {})
+        (
+            kind,
+            np.array([[mu, square.low[1]], [mu, square.high[1]]]),
+            np.full(2, bar / (high - low)),
+            {},
+        )
         for kind, mu, bar in across
     ]
     curves = joined(found, [])
@@ -65,7 +76,9 @@ def _of_circular(square):
 
 
 def _function(name, e, mu):
-    """(values, bars) of the function that vanishes on the curve, at points (N); NaN where it means something else."""
+    """(values, bars) of the function that vanishes on the curve, at points (N); NaN where it means
+    something else.
+    """
     out, bars = np.full((2, e.size), np.nan)
     inside = (mu > 0.0) & (mu <= 0.5) & (e >= 0.0) & (e < 1.0)
     if not inside.any():

@@ -1,12 +1,15 @@
-"""Danby's question: are the triangular points of the elliptic problem stable? Trace invariants, verdict, collision.
+"""Danby's question: are the triangular points of the elliptic problem stable? Trace invariants,
+verdict, collision.
 
-The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By the reversibility half a period gives all
-(`traces`; `scenes/libration_elliptic.md`): stable <=> A B > 0, C D > 0, K > 0 and 0 < t < 2, decided by the
-error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs that meet.
+The monodromy's characteristic polynomial is l^4 - a l^3 + b l^2 - a l + 1. By the reversibility
+half a period gives all (`traces`; `scenes/libration_elliptic.md`): stable <=> A B > 0, C D > 0, K >
+0 and 0 < t < 2, decided by the error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs
+that meet.
 
-Points climb a ladder of steps (`survey.measures.answers`). Dense rows (one e, many mu) are five Chebyshev series in
-s = sqrt(1 - 3 mu (1 - mu)), which come from series in both parameters (`panels`), as do very many points. e = 0 and
-mu = 0 have closed forms. What these leave open, or not as accurate as asked, is solved in double-double.
+Points climb a ladder of steps (`survey.measures.answers`). Dense rows (one e, many mu) are five
+Chebyshev series in s = sqrt(1 - 3 mu (1 - mu)), which come from series in both parameters
+(`panels`), as do very many points. e = 0 and mu = 0 have closed forms. What these leave open, or
+not as accurate as asked, is solved in double-double.
 """
 
 from functools import lru_cache
@@ -45,18 +48,23 @@ OUTPUTS = (
 # Numbers of steps; a point climbs to 1.7 times as many. Of adaptive methods: tolerances of a step.
 _NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in range(49))])
 STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
-TOLERANCES = Ladder(10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5)
+TOLERANCES = Ladder(
+    10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5
+)
 FINEST = 1e-14
-# The least number of points in a row for which a series pays, and of points on their own: a panel costs 30,000 of them.
+# The least number of points in a row for which a series pays, and of points on their own: a panel
+# costs 30,000 of them.
 DENSE, MANY = 3 * NODES, 30_000
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
-    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bounds, verdict, collision, status.
+    """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bounds, verdict,
+    collision, status.
 
-    `dense`: the rows are long enough for series (see DENSE), `many`: the points are enough, wherever they are cut.
+    `dense`: the rows are long enough for series (see DENSE), `many`: the points are enough,
+    wherever they are cut.
     """
     answers = Answers(mu.size)
     valid = np.isfinite(e)[:, None] & np.isfinite(mu)
@@ -74,7 +82,9 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
     elif left.any():
         used = taylor16 if method == "auto" else measures.method(method)
         points = np.flatnonzero(left)
-        answers.replace(points, _point_by_point(e[points // mu.shape[1]], *rates(mu[left]), used, rtol))
+        answers.replace(
+            points, _point_by_point(e[points // mu.shape[1]], *rates(mu[left]), used, rtol)
+        )
     if method == "auto":
         points = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
         if points.size:
@@ -83,7 +93,10 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
     answers.floats[:, answers.status != status.OK] = np.nan
     names = ("a", "a_error", "b", "b_error")
     out = dict(zip(names, answers.floats.reshape(4, *mu.shape), strict=True))
-    return out | {name: getattr(answers, name).reshape(mu.shape) for name in ("verdict", "collision", "status")}
+    return out | {
+        name: getattr(answers, name).reshape(mu.shape)
+        for name in ("verdict", "collision", "status")
+    }
 
 
 def rates(mu):
@@ -109,7 +122,9 @@ def _by_series(e, mu, rtol, answers, left):
 
 
 def _point_by_point(e, d1, d2, method, rtol, results=None):
-    """Answers of points (N each), each on a rung of its own; fills `results` (N, RESULTS) if they are given."""
+    """Answers of points (N each), each on a rung of its own; fills `results` (N, RESULTS) if they
+    are given.
+    """
     results = np.empty((e.size, RESULTS)) if results is None else results
     adaptive = methods.adaptive(method)
     run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
@@ -137,7 +152,9 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
 
 
 def _chain(method, e, d1, d2, number):
-    """Results (N, RESULTS) by `number` (N) fixed steps; points of one mesh together, in calls of bounded work."""
+    """Results (N, RESULTS) by `number` (N) fixed steps; points of one mesh together, in calls of
+    bounded work.
+    """
     results, key = np.empty((e.size, RESULTS)), number * 1000 + grading(e)
     order = np.argsort(key, kind="stable")
     nodes = tuple(method.NODES)
@@ -173,8 +190,8 @@ def grading(e):
 def mesh(steps, grade, nodes):
     """1 + cos f at the nodes of each step (steps, nodes), and the steps' lengths (steps).
 
-    They are even in psi, tan((pi - f) / 2) = 2^-grade tan(psi / 2): between true (0) and eccentric anomaly, so that the
-    singularities of the equation and of this map lie about as far away.
+    They are even in psi, tan((pi - f) / 2) = 2^-grade tan(psi / 2): between true (0) and eccentric
+    anomaly, so that the singularities of the equation and of this map lie about as far away.
     """
     psi = np.pi * np.arange(steps, -1, -1) / steps
     y = 2.0 * np.arctan(2.0**-grade * np.tan(0.5 * psi))
@@ -184,7 +201,9 @@ def mesh(steps, grade, nodes):
 
 
 def closed_form(mu, rtol):
-    """Answers where mu = 0 (all multipliers 1, and a secular term) or e = 0 (frequencies of the circular problem)."""
+    """Answers where mu = 0 (all multipliers 1, and a secular term) or e = 0 (frequencies of the
+    circular problem).
+    """
     answers = Answers(mu.size)
     x = 6.75 * mu * (1.0 - mu)
     s = np.sqrt((1.0 - 4.0 * x).astype(complex))  # w1^2 - w2^2, imaginary beyond Routh's value

@@ -1,7 +1,9 @@
-"""Danby's map in double-double, for points that float64 leaves undecided or less accurate than asked.
+"""Danby's map in double-double, for points that float64 leaves undecided or less accurate than
+asked.
 
-Points one by one; rows of many such points by Chebyshev series, as in `danby`, and then one by one what these
-leave open. Verdicts are decided with about 27 digits; values are rounded once, at the end.
+Points one by one; rows of many such points by Chebyshev series, as in `danby`, and then one by one
+what these leave open. Verdicts are decided with about 27 digits; values are rounded once, at the
+end.
 """
 
 import numpy as np
@@ -16,7 +18,9 @@ POINTS, VALUES = 1000, 50_000  # of a kernel call, to keep it below about a seco
 
 
 def solve(e, mu, rtol, answers, points, dense=False):
-    """Answer the `points` (ascending) of rows e (R) of mu (R, L), in place; by the rows' series first, if `dense`."""
+    """Answer the `points` (ascending) of rows e (R) of mu (R, L), in place; by the rows' series
+    first, if `dense`.
+    """
     wait_for_other_compiler()
     row_of = points // mu.shape[1]
     if dense:
@@ -47,7 +51,9 @@ def _take(answers, points, own):
 
 def factors(e, mu):
     """A, B, C, D, t (N, 5) of points, rounded once, and their error bounds (N, 5)."""
-    results = np.concatenate([_results(e[i : i + POINTS], mu[i : i + POINTS]) for i in range(0, e.size, POINTS)])
+    results = np.concatenate(
+        [_results(e[i : i + POINTS], mu[i : i + POINTS]) for i in range(0, e.size, POINTS)]
+    )
     values, low, bars = np.split(results, 3, axis=1)
     return values, bars + abs(low)
 
@@ -70,6 +76,8 @@ def _by_series(e, mu, rtol):
     own = Answers(mu.size)
     for first in range(0, mu.size, VALUES):
         part = Answers(mu[first : first + VALUES].size)
-        traces_double.dense(series, bars, mu[first : first + VALUES], rtol, status.OVERFLOW, *part.all)
+        traces_double.dense(
+            series, bars, mu[first : first + VALUES], rtol, status.OVERFLOW, *part.all
+        )
         own.replace(slice(first, first + VALUES), part)
     return own

@@ -1,7 +1,9 @@
-"""The normal form beyond order 6, by Lie series, and for how long motions stay (`effective_stability`).
+"""The normal form beyond order 6, by Lie series, and for how long motions stay
+(`effective_stability`).
 
-`c8` and `c10` are the coefficients of the monomials of four and five actions. At a resonance of order 8 or 10 or less a
-generator's divisor vanishes: beside it they grow, and where it is too small to divide by they are not given.
+`c8` and `c10` are the coefficients of the monomials of four and five actions. At a resonance of
+order 8 or 10 or less a generator's divisor vanishes: beside it they grow, and where it is too small
+to divide by they are not given.
 """
 
 import numpy as np
@@ -12,7 +14,8 @@ from survey.measures.libration import effective_stability
 from survey.methods import lie, lie_double
 
 ORDERS = (8, 10)
-SERIES = (lie, lie_double)  # the second where the first misses the accuracy; closed forms end at order 6
+# the second where the first misses the accuracy; closed forms end at order 6
+SERIES = (lie, lie_double)
 LARGEST_BAR = 3e38  # a file keeps bars as float32; where one is larger the coefficient is not given
 BLOCK = 64  # mass ratios whose remainders are in memory at a time
 
@@ -25,12 +28,14 @@ def labels(order):
 def solve(mu, periods, order, method, rtol):
     """{output: values} at mu (N) for motions of `periods` (N) periods of the primaries.
 
-    `method` is the name of a method, or "auto", as in `normal_form`; closed forms have none of these outputs, so for
-    their methods all is as with "auto".
+    `method` is the name of a method, or "auto", as in `normal_form`; closed forms have none of
+    these outputs, so for their methods all is as with "auto".
     """
     own = None if method == "auto" else measures.method(method)
     series = (own,) if own in SERIES else SERIES
-    return _solve(_coefficients, (mu,), order, series, rtol) | _solve(_radius, (mu, periods), order, series, rtol)
+    return _solve(_coefficients, (mu,), order, series, rtol) | _solve(
+        _radius, (mu, periods), order, series, rtol
+    )
 
 
 def _solve(answers, points, order, series, rtol):
@@ -39,7 +44,9 @@ def _solve(answers, points, order, series, rtol):
     for finer in series[1:]:
         open_ = _missed(out, rtol) & (points[0] < MU_R[0])
         if open_.any():
-            for name, values in answers(*(values[open_] for values in points), order, finer).items():
+            for name, values in answers(
+                *(values[open_] for values in points), order, finer
+            ).items():
                 out[name][open_] = values
     return out
 
@@ -47,7 +54,9 @@ def _solve(answers, points, order, series, rtol):
 def _missed(out, rtol):
     """Points (N) where an error bound exceeds rtol (1 + |value|), or nothing is known."""
     wide = [
-        ~(bar <= rtol * (1 + abs(out[name.removesuffix("_error")]))) for name, bar in out.items() if "_error" in name
+        ~(bar <= rtol * (1 + abs(out[name.removesuffix("_error")])))
+        for name, bar in out.items()
+        if "_error" in name
     ]
     return np.any([w if w.ndim == 1 else w.any(axis=1) for w in wide], axis=0)
 
@@ -69,6 +78,12 @@ def _radius(mu, periods, order, series):
     """The radius of effective stability with its bound, and the order of normalisation that gives it (N)."""
     each, where = np.unique(mu, return_inverse=True)
     parts = [series.remainders(each[i : i + BLOCK], order) for i in range(0, each.size, BLOCK)]
-    norms = {key: np.concatenate([part[key] for part in parts], axis=-1)[..., where] for key in parts[0]}
+    norms = {
+        key: np.concatenate([part[key] for part in parts], axis=-1)[..., where] for key in parts[0]
+    }
     radius, bar, r = effective_stability.radius(norms, 2.0 * np.pi * periods)
-    return {"effective_radius": radius, "effective_radius_error": bar, "effective_order": r.astype(np.int32)}
+    return {
+        "effective_radius": radius,
+        "effective_radius_error": bar,
+        "effective_order": r.astype(np.int32),
+    }

@@ -1,4 +1,5 @@
-"""Planar motions near L4 in the linear equations, circular or elliptic, and the multipliers of a trace and b.
+"""Planar motions near L4 in the linear equations, circular or elliptic, and the multipliers of a
+trace and b.
 
 xi'' - 2 eta' = d1 r xi,   eta'' + 2 xi' = d2 r eta,   r = 1 / (1 + e cos f)
 """
@@ -15,7 +16,9 @@ GROWTH = 5.0
 
 
 def orbit(mu, e, time):
-    """f, xi and eta, from rest in xi = 1, up to f = `time`, with their bounds, as `Trajectory.data` holds them."""
+    """f, xi and eta, from rest in xi = 1, up to f = `time`, with their bounds, as `Trajectory.data`
+    holds them.
+    """
     matrices, lengths = coefficients(mu, e)
     turns = int(np.clip(ceil(time / (2 * pi) - 1e-9), 1, MOST))
     f, y, bars = linear_motion.fundamental(matrices, lengths, turns)
@@ -28,11 +31,18 @@ def orbit(mu, e, time):
 
 
 def coefficients(mu, e):
-    """A of Y' = A Y, Y = (xi, eta, xi', eta'), at the nodes of the steps of a turn (steps, 9, 4, 4); their lengths."""
+    """A of Y' = A Y, Y = (xi, eta, xi', eta'), at the nodes of the steps of a turn (steps, 9, 4,
+    4); their lengths.
+    """
     d1, d2 = (float(rate[0]) for rate in danby.rates(np.array([mu])))
-    height, lengths = danby.mesh(STEPS, int(danby.grading(np.array([e]))[0]), tuple(linear_motion.NODES))
+    height, lengths = danby.mesh(
+        STEPS, int(danby.grading(np.array([e]))[0]), tuple(linear_motion.NODES)
+    )
     r = 1.0 / ((1.0 - e) + e * height)
-    r, lengths = np.concatenate([r, linear_motion.mirrored(r)]), np.concatenate([lengths, lengths[::-1]])
+    r, lengths = (
+        np.concatenate([r, linear_motion.mirrored(r)]),
+        np.concatenate([lengths, lengths[::-1]]),
+    )
     matrices = np.zeros((*r.shape, 4, 4))
     matrices[..., 0, 2] = matrices[..., 1, 3] = 1.0
     matrices[..., 2, 0], matrices[..., 3, 1] = d1 * r, d2 * r
@@ -41,7 +51,9 @@ def coefficients(mu, e):
 
 
 def multipliers(a, a_bar, b, b_bar):
-    """The four zeros of l^4 - a l^3 + b l^2 - a l + 1 and their error bounds: l + 1/l = w, w^2 - a w + b - 2 = 0."""
+    """The four zeros of l^4 - a l^3 + b l^2 - a l + 1 and their error bounds: l + 1/l = w, w^2 - a
+    w + b - 2 = 0.
+    """
     x, d = 0.25 * complex(a) ** 2 - (b - 2.0), 0.5 * abs(a) * a_bar + 0.25 * a_bar**2 + b_bar
     root = np.sqrt(x)
     bar = 0.5 * a_bar + min(np.sqrt(d), d / abs(root) if root else np.inf)

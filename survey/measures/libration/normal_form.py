@@ -1,12 +1,14 @@
-"""Formal stability of an equilibrium with frequencies omega1, -omega2, 1 by its normal form of orders 4 and 6.
+"""Formal stability of an equilibrium with frequencies omega1, -omega2, 1 by its normal form of
+orders 4 and 6.
 
-H = L + N + M + ..., L = omega1 r1 - omega2 r2 + r3, N and M the terms of orders 4 and 6: equation numbers as in
-`scenes/libration.md`. A method serves by `coefficients(mu, order)`, values and error bounds (16, N) of the
-coefficients in the order of LABELS; by `combined(mu)` also, if it knows their combinations better than their sums do.
+H = L + N + M + ..., L = omega1 r1 - omega2 r2 + r3, N and M the terms of orders 4 and 6: equation
+numbers as in `scenes/libration.md`. A method serves by `coefficients(mu, order)`, values and error
+bounds (16, N) of the coefficients in the order of LABELS; by `combined(mu)` also, if it knows their
+combinations better than their sums do.
 
-Formally stable by order 4: L = N = 0 has no solution r >= 0 but 0, so L^4 + (H - L)^2 is definite. Else, by order 6: M
-is not 0 on the one ray of L = N = 0 in the octant r >= 0, and no resonance of order 6 or less is met. A verdict is
-given only where the error bounds leave no other.
+Formally stable by order 4: L = N = 0 has no solution r >= 0 but 0, so L^4 + (H - L)^2 is definite.
+Else, by order 6: M is not 0 on the one ray of L = N = 0 in the octant r >= 0, and no resonance of
+order 6 or less is met. A verdict is given only where the error bounds leave no other.
 """
 
 from itertools import product
@@ -32,9 +34,15 @@ FILL = -99  # of a resonance where there is none
 
 
 def vectors(highest):
-    """Integer vectors k != 0 with k3 even and |k1| + |k2| + |k3| <= highest, by order: k and -k once, no multiples."""
+    """Integer vectors k != 0 with k3 even and |k1| + |k2| + |k3| <= highest, by order: k and -k
+    once, no multiples.
+    """
     numbers = range(-highest, highest + 1)
-    found = [k for k in product(numbers, numbers, numbers) if k[2] % 2 == 0 and 0 < sum(map(abs, k)) <= highest]
+    found = [
+        k
+        for k in product(numbers, numbers, numbers)
+        if k[2] % 2 == 0 and 0 < sum(map(abs, k)) <= highest
+    ]
     found = [k for k in found if next(filter(None, k)) > 0 and gcd(k[0], k[1], k[2] // 2) == 1]
     return np.array(sorted(found, key=lambda k: (sum(map(abs, k)), k)), dtype=float)
 
@@ -43,15 +51,18 @@ VECTORS = vectors(HIGHEST)
 
 
 def solve(mu, method, rtol):
-    """Every output, its error bound, `verdict` and `status` at mu (N); `c` and its error bound are (N, 16).
+    """Every output, its error bound, `verdict` and `status` at mu (N); `c` and its error bound are
+    (N, 16).
 
-    `method` is the name of a method, or "auto": closed forms in float64, and in double-double where `rtol` is missed or
-    the verdict is left open.
+    `method` is the name of a method, or "auto": closed forms in float64, and in double-double where
+    `rtol` is missed or the verdict is left open.
     """
     first, *finer = AUTO if method == "auto" else (measures.method(method),)
     answer = answers(mu, first)
     for other in finer:
-        open_ = missed(answer, rtol) | ((answer["verdict"] == UNDECIDED) & (answer["status"] != INVALID_PARAMETERS))
+        open_ = missed(answer, rtol) | (
+            (answer["verdict"] == UNDECIDED) & (answer["status"] != INVALID_PARAMETERS)
+        )
         if open_.any():
             for name, values in answers(mu[open_], other).items():
                 answer[name][open_] = values
@@ -60,7 +71,11 @@ def solve(mu, method, rtol):
 
 def answers(mu, method):
     """All outputs at mu (N), by one method."""
-    omega, nearest, distance = np.empty((2, mu.size)), np.empty(mu.size, dtype=np.int64), np.empty((2, mu.size))
+    omega, nearest, distance = (
+        np.empty((2, mu.size)),
+        np.empty(mu.size, dtype=np.int64),
+        np.empty((2, mu.size)),
+    )
     linear(mu, VECTORS, omega, nearest, distance)
     c, combined = forms(method, mu, omega)
     ray = on_ray(c, combined, omega)
@@ -69,8 +84,14 @@ def answers(mu, method):
     stable = np.isfinite(omega[0])
     lost = stable & ~(np.isfinite(c).all(axis=(0, 1)) & np.isfinite(combined).all(axis=(0, 1)))
     values[:, lost], bars[:, lost] = np.nan, np.nan
-    out = {"status": np.where(np.isnan(mu), INVALID_PARAMETERS, np.where(lost, OVERFLOW, OK)).astype(np.int8)}
-    out["verdict"] = np.where(out["status"] == OK, verdict(mu, combined, ray), UNDECIDED).astype(np.int8)
+    out = {
+        "status": np.where(np.isnan(mu), INVALID_PARAMETERS, np.where(lost, OVERFLOW, OK)).astype(
+            np.int8
+        )
+    }
+    out["verdict"] = np.where(out["status"] == OK, verdict(mu, combined, ray), UNDECIDED).astype(
+        np.int8
+    )
     orders = abs(VECTORS).sum(axis=1).astype(np.int32)
     out["resonance_order"] = np.where(stable & ~lost, orders[nearest], -1).astype(np.int32)
     for name, value, bar in zip(FLOATS, values, bars, strict=True):
@@ -84,8 +105,13 @@ def answers(mu, method):
 
 def missed(answer, rtol):
     """Points where an error bound exceeds rtol (1 + |value|)."""
-    wide = [answer[f"{name}_error"] > rtol * (1 + abs(answer[name])) for name in (*FLOATS, *rays.FLOATS)]
-    several = [(answer[f"{name}_error"] > rtol * (1 + abs(answer[name]))).any(axis=1) for name in ("c", *rays.RAYS)]
+    wide = [
+        answer[f"{name}_error"] > rtol * (1 + abs(answer[name])) for name in (*FLOATS, *rays.FLOATS)
+    ]
+    several = [
+        (answer[f"{name}_error"] > rtol * (1 + abs(answer[name]))).any(axis=1)
+        for name in ("c", *rays.RAYS)
+    ]
     return np.any([*wide, *several], axis=0)
 
 
@@ -108,7 +134,10 @@ def combine(c, bars, w1, w2):
         {"200": w2 * w2, "110": w1 * w2, "020": w1 * w1},
         {"300": w2**3, "210": w2 * w2 * w1, "120": w2 * w1 * w1, "030": w1**3},
     )
-    return [_sum({LABELS.index(label): weight for label, weight in terms.items()}, c, bars) for terms in sums]
+    return [
+        _sum({LABELS.index(label): weight for label, weight in terms.items()}, c, bars)
+        for terms in sums
+    ]
 
 
 def _sum(terms, c, bars):
@@ -116,12 +145,17 @@ def _sum(terms, c, bars):
     size = sum(abs(weight * c[row]) for row, weight in terms.items())
     bar = sum(abs(weight) * bars[row] for row, weight in terms.items())
     return np.stack(
-        [sum(weight * c[row] for row, weight in terms.items()), MARGIN * (bar + ROUNDINGS * ROUNDOFF * size)]
+        [
+            sum(weight * c[row] for row, weight in terms.items()),
+            MARGIN * (bar + ROUNDINGS * ROUNDOFF * size),
+        ]
     )
 
 
 def on_ray(c, combined, omega):
-    """M on the ray (alpha2, 1, beta2) of L = N = 0 (3.11) and its bound, where the ray lies in the octant; else NaN."""
+    """M on the ray (alpha2, 1, beta2) of L = N = 0 (3.11) and its bound, where the ray lies in the
+    octant; else NaN.
+    """
     ray = np.full(omega.shape, np.nan)
     (_, _, a02, D4, _), (_, _, da02, dD4, _) = combined
     inside = (a02 > da02) & (-D4 > dD4)
@@ -133,7 +167,8 @@ def on_ray(c, combined, omega):
 def _inside(c, combined, w1, w2):
     """M on the ray and its error bound, where a02 > 0 > D4."""
     (a20, a11, a02, _, _), (da20, da11, da02, _, _) = combined
-    # the root of a20 alpha^2 + a11 alpha + a02 that is 0 at mu_d; a11 < 0 < a20 here, so nothing cancels
+    # the root of a20 alpha^2 + a11 alpha + a02 that is 0 at mu_d; a11 < 0 < a20 here, so nothing
+    # cancels
     square = a11 * a11 - 4.0 * a20 * a02
     dsquare = 2.0 * abs(a11) * da11 + 4.0 * (abs(a20) * da02 + abs(a02) * da20)
     root = np.sqrt(square)

@@ -1,7 +1,9 @@
-"""Danby's map from series in both parameters, which are made once a process and hold for every row and point.
+"""Danby's map from series in both parameters, which are made once a process and hold for every row
+and point.
 
-See `survey.kernels.libration.panels`. The values at the nodes are double-doubles, so what a series leaves out and the
-roundings of its sum are all of its bar: in float64 about 1e-14 of the factors, whatever accuracy is asked.
+See `survey.kernels.libration.panels`. The values at the nodes are double-doubles, so what a series
+leaves out and the roundings of its sum are all of its bar: in float64 about 1e-14 of the factors,
+whatever accuracy is asked.
 """
 
 from decimal import Decimal, localcontext
@@ -20,8 +22,8 @@ from survey.kernels.math.roundoff import EPS, PAIR_ROUNDOFF, PAIR_SUM_ROUNDOFF
 DIGITS = 40
 LEAST = 1e-17  # of the largest coefficient: what is less counts at no single point
 PI = "3.14159265358979323846264338327950288419716939937510582097494"
-# Orders in y and in 4 s - 3. A sum of T_n(x) c_n rounds its terms, T_n or Clenshaw's sum by n^2 / 2 EPS, and x, where
-# T_n' <= n^2.
+# Orders in y and in 4 s - 3. A sum of T_n(x) c_n rounds its terms, T_n or Clenshaw's sum by n^2 / 2
+# EPS, and x, where T_n' <= n^2.
 IN_Y, IN_S = np.arange(panels.TERMS)[:, None], np.arange(traces.NODES)
 ROUNDING = EPS * (8.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
 # In double-double n rounds |c_n| up to n + 1 times, each with a weight up to n + 1.
@@ -69,7 +71,10 @@ def rows(e):
     series, bars = np.empty((e.size, INVARIANTS, traces.NODES)), np.empty((e.size, INVARIANTS))
     for one in np.unique(number):
         mine = np.flatnonzero(number == one)
-        found, found_bars = np.empty((mine.size, INVARIANTS, traces.NODES)), np.empty((mine.size, INVARIANTS))
+        found, found_bars = (
+            np.empty((mine.size, INVARIANTS, traces.NODES)),
+            np.empty((mine.size, INVARIANTS)),
+        )
         own = panel(int(one))
         panels.rows(e[mine], one == 0, own.middle, own.series, own.bars, found, found_bars)
         series[mine], bars[mine] = found, found_bars
@@ -78,7 +83,11 @@ def rows(e):
 
 def row(e):
     """As `rows`, of one row as pairs (5, 2, NODES), and the bounds (5)."""
-    number, series, bars = np.empty(1, dtype=np.int64), np.empty((INVARIANTS, 2, NODES)), np.empty(INVARIANTS)
+    number, series, bars = (
+        np.empty(1, dtype=np.int64),
+        np.empty((INVARIANTS, 2, NODES)),
+        np.empty(INVARIANTS),
+    )
     panels.panels(np.array([e]), number)
     own = panel(int(number[0]))
     panels.row(e, number[0] == 0, own.middle, own.pairs, own.pair_bars, series, bars)
@@ -92,14 +101,16 @@ def points(e, mu):
     for one in np.unique(number):
         mine = np.flatnonzero(number == one)
         found, own = np.empty((mine.size, traces.RESULTS)), panel(int(one))
-        panels.points(e[mine], mu[mine], one == 0, own.middle, own.series, own.lengths, own.bars, found)
+        panels.points(
+            e[mine], mu[mine], one == 0, own.middle, own.series, own.lengths, own.bars, found
+        )
         results[mine] = found
     return results
 
 
 def nodes(number):
-    """1 + e, 1 - e (NODES, 4) and 1 / growth (NODES, 2) at the nodes of a panel, and the same e and 1 - e (4) in its
-    middle: pairs.
+    """1 + e, 1 - e (NODES, 4) and 1 / growth (NODES, 2) at the nodes of a panel, and the same e and
+    1 - e (4) in its middle: pairs.
     """
     with localcontext() as context:
         context.prec = DIGITS
@@ -107,7 +118,13 @@ def nodes(number):
         for k in range(NODES):
             square = (2 * number + 1 + cosine(2 * k + 1)).exp()  # exp(2 y)
             less = 2 / (1 + square)
-            found.append((*pair(square * less), *pair(less), *pair(1 / (square * square if number else square))))
+            found.append(
+                (
+                    *pair(square * less),
+                    *pair(less),
+                    *pair(1 / (square * square if number else square)),
+                )
+            )
         less = 2 / (1 + Decimal(2 * number + 1).exp())
         middle = np.array([*pair(1 - less), *pair(less)])
     shapes, weights = np.split(np.array(found), [4], axis=1)
@@ -116,7 +133,9 @@ def nodes(number):
 
 @lru_cache
 def tables():
-    """The rates at the nodes (NODES, 4), and the matrix that makes coefficients of values (2, NODES, NODES)."""
+    """The rates at the nodes (NODES, 4), and the matrix that makes coefficients of values (2,
+    NODES, NODES).
+    """
     with localcontext() as context:
         context.prec = DIGITS
         cosines = [cosine(k) for k in range(4 * NODES)]  # of k pi / (2 NODES)
@@ -124,10 +143,16 @@ def tables():
         one = Decimal(1)
         # d1, d2 = (3 / 2)(1 +- s), s = (3 + cos) / 4, and 1 - cos without cancellation
         both = [
-            (*pair((7 + cosines[k]) * 3 / 8), *pair((1 - cosines[k]) * 3 / 8 if cosines[k] < one / 2 else _less(k)))
+            (
+                *pair((7 + cosines[k]) * 3 / 8),
+                *pair((1 - cosines[k]) * 3 / 8 if cosines[k] < one / 2 else _less(k)),
+            )
             for k in at
         ]
-        matrix = [[pair(cosines[k * n % (4 * NODES)] * (2 if n else 1) / NODES) for k in at] for n in range(NODES)]
+        matrix = [
+            [pair(cosines[k * n % (4 * NODES)] * (2 if n else 1) / NODES) for k in at]
+            for n in range(NODES)
+        ]
     return np.array(both), np.ascontiguousarray(np.moveaxis(np.array(matrix), 2, 0))
 
 

@@ -1,8 +1,10 @@
-"""The rays of L = N = 0 (3.11), and the determinants of N that KAM theory asks for, each with its error bound.
+"""The rays of L = N = 0 (3.11), and the determinants of N that KAM theory asks for, each with its
+error bound.
 
-r3 = omega2 r2 - omega1 r1 on L = 0; N = 0 there is a20 r1^2 + a11 r1 r2 + a02 r2^2 = 0, whose roots are
-alpha_1, alpha_2 = (-a11 +- sqrt(a11^2 - 4 a20 a02)) / (2 a20) (3.11): rays r = (alpha_j, 1, beta_j), beta_j = omega2 -
-alpha_j omega1. The discriminant is the determinant of N'' bordered by the frequencies (Arnold's).
+r3 = omega2 r2 - omega1 r1 on L = 0; N = 0 there is a20 r1^2 + a11 r1 r2 + a02 r2^2 = 0, whose roots
+are alpha_1, alpha_2 = (-a11 +- sqrt(a11^2 - 4 a20 a02)) / (2 a20) (3.11): rays r = (alpha_j, 1,
+beta_j), beta_j = omega2 - alpha_j omega1. The discriminant is the determinant of N'' bordered by
+the frequencies (Arnold's).
 
 A quantity is a pair (value, bound), arrays.
 """
@@ -18,7 +20,9 @@ FLOATS = ("discriminant", "det_N", "det_bordered")
 
 
 def answers(c, combined, omega):
-    """{output and its `_error`: values} from the coefficients (2, 16, N), COMBINED (2, 5, N) and frequencies (2, N)."""
+    """{output and its `_error`: values} from the coefficients (2, 16, N), COMBINED (2, 5, N) and
+    frequencies (2, N).
+    """
     a20, a11, a02 = ((combined[0, i], combined[1, i]) for i in range(3))
     w1, w2 = ((w, ROUNDOFF * w) for w in omega)
     with np.errstate(all="ignore"):
@@ -32,12 +36,17 @@ def answers(c, combined, omega):
     for name, both in zip(RAYS, (alpha, beta), strict=True):
         value, bar = (np.stack(part, axis=-1) for part in zip(*both, strict=True))
         known = np.isfinite(value) & np.isfinite(bar)
-        out[name], out[f"{name}_error"] = np.where(known, value, np.nan), np.where(known, MARGIN * bar, np.nan)
+        out[name], out[f"{name}_error"] = (
+            np.where(known, value, np.nan),
+            np.where(known, MARGIN * bar, np.nan),
+        )
     return out
 
 
 def _roots(a20, a11, a02, square):
-    """alpha_1 and alpha_2, by the formula of each in which nothing cancels; no number where its divisor may be 0."""
+    """alpha_1 and alpha_2, by the formula of each in which nothing cancels; no number where its
+    divisor may be 0.
+    """
     root = np.sqrt(square[0])
     root = root, 0.5 * square[1] / root + ROUNDOFF * root
     falling = a11[0] <= 0.0

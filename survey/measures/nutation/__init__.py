@@ -1,8 +1,9 @@
 """Nutations of an axisymmetric body: periods and advances, and their bifurcation set.
 
 METHODS lists what a method that serves the family "nutation" offers. A well is a row (SIZE) of
-`survey.kernels.nutation.wells`, of a kind from NUTATION on; rows of other kinds are left alone. What is filled has
-the columns of `survey.kernels.nutation.records`. Times are in units of the moment of inertia A, angles in radians.
+`survey.kernels.nutation.wells`, of a kind from NUTATION on; rows of other kinds are left alone.
+What is filled has the columns of `survey.kernels.nutation.records`. Times are in units of the
+moment of inertia A, angles in radians.
 """
 
 from survey.contract import Function

@@ -1,4 +1,5 @@
-"""The bifurcation set of nutations on a map of two of the scaled integrals l, alpha, beta, in closed form.
+"""The bifurcation set of nutations on a map of two of the scaled integrals l, alpha, beta, in
+closed form.
 
 On maps of initial states the same curves are level curves, see `level_curves`.
 
@@ -8,7 +9,8 @@ separatrices; where it is 0 the sheets of the surface meet in cusps (k > 0). The
 alpha = +-beta, l = alpha^2 - s, which for k < 0 go on without it as threads; with the same alpha and beta and a greater
 l the motion passes the pole, where the advances jump. Equation numbers: `scenes/brun.md`.
 
-Curves are sampled until chords are short and near them, cut where they leave the map or become unstable.
+Curves are sampled until chords are short and near them, cut where they leave the map or become
+unstable.
 """
 
 from itertools import pairwise, product
@@ -73,7 +75,10 @@ def _of_states(square, axes, fixed):
     count, kinds, parameters, errors, known = [], [], [], [], []
     for function, x, error, columns in level_curves.traced(square, axes, fixed):
         here = _nowhere(len(x)) | level_curves.along(function, columns)
-        kind = np.full(len(x), PASSAGE if function in (level_curves.upper_pole, level_curves.lower_pole) else SADDLE)
+        kind = np.full(
+            len(x),
+            PASSAGE if function in (level_curves.upper_pole, level_curves.lower_pole) else SADDLE,
+        )
         if function is level_curves.precession:
             kind[here["nutation_square"][0] > 0.0] = STABLE
         for part in np.split(np.arange(len(x)), 1 + np.flatnonzero(np.diff(kind))):
@@ -88,7 +93,10 @@ def _of_states(square, axes, fixed):
         parameters=np.concatenate([np.zeros((0, 2)), *parameters]),
         error=np.concatenate([np.zeros(0), *errors]),
         along={
-            output.name: tuple(np.concatenate([np.zeros(0), *(here[output.name][i] for here in known)]) for i in (0, 1))
+            output.name: tuple(
+                np.concatenate([np.zeros(0), *(here[output.name][i] for here in known)])
+                for i in (0, 1)
+            )
             for output in ALONG
         },
     )
@@ -96,15 +104,21 @@ def _of_states(square, axes, fixed):
 
 def _furthest(square, axes):
     """The largest |alpha| or |beta| on the map."""
-    return max(max(abs(square.low[i]), abs(square.high[i])) for i, name in enumerate(axes) if name != "l")
+    return max(
+        max(abs(square.low[i]), abs(square.high[i])) for i, name in enumerate(axes) if name != "l"
+    )
 
 
 def _traced(part, square, axes, s):
-    """[(kind, {name: (values, errors)})]: the runs of a part on the map, cut at cusps, and these as points."""
+    """[(kind, {name: (values, errors)})]: the runs of a part on the map, cut at cusps, and these as
+    points.
+    """
 
     def position(t):
         here = surface(*part.at(t), s)
-        return square.positions(_positive(np.stack([here[name][0] for name in axes], axis=-1), square))
+        return square.positions(
+            _positive(np.stack([here[name][0] for name in axes], axis=-1), square)
+        )
 
     def inside(t):
         x = position(t)
@@ -142,7 +156,10 @@ def _uprights(third, value, s, square, axes):
         a, b = (p, side * p) if third == "alpha" else (side * p, p)
         square_p = (value + s if third == "l" else p * p) + 4.0 * s
         here = _nowhere(1) | {
-            "l": (np.array([value if third == "l" else p * p - s]), np.array([2.0 * ROUNDOFF * (p * p + 1.0)])),
+            "l": (
+                np.array([value if third == "l" else p * p - s]),
+                np.array([2.0 * ROUNDOFF * (p * p + 1.0)]),
+            ),
             "alpha": (np.array([a]), np.array([2.0 * ROUNDOFF * abs(p) * (third == "l")])),
             "beta": (np.array([b]), np.array([2.0 * ROUNDOFF * abs(p) * (third == "l")])),
             "u": (np.array([side]), np.zeros(1)),
@@ -169,14 +186,18 @@ def _passages(third, value, s, square, axes):
     for side in (1.0, -1.0):
         if third == "l":
             far = np.sqrt(max(value + s, 0.0))
-            least, most = (low["beta"], high["beta"]) if side > 0.0 else (-high["beta"], -low["beta"])
+            least, most = (
+                (low["beta"], high["beta"]) if side > 0.0 else (-high["beta"], -low["beta"])
+            )
             ends = np.array([max(low["alpha"], least, -far), min(high["alpha"], most, far)])
             here = {"alpha": ends, "beta": side * ends, "l": np.full(2, value)}
         else:
             ends = np.array([max(low["l"], value * value - s), high["l"]])
             other = "beta" if third == "alpha" else "alpha"
             here = {"l": ends, third: np.full(2, value), other: np.full(2, side * value)}
-        here = _nowhere(2) | {name: (v, 2.0 * ROUNDOFF * (abs(v) + 1.0)) for name, v in here.items()}
+        here = _nowhere(2) | {
+            name: (v, 2.0 * ROUNDOFF * (abs(v) + 1.0)) for name, v in here.items()
+        }
         if ends[0] < ends[1] and _on_map(here, square, axes).all():
             found.append((PASSAGE, here))
     return found

@@ -1,6 +1,8 @@
-"""Outputs of a nutation that are derived from its period and advances: frequencies, mean rates, rotation numbers.
+"""Outputs of a nutation that are derived from its period and advances: frequencies, mean rates,
+rotation numbers.
 
-One entry of DERIVED is one output: `of` takes (value, error bound) of each of its `parts` and returns its own.
+One entry of DERIVED is one output: `of` takes (value, error bound) of each of its `parts` and
+returns its own.
 """
 
 from collections.abc import Callable

@@ -6,10 +6,11 @@ On such a map there is no closed form. Its curves are zeros of functions that ar
     regular precession  (b - a u)(a - b u) + k u (1 - u^2)^2, u = cos theta0, where p_theta0 = 0 is given (F of brun.md)
     pole passage        p_psi -+ p_phi, where the motion reaches the pole u = +-1
 
-with b = p_psi, a = p_phi. They are searched for on LINES lines of the map each way by marching squares, and every
-point is bracketed on its line by certain signs. A closed curve narrower than a LINES-th of the map may be missed,
-and a curve may end as far before the cusp at which its saddle ends. No curve shows where a well begins in which the
-motion is not. A precession is stable where its squared frequency (S18) is positive, else it is the saddle itself.
+with b = p_psi, a = p_phi. They are searched for on LINES lines of the map each way by marching
+squares, and every point is bracketed on its line by certain signs. A closed curve narrower than a
+LINES-th of the map may be missed, and a curve may end as far before the cusp at which its saddle
+ends. No curve shows where a well begins in which the motion is not. A precession is stable where
+its squared frequency (S18) is positive, else it is the saddle itself.
 
 Positions are those of `survey.measures.square`.
 """
@@ -27,11 +28,17 @@ LINES = 513
 
 
 def traced(square, axes, fixed):
-    """[(function, positions (m, 2) in the square, errors (m), columns (7, m) of states)] of every curve on the map.
+    """[(function, positions (m, 2) in the square, errors (m), columns (7, m) of states)] of every
+    curve on the map.
 
     The function is one of those below.
     """
-    functions = [separatrix, *([precession] if fixed.get("p_theta0") == 0.0 else []), upper_pole, lower_pole]
+    functions = [
+        separatrix,
+        *([precession] if fixed.get("p_theta0") == 0.0 else []),
+        upper_pole,
+        lower_pole,
+    ]
     found = []
     for function in functions:
 
@@ -46,7 +53,9 @@ def traced(square, axes, fixed):
 def states(square, axes, fixed, x):
     """Columns (7, m) of the initial states at positions x (m, 2)."""
     here = dict(zip(axes, square.parameters(x).T, strict=True))
-    return np.stack([np.broadcast_to(here.get(name, fixed.get(name)), len(x)).astype(float) for name in STATE])
+    return np.stack(
+        [np.broadcast_to(here.get(name, fixed.get(name)), len(x)).astype(float) for name in STATE]
+    )
 
 
 def separatrix(columns):
@@ -58,7 +67,9 @@ def separatrix(columns):
 
 
 def precession(columns):
-    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its error bound; NaN at the poles, where it has other zeros."""
+    """(b - a u)(a - b u) + k u (1 - u^2)^2, and its error bound; NaN at the poles, where it has
+    other zeros.
+    """
     size, c, epsilon, theta, _, b, a = columns
     u, sine = np.cos(theta), np.sin(theta)
     k, square = epsilon * size * (size - c), sine * sine
@@ -66,7 +77,11 @@ def precession(columns):
     bar = (
         8.0
         * ROUNDOFF
-        * ((abs(b) + abs(a * u)) * abs(two) + (abs(a) + abs(b * u)) * abs(one) + abs(k) * square * square)
+        * (
+            (abs(b) + abs(a * u)) * abs(two)
+            + (abs(a) + abs(b * u)) * abs(one)
+            + abs(k) * square * square
+        )
     )
     return np.where((square > 0.0) & (c <= 2.0 * size) & (k != 0.0), one * two + three, np.nan), bar
 
@@ -95,7 +110,9 @@ def _reaching(function, x, error, columns):
 
 
 def along(function, columns):
-    """{name: (values, bounds)} of the precession to which each state (7, m) of a curve belongs; none at poles."""
+    """{name: (values, bounds)} of the precession to which each state (7, m) of a curve belongs;
+    none at poles.
+    """
     if function in (upper_pole, lower_pole):
         return {}
     size, c, epsilon, theta, _, b, a = columns
@@ -108,14 +125,20 @@ def along(function, columns):
     y, y_bar = _rate(b, a, u, off, v, root)
     z, z_bar = _rate(a, b, u, off, v, root)
     square = y * y + z * z - np.sign(k) * (1.0 - 3.0 * u * u)
-    bar = 2.0 * (abs(y) * y_bar + abs(z) * z_bar) + 6.0 * abs(u) * off + 8.0 * ROUNDOFF * (y * y + z * z + 4.0)
+    bar = (
+        2.0 * (abs(y) * y_bar + abs(z) * z_bar)
+        + 6.0 * abs(u) * off
+        + 8.0 * ROUNDOFF * (y * y + z * z + 4.0)
+    )
     return {
         "u": (u, off), "precession_rate": (y, y_bar), "reduced_spin_rate": (z, z_bar), "nutation_square": (square, bar),
     }  # fmt: skip
 
 
 def _rate(own, other, u, off, v, root):
-    """(own - other u) / ((1 - u^2) sqrt|k|) and its error bound: psi' or the reduced phi', times A / sqrt|k|."""
+    """(own - other u) / ((1 - u^2) sqrt|k|) and its error bound: psi' or the reduced phi', times A
+    / sqrt|k|.
+    """
     rate = (own - other * u) / (v * root)
     bar = (4.0 * ROUNDOFF * (abs(own) + abs(other * u)) + abs(other) * off) / (v * root)
     return rate, bar + abs(rate) * (2.0 * abs(u) * off / v + 8.0 * ROUNDOFF)

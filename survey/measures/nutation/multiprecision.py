@@ -1,14 +1,25 @@
-"""Nutations in decimal arithmetic with as many digits as a point takes: the few that double-double leaves open.
+"""Nutations in decimal arithmetic with as many digits as a point takes: the few that double-double
+leaves open.
 
-The set-up of `kernels.nutation.wells` is double-double already, so where its error bounds are too wide (1e-26 from
-separatrices) only more digits help. Each point is solved with twice the digits until the answers agree; their
-difference bounds the error of the last one. No subtraction is avoided; digits make up for it. What stays open after
-MOST lies on a separatrix or a regular precession, as far as can be decided. A point takes about a millisecond.
+The set-up of `kernels.nutation.wells` is double-double already, so where its error bounds are too
+wide (1e-26 from separatrices) only more digits help. Each point is solved with twice the digits
+until the answers agree; their difference bounds the error of the last one. No subtraction is
+avoided; digits make up for it. What stays open after MOST lies on a separatrix or a regular
+precession, as far as can be decided. A point takes about a millisecond.
 
 Formulas (S1)-(S14) of `scenes/brun.md`; the quartic by Ferrari's resolvent.
 """
 
-from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, DivisionByZero, InvalidOperation, getcontext, localcontext
+from decimal import (
+    MAX_EMAX,
+    MIN_EMIN,
+    Context,
+    Decimal,
+    DivisionByZero,
+    InvalidOperation,
+    getcontext,
+    localcontext,
+)
 from functools import cache
 from itertools import pairwise
 
@@ -32,7 +43,8 @@ class NoMotion(Exception):
 
 
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
-    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error: bound}] of its own.
+    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error:
+    bound}] of its own.
 
     None where it stays open.
     """
@@ -58,14 +70,20 @@ def _settled(solve):
                 now = None
             if now is not None and before is not None and _agree(before, now):
                 passes, number, found = now
-                return passes, number, [_rounded(*pair) for pair in zip(before[2], found, strict=True)]
+                return (
+                    passes,
+                    number,
+                    [_rounded(*pair) for pair in zip(before[2], found, strict=True)],
+                )
         before, digits = now, 2 * digits
     return None
 
 
 def _agree(before, now):
     """Do two answers agree, that of fewer digits and that of more?"""
-    if before[:2] != now[:2] or any(x.keys() != y.keys() for x, y in zip(before[2], now[2], strict=True)):
+    if before[:2] != now[:2] or any(
+        x.keys() != y.keys() for x, y in zip(before[2], now[2], strict=True)
+    ):
         return False
     return all(
         abs(x[name] - y[name]) <= CLOSE * (ONE + abs(y[name]))
@@ -97,14 +115,22 @@ def _of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
 def _solved(k, level, a, b, size_a, size_c, u):
     """Passage?, the number of wells, and the outputs of all of them or of the one that holds u."""
     ends = wells(k, level, a, b)
-    mine = ends if u is None else [well for well in ends if well[0] - _slack() <= u <= well[1] + _slack()]
+    mine = (
+        ends
+        if u is None
+        else [well for well in ends if well[0] - _slack() <= u <= well[1] + _slack()]
+    )
     if u is not None and len(mine) != 1:
         raise Unclear
     if not mine:
         raise NoMotion
     passes = any((a == b and high == ONE) or (a == -b and low == -ONE) for low, high in mine)
     distance = separatrix_distance(k, level, a, b)
-    return passes, len(ends), [_outputs(k, level, a, b, size_a, size_c, *well) | distance for well in mine]
+    return (
+        passes,
+        len(ends),
+        [_outputs(k, level, a, b, size_a, size_c, *well) | distance for well in mine],
+    )
 
 
 def _slack():
@@ -113,7 +139,9 @@ def _slack():
 
 
 def versine(theta):
-    """1 - cos theta, to a few digits less than those of the context: the series, and 10 doublings of the angle."""
+    """1 - cos theta, to a few digits less than those of the context: the series, and 10 doublings
+    of the angle.
+    """
     x = (theta / 1024) ** 2
     total, term, n = Decimal(0), HALF * x, 2
     while total + term != total:
@@ -157,11 +185,15 @@ def _real_roots(k, level, a, b):
         return _of_quadratic(HALF * c1 / -level, c0 / -level) if level else []
     p, q, r = (level - k) / k, -c1 / k, -c0 / k
     if q == 0:
-        return [sign * z.sqrt() for z in _of_quadratic(HALF * p, r, positive=True) for sign in (1, -1)]
+        return [
+            sign * z.sqrt() for z in _of_quadratic(HALF * p, r, positive=True) for sign in (1, -1)
+        ]
     y = _largest(TWO * p, p * p - FOUR * r, -q * q)
     w, found = y.sqrt(), []
     for side in (1, -1):
-        found += _of_quadratic(HALF * side * w, HALF * (p + y) - side * q / (TWO * w), abs(p) + abs(q / w))
+        found += _of_quadratic(
+            HALF * side * w, HALF * (p + y) - side * q / (TWO * w), abs(p) + abs(q / w)
+        )
     return found
 
 
@@ -186,7 +218,9 @@ def _of_quadratic(half, c, size=0, positive=False):
 
 
 def _largest(c2, c1, c0):
-    """The greatest root of y^3 + c2 y^2 + c1 y + c0, c0 < 0: Newton's method from above, in a bracket if it is lost."""
+    """The greatest root of y^3 + c2 y^2 + c1 y + c0, c0 < 0: Newton's method from above, in a
+    bracket if it is lost.
+    """
     size = max(abs(c2), abs(c1).sqrt(), Decimal(10) ** (abs(c0).adjusted() // 3 + 1))
     low, high, close = Decimal(0), TWO * size, Decimal(10) ** (2 - getcontext().prec)
     y = high
@@ -231,7 +265,9 @@ def _saddle(k, a, b):
         if not rise > 0:
             return None
         move = ((a - b * u) * (b - a * u) + k * u * rest * rest) / rise
-        if abs(move) <= abs(u) * _slack() ** 2 or (last is not None and abs(move) >= last and abs(move) < _slack()):
+        if abs(move) <= abs(u) * _slack() ** 2 or (
+            last is not None and abs(move) >= last and abs(move) < _slack()
+        ):
             return u - move
         u, last = u - move, abs(move)
 

@@ -1,4 +1,6 @@
-"""Outputs of a nutation that are computed only where they are named: growth, twist, constants, the rotation at t."""
+"""Outputs of a nutation that are computed only where they are named: growth, twist, constants, the
+rotation at t.
+"""
 
 import numpy as np
 
@@ -14,9 +16,11 @@ _RTOL = 1e-13
 
 
 def solve(given, valid, times, out, request):
-    """{name: values, name_error: bars} of those that `request` wants, in the shapes of `out` where its status is ok.
+    """{name: values, name_error: bars} of those that `request` wants, in the shapes of `out` where
+    its status is ok.
 
-    given: the parameters (n) of states in the order of the scene's, or of scaled integrals; times (n, m) or None.
+    given: the parameters (n) of states in the order of the scene's, or of scaled integrals; times
+    (n, m) or None.
     """
     wanted, found = request.variables, {}
     with np.errstate(all="ignore"):
@@ -59,7 +63,9 @@ def _of_integrals(given, valid, sign, wanted):
     rows, kinds, _count, _heights = nutation.of_integrals(points, sign)
     rows = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]))
     ratio = np.repeat(np.where(valid, given["ratio"], 1.0), 2)
-    found = twist.determinants(rows, kinds.ravel(), (np.ones_like(ratio), ratio, np.repeat(points[:, 1], 2)), wanted)
+    found = twist.determinants(
+        rows, kinds.ravel(), (np.ones_like(ratio), ratio, np.repeat(points[:, 1], 2)), wanted
+    )
     return {name: tuple(x.reshape(-1, 1, 2) for x in pair) for name, pair in found.items()}
 
 

@@ -1,11 +1,12 @@
-"""The regular precessions of nutations as a surface over l, alpha, beta, and where one of these is a number, as curves.
+"""The regular precessions of nutations as a surface over l, alpha, beta, and where one of these is
+a number, as curves.
 
 Scaled, s = sgn k, y = A psi', z = A phi' (reduced), both in units of sqrt|k|: double roots u, |u| <= 1, of P (S2) are
 
     alpha = z (1 - s y^2),  beta = y (1 - s z^2),  l = y^2 + z^2 - 3 s y^2 z^2,  u = -s y z                  (S18)
 
-A cut of it consists of parts that one parameter runs through, each without cancellation (S19)-(S21), so that errors are
-those of a few roundings. Equation numbers: `scenes/brun.md`.
+A cut of it consists of parts that one parameter runs through, each without cancellation
+(S19)-(S21), so that errors are those of a few roundings. Equation numbers: `scenes/brun.md`.
 """
 
 from collections.abc import Callable
@@ -36,20 +37,31 @@ def surface(y, z, ry, rz, s):
             yy + zz - 3.0 * s * yy * zz,
             2.0 * (yy * (ry + 2.0 * ROUNDOFF) + zz * (rz + 2.0 * ROUNDOFF) + 3.0 * yy * zz * both),
         ),
-        "alpha": (z * (1.0 - s * yy), abs(z) * ((rz + 4.0 * ROUNDOFF) * (1.0 + yy) + 2.0 * yy * ry)),
+        "alpha": (
+            z * (1.0 - s * yy),
+            abs(z) * ((rz + 4.0 * ROUNDOFF) * (1.0 + yy) + 2.0 * yy * ry),
+        ),
         "beta": (y * (1.0 - s * zz), abs(y) * ((ry + 4.0 * ROUNDOFF) * (1.0 + zz) + 2.0 * zz * rz)),
         "u": (u, abs(u) * (ry + rz + ROUNDOFF)),
         "precession_rate": (y, abs(y) * ry),
         "reduced_spin_rate": (z, abs(z) * rz),
         "nutation_square": (
             yy + zz - s * (1.0 - 3.0 * yy * zz),
-            2.0 * (yy * (ry + 2.0 * ROUNDOFF) + zz * (rz + 2.0 * ROUNDOFF) + 3.0 * yy * zz * both + ROUNDOFF),
+            2.0
+            * (
+                yy * (ry + 2.0 * ROUNDOFF)
+                + zz * (rz + 2.0 * ROUNDOFF)
+                + 3.0 * yy * zz * both
+                + ROUNDOFF
+            ),
         ),
     }
 
 
 def parts(third, value, s, most):
-    """The Parts of the surface where the parameter `third` has this value; |y| and |z| up to about `most` at least."""
+    """The Parts of the surface where the parameter `third` has this value; |y| and |z| up to about
+    `most` at least.
+    """
     if third == "l":
         return _of_energy(value, s)
     own = _of_momentum(value, s, 1.0 + most)
@@ -65,7 +77,8 @@ def _of_momentum(a, s, most):
         return [Part(_oblate(a), *np.arcsinh(ends)) for ends in ranges if ends[0] < ends[1]]
     if abs(a) < TINY:
         return [Part(lambda t: (t, 0.0 * t, ROUNDOFF, ROUNDOFF), -most, most)] + [
-            Part(lambda t, y=y: (y + 0.0 * t, t, ROUNDOFF, ROUNDOFF), -1.0, 1.0) for y in (1.0, -1.0)
+            Part(lambda t, y=y: (y + 0.0 * t, t, ROUNDOFF, ROUNDOFF), -1.0, 1.0)
+            for y in (1.0, -1.0)
         ]
     last, first = np.arcsinh(2.0 / abs(a)), 2.0 * np.arctanh(1.0 / most)
     outer = [Part(_far(a, side), first, last) for side in (1.0, -1.0)] if first < last else []
@@ -112,13 +125,20 @@ def _far(a, side):
 
     def at(t):
         u, root = _root(a, t)
-        return np.copysign(1.0, a) * side * root / u, -np.copysign(u * (u / root), a), 4.0 * ROUNDOFF, 5.0 * ROUNDOFF
+        return (
+            np.copysign(1.0, a) * side * root / u,
+            -np.copysign(u * (u / root), a),
+            4.0 * ROUNDOFF,
+            5.0 * ROUNDOFF,
+        )
 
     return at
 
 
 def _of_energy(l, s):  # noqa: E741
-    """l given (S21): the lesser (or, on some parts, the greater) of |y|, |z| as parameter, both ways and signs."""
+    """l given (S21): the lesser (or, on some parts, the greater) of |y|, |z| as parameter, both
+    ways and signs.
+    """
     partner = _partner(l, s)
     found = []
     for kind, low, high in _energy_ranges(l, s):

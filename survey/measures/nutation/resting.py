@@ -1,4 +1,5 @@
-"""States that rest on an unstable precession, as far as double-double tells: u, psi and phi at times, with bars.
+"""States that rest on an unstable precession, as far as double-double tells: u, psi and phi at
+times, with bars.
 
 Beside a saddle u0, in units A = |k| = 1, x = u - u0 obeys x'' = P'(u) / 2 = rate^2 x - 6 u0 x^2 - 2 x^3 but for
 a shift of L that is of second order: while |x| <= REACH rate^2 it is at most (|x| + |x'| / rate) at first times
@@ -18,7 +19,8 @@ _PI_SHORT = 1e-32  # 1 + cos of the float64 next to pi, and more
 
 
 def at_times(found, those, points, times, drift):
-    """`found` (u, psi, phi and bars, each (n, m)) with the answers of the rows `those` (n) of the states (n, 7).
+    """`found` (u, psi, phi and bars, each (n, m)) with the answers of the rows `those` (n) of the
+    states (n, 7).
 
     drift: a (1/C - 1/A).
     """
@@ -30,14 +32,23 @@ def at_times(found, those, points, times, drift):
     size = np.sqrt(np.abs(k))
     with np.errstate(all="ignore"):
         alpha, beta, t = a / size, b / size, times[rows] * (size / size_a)[:, None]
-        place, first, rate = _saddle(alpha, beta, np.cos(theta), np.abs(p_theta) * np.sin(theta) / size)
+        place, first, rate = _saddle(
+            alpha, beta, np.cos(theta), np.abs(p_theta) * np.sin(theta) / size
+        )
         pole = np.where(theta == 0.0, 1.0, np.where(theta == np.pi, -1.0, 0.0))
         pole = np.where((k < 0.0) & (b == pole * a) & (p_theta == 0.0), pole, 0.0)
         up = pole != 0.0
-        place, first = np.where(up, pole, np.where(k > 0.0, place, np.nan)), np.where(up, _first(pole), first)
+        place, first = (
+            np.where(up, pole, np.where(k > 0.0, place, np.nan)),
+            np.where(up, _first(pole), first),
+        )
         rate = np.where(up, np.sqrt(np.maximum(4.0 - alpha**2, 0.0) + 8.0 * EPS), rate)
-        grown = np.where(first[:, None] > 0.0, np.exp((1.0 + 4.0 * REACH) * rate[:, None] * np.abs(t)), 1.0)
-        off = np.where(first[:, None] * grown <= REACH * rate[:, None] ** 2, first[:, None] * grown, np.nan)
+        grown = np.where(
+            first[:, None] > 0.0, np.exp((1.0 + 4.0 * REACH) * rate[:, None] * np.abs(t)), 1.0
+        )
+        off = np.where(
+            first[:, None] * grown <= REACH * rate[:, None] ** 2, first[:, None] * grown, np.nan
+        )
         one, two = 0.5 * _part(beta - alpha, 1.0 - place), 0.5 * _part(beta + alpha, 1.0 + place)
         steep = _part(np.abs(one), np.abs(1.0 - place)) + _part(np.abs(two), np.abs(1.0 + place))
         turned = 4.0 * steep[:, None] * off * np.minimum(np.abs(t), 1.0 / rate[:, None])
@@ -56,11 +67,14 @@ def at_times(found, those, points, times, drift):
 
 
 def _saddle(alpha, beta, u, speed):
-    """u0, a bound of what the state (u, |u'|) is off it, in u and u' over the rate, and a bound of the rate."""
+    """u0, a bound of what the state (u, |u'|) is off it, in u and u' over the rate, and a bound of
+    the rate.
+    """
     place, bar = separatrix.saddles(alpha, beta)
     rate, width = separatrix.growth(alpha, beta, np.ones_like(alpha))
     first = np.abs(u - place) + 4.0 * bar + 2.0 * EPS + 1.01 * speed / rate
-    first = np.where(first <= REACH * rate**2, first * (1.0 + 8.0 * first), np.nan)  # with the shift of L
+    # with the shift of L
+    first = np.where(first <= REACH * rate**2, first * (1.0 + 8.0 * first), np.nan)
     return place, first, rate + width
 
 
@@ -74,12 +88,14 @@ def _part(over, under):
 
 
 def rotations(states, u, off):
-    """sin theta, p_theta and (p_psi - p_phi u) / sin theta, and bars, each (n, m), of `states` (n, 7) that rest at u.
+    """sin theta, p_theta and (p_psi - p_phi u) / sin theta, and bars, each (n, m), of `states` (n,
+    7) that rest at u.
 
     u and its bar `off`: (n, m), as from `at_times`.
     """
     size_a, size_c, epsilon, _theta, _p_theta, b, a = states.T[:, :, None]
-    rate = 2.0 * np.sqrt(np.abs(epsilon * size_a * (size_a - size_c)))  # no unstable precession leaves faster
+    # no unstable precession leaves faster
+    rate = 2.0 * np.sqrt(np.abs(epsilon * size_a * (size_a - size_c)))
     sine = np.sqrt((1.0 - u) * (1.0 + u))
     up = sine == 0.0
     high = np.sqrt(2.0 * off)  # the sine at a pole

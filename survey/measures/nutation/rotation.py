@@ -1,7 +1,7 @@
 """The rotation of a body that nutates, at given times: p_theta, p, q, r and gamma of (3) and (6).
 
-And what the paper's (8) to (11), corrected, keep constant: alpha1 = 2 h, alpha2 = F2, alpha3 = p_psi; beta1, beta2,
-beta3, with the integrals from the lower turning point that is next to t = 0.
+And what the paper's (8) to (11), corrected, keep constant: alpha1 = 2 h, alpha2 = F2, alpha3 =
+p_psi; beta1, beta2, beta3, with the integrals from the lower turning point that is next to t = 0.
 
 Source: `scenes/brun.md`, (3), (10) and (11) corrected, for any A = B.
 """
@@ -55,7 +55,13 @@ def constants(rows, kinds, starts, periods, points):
             "alpha2": (second, 4.0 * ROUNDOFF * (np.abs(level) + np.abs(field * size_c))),
             "alpha3": (b, 0.0 * b),
             "beta1": _where(share, -2.0 * size_a * share * phi, 2.0 * size_a * moved, 8.0),
-            "beta2": _where(share, share * phi + 0.5 * since, moved + 0.5 * delay, 8.0, abs(share * phi) + abs(since)),
+            "beta2": _where(
+                share,
+                share * phi + 0.5 * since,
+                moved + 0.5 * delay,
+                8.0,
+                abs(share * phi) + abs(since),
+            ),
             "beta3": (-psi, psi_bar),
         }
 
@@ -68,7 +74,8 @@ def _where(share, value, bar, roundings, size=None):
 
 
 def at_times(rows, kinds, starts, periods, times, points, motion):
-    """{name: (values, bars)} of AT_T, each (n, m) at `times` (n, m), of initial states `points` (n, 7).
+    """{name: (values, bars)} of AT_T, each (n, m) at `times` (n, m), of initial states `points` (n,
+    7).
 
     motion: u, psi and phi there, and their bars.
     """
@@ -80,7 +87,9 @@ def at_times(rows, kinds, starts, periods, times, points, motion):
     rt.places(rows[turning], starts[turning], periods[turning], inside, some)
     found[turning] = some
     still = kinds == nu.SEPARATRIX
-    found[still] = resting.rotations(points[still], motion["u"][still], motion["u_error"][still]).transpose(2, 3, 0, 1)
+    found[still] = resting.rotations(
+        points[still], motion["u"][still], motion["u_error"][still]
+    ).transpose(2, 3, 0, 1)
     values, bars = np.moveaxis(found, -1, 0)[:, :, :, 0], np.moveaxis(found, -1, 0)[:, :, :, 1]
     sine, p_theta, across = values
     phi, off = motion["phi"], motion["phi_error"] + 4.0 * ROUNDOFF

@@ -23,11 +23,13 @@ BISECTIONS = 60
 
 
 def saddles(alpha, beta):
-    """u0 (n) in (-1/3, 1/3) of the saddles with these momenta (n), k > 0, and error bounds; NaN where none is found.
+    """u0 (n) in (-1/3, 1/3) of the saddles with these momenta (n), k > 0, and error bounds; NaN
+    where none is found.
 
     There is one at most; one nearer to a minimum than the samples are to one another is not seen.
     """
-    known = (abs(alpha) < 2.0) & (abs(beta) < 2.0)  # cusps bound the region: its momenta are smaller
+    # cusps bound the region: its momenta are smaller
+    known = (abs(alpha) < 2.0) & (abs(beta) < 2.0)
     alpha, beta = np.where(known, alpha, 0.0), np.where(known, beta, 0.0)
     low = np.full(alpha.shape, np.nan)
     nodes = np.linspace(-1.0 / 3.0, 1.0 / 3.0, SAMPLES)
@@ -60,7 +62,8 @@ def _square(u, alpha, beta, sign):
 
 
 def growth(alpha, beta, sign):
-    """Growth rates (n) of the unstable precessions with these momenta, signs of k (n), and bounds; NaN: there is none.
+    """Growth rates (n) of the unstable precessions with these momenta, signs of k (n), and bounds;
+    NaN: there is none.
 
     For k < 0 those are upright rotations, alpha = +-beta, and the rate is sqrt(4 - alpha^2).
     """
@@ -69,7 +72,9 @@ def growth(alpha, beta, sign):
     upright = (sign < 0) & (abs(alpha) == abs(beta)) & (abs(alpha) < 2.0)
     square = np.where(upright, (2.0 - alpha) * (2.0 + alpha), _square(u, alpha, beta, 1.0))
     # to first order the energy of the saddle does not depend on its place
-    off = np.where(upright, 0.0, 12.0 * (abs(u) + bar) * bar) + 32.0 * EPS * (1.0 + alpha**2 + beta**2)
+    off = np.where(upright, 0.0, 12.0 * (abs(u) + bar) * bar) + 32.0 * EPS * (
+        1.0 + alpha**2 + beta**2
+    )
     with np.errstate(invalid="ignore"):
         clear = square > 2.0 * off
         value = np.where(clear, np.sqrt(square), np.nan)
@@ -78,7 +83,8 @@ def growth(alpha, beta, sign):
 
 @dataclass(frozen=True)
 class Loop:
-    """u = u0 + kappa / D, D = level + swing cosh(rate t), which leaves u0, an unstable precession, and returns.
+    """u = u0 + kappa / D, D = level + swing cosh(rate t), which leaves u0, an unstable precession,
+    and returns.
 
     On a motion that passes a pole, |alpha| = |beta|, psi and phi go without the jumps of pi that they have there.
     """
@@ -115,7 +121,14 @@ class Loop:
         turned = abs(parts[1.0]) + abs(parts[-1.0]) + abs(self.drift * t)
         steep = sum(2.0 * abs(c) / abs(end - u).min() ** 2 for end, c in half.items() if c)
         size = off * steep * (1.0 + abs(t)) + 64 * EPS * turned
-        return {"u": u, "u_error": off, "psi": psi, "psi_error": size, "phi": phi, "phi_error": size}
+        return {
+            "u": u,
+            "u_error": off,
+            "psi": psi,
+            "psi_error": size,
+            "phi": phi,
+            "phi_error": size,
+        }
 
     def _integral(self, end, t):
         """The integral of 1 / (end - u) from 0 to t."""
@@ -128,18 +141,31 @@ class Loop:
 
 
 def loop(alpha, beta, sign, drift):
-    """The Loop of these momenta that goes farther, or None: there is none, or none that is seen (see `saddles`).
+    """The Loop of these momenta that goes farther, or None: there is none, or none that is seen
+    (see `saddles`).
 
-    With k < 0 it leaves an upright rotation; alpha = beta = 0 then is a passage from one to the other.
+    With k < 0 it leaves an upright rotation; alpha = beta = 0 then is a passage from one to the
+    other.
     """
     if sign < 0:
         if abs(alpha) != abs(beta) or abs(alpha) >= 2.0:
             return None
         pole = 1.0 if alpha == beta else -1.0
-        return Loop(pole, 0.0, -pole * (2.0 - abs(alpha)) * (2.0 + abs(alpha)), 2.0, abs(alpha), alpha, beta, drift)
+        return Loop(
+            pole,
+            0.0,
+            -pole * (2.0 - abs(alpha)) * (2.0 + abs(alpha)),
+            2.0,
+            abs(alpha),
+            alpha,
+            beta,
+            drift,
+        )
     place, bar = (float(x[0]) for x in saddles(np.array([alpha]), np.array([beta])))
     kappa = _square(place, alpha, beta, 1.0)
     if not kappa > 0.0:
         return None
     side = 1.0 if place <= 0.0 else -1.0  # of the loop whose end is farther from u0
-    return Loop(place, bar, kappa, 2.0 * place, side * np.sqrt(4.0 * place**2 + kappa), alpha, beta, drift)
+    return Loop(
+        place, bar, kappa, 2.0 * place, side * np.sqrt(4.0 * place**2 + kappa), alpha, beta, drift
+    )

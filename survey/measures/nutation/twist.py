@@ -1,11 +1,13 @@
-"""Twist determinants of the frequency map of a nutation, of KAM theory, and how a well's row gives them.
+"""Twist determinants of the frequency map of a nutation, of KAM theory, and how a well's row gives
+them.
 
-H is a function of the actions J, p_psi and p_phi. Perturbations that keep p_psi, as A != B does, leave two degrees of
-freedom, J and p_phi: there the determinant of the second derivatives of H must not be zero for most tori to survive
-(Kolmogorov), or that bordered by the frequencies for most of those on each level of energy (Arnold). Under others the
-same is asked of all three.
+H is a function of the actions J, p_psi and p_phi. Perturbations that keep p_psi, as A != B does,
+leave two degrees of freedom, J and p_phi: there the determinant of the second derivatives of H must
+not be zero for most tori to survive (Kolmogorov), or that bordered by the frequencies for most of
+those on each level of energy (Arnold). Under others the same is asked of all three.
 
-Source: V. I. Arnold, V. V. Kozlov, A. I. Neishtadt, Mathematical Aspects of Classical and Celestial Mechanics, 6.3.
+Source: V. I. Arnold, V. V. Kozlov, A. I. Neishtadt, Mathematical Aspects of Classical and Celestial
+Mechanics, 6.3.
 """
 
 import numpy as np
@@ -16,14 +18,24 @@ from survey.kernels.nutation import wells as nu
 _KEPT, _ALL = "under perturbations that keep p_psi", "under any perturbation"
 NAMES = {
     "kam_determinant": (f"Kolmogorov's twist determinant {_KEPT}", r"\det H''", twist.KAM),
-    "isoenergetic_determinant": (f"isoenergetic twist determinant {_KEPT}", r"\det\hat H''", twist.ISOENERGETIC),
+    "isoenergetic_determinant": (
+        f"isoenergetic twist determinant {_KEPT}",
+        r"\det\hat H''",
+        twist.ISOENERGETIC,
+    ),
     "kam_determinant_3": (f"Kolmogorov's twist determinant {_ALL}", r"\det H''_3", twist.KAM_3),
-    "isoenergetic_determinant_3": (f"isoenergetic twist determinant {_ALL}", r"\det\hat H''_3", twist.ISOENERGETIC_3),
+    "isoenergetic_determinant_3": (
+        f"isoenergetic twist determinant {_ALL}",
+        r"\det\hat H''_3",
+        twist.ISOENERGETIC_3,
+    ),
 }
 
 
 def determinants(rows, kinds, sizes, wanted):
-    """{name: (values, bars)} (n) of those `wanted`, of wells of these kinds; sizes: A, C and p_phi (n) of each."""
+    """{name: (values, bars)} (n) of those `wanted`, of wells of these kinds; sizes: A, C and p_phi
+    (n) of each.
+    """
     wanted = [name for name in NAMES if name in wanted]
     if not wanted:
         return {}

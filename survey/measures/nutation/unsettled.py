@@ -1,4 +1,6 @@
-"""Which nutations are solved again with more digits (`multiprecision`): open verdicts, and bounds that miss rtol."""
+"""Which nutations are solved again with more digits (`multiprecision`): open verdicts, and bounds
+that miss rtol.
+"""
 
 import numpy as np
 
@@ -6,15 +8,17 @@ from survey.kernels.nutation import wells as nu
 from survey.measures.nutation import derived, multiprecision, wells
 from survey.status import NO_CONVERGENCE, OK, OVERFLOW
 
-ILL = 1e-13  # float64 reaches this, relative to 1 + |value|, at every point that is not ill conditioned
+# float64 reaches this, relative to 1 + |value|, at every point that is not ill conditioned
+ILL = 1e-13
 DISTANCE = "separatrix_distance"
 
 
 def settle(out, points, solver, valid, request, known=False):
-    """Solve the points (parameters, n) again in place, as `solver` of `multiprecision` does, where that is needed.
+    """Solve the points (parameters, n) again in place, as `solver` of `multiprecision` does, where
+    that is needed.
 
-    known: only motions whose period is known already. Of methods other than `auto` only distances from a separatrix
-    whose existence is in doubt.
+    known: only motions whose period is known already. Of methods other than `auto` only distances
+    from a separatrix whose existence is in doubt.
     """
     doubt = np.isinf(out[f"{DISTANCE}_error"]) if DISTANCE in out else np.zeros(valid.size, bool)
     again = valid & doubt
@@ -34,7 +38,9 @@ def _open(out, request):
     found = (status == NO_CONVERGENCE) | (status == OVERFLOW)
     found |= (status == OK) & (verdict != nu.NUTATION) & (verdict != nu.PASSAGE)
     rtol = max(request.rtol, ILL)
-    asked = set().union(*(derived.PARTS.get(name, {name}) for name in request.variables or wells.NAMES))
+    asked = set().union(
+        *(derived.PARTS.get(name, {name}) for name in request.variables or wells.NAMES)
+    )
     for name in asked & {*wells.NAMES, DISTANCE} & out.keys():
         bars = out[f"{name}_error"]
         if (bars <= rtol).all():  # as a rule

@@ -1,7 +1,7 @@
 """Nutations between turning points: period, advances and action of each well, as arrays.
 
-A method fills, for each well (a row of `kernels.nutation.wells`), the periods' columns of `kernels.nutation.records`,
-and from these, at given times, those of a motion.
+A method fills, for each well (a row of `kernels.nutation.wells`), the periods' columns of
+`kernels.nutation.records`, and from these, at given times, those of a motion.
 """
 
 import numpy as np
@@ -20,7 +20,9 @@ FAR = 1e38  # distances in units of |k| beyond this only say that there is next 
 
 
 def of_states(points):
-    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, HEIGHT), starts (n, START) of states (n, 7)."""
+    """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, HEIGHT), starts (n, START) of
+    states (n, 7).
+    """
     n = len(points)
     rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
     heights, starts = np.full((n, rc.HEIGHT), np.nan), np.zeros((n, rc.START))
@@ -31,14 +33,19 @@ def of_states(points):
 def of_integrals(points, sign):
     """The same but starts for (l, alpha, beta) (n, 3): rows (n, 2, SIZE), kinds (n, 2)."""
     n = len(points)
-    rows, kinds, heights = np.zeros((n, 2, nu.SIZE)), np.zeros((n, 2), np.int64), np.full((n, rc.HEIGHT), np.nan)
+    rows, kinds, heights = (
+        np.zeros((n, 2, nu.SIZE)),
+        np.zeros((n, 2), np.int64),
+        np.full((n, rc.HEIGHT), np.nan),
+    )
     brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
     count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
     return rows, kinds, count, heights
 
 
 def in_lanes(kernel, points, actions):
-    """Values and bounds (OUTPUTS, n) of `points` (7, n), numbers of wells (n), who is answered (n): see `brun_lanes`.
+    """Values and bounds (OUTPUTS, n) of `points` (7, n), numbers of wells (n), who is answered (n):
+    see `brun_lanes`.
 
     actions: to full accuracy in small wells, too.
     """
@@ -64,7 +71,8 @@ def compile_periods(method):
 
 
 def periods(method, rows, kinds, rtol):
-    """Periods (n, PERIODS) of the wells, NaN where there is no nutation, and the kinds, LOST where there should be one.
+    """Periods (n, PERIODS) of the wells, NaN where there is no nutation, and the kinds, LOST where
+    there should be one.
 
     An error is trusted as one of first order only where it is small.
     """
@@ -72,18 +80,26 @@ def periods(method, rows, kinds, rtol):
     out = np.full((len(rows), rc.PERIODS), np.nan)
     method.nutation_periods(rows, kinds, rtol, out)
     turning = kinds >= nu.NUTATION
-    good = turning & np.isfinite(out).all(axis=1) & (out[:, rc.PERIOD_BAR] < TRUST * out[:, rc.PERIOD])
+    good = (
+        turning & np.isfinite(out).all(axis=1) & (out[:, rc.PERIOD_BAR] < TRUST * out[:, rc.PERIOD])
+    )
     out[~good] = np.nan
     return out, np.where(turning & ~good, nu.LOST, kinds)
 
 
 def outputs(rows, out, inertia, drift):
-    """{name: values, name_error: bounds} of wells from `periods`; inertia is A, drift a (1/C - 1/A) to 8 roundings."""
+    """{name: values, name_error: bounds} of wells from `periods`; inertia is A, drift a (1/C - 1/A)
+    to 8 roundings.
+    """
     good = np.isfinite(out[:, rc.PERIOD])
     period = inertia * out[:, rc.PERIOD]
     bar = inertia * out[:, rc.PERIOD_BAR] + 2.0 * ROUNDOFF * period
     spin = out[:, rc.SPIN] + drift * period
-    spin_bar = out[:, rc.SPIN_BAR] + np.abs(drift) * (bar + 8.0 * ROUNDOFF * period) + ROUNDOFF * np.abs(spin)
+    spin_bar = (
+        out[:, rc.SPIN_BAR]
+        + np.abs(drift) * (bar + 8.0 * ROUNDOFF * period)
+        + ROUNDOFF * np.abs(spin)
+    )
     found = {
         "u_min": (rows[:, nu.LOW], rows[:, nu.BAR_LOW]),
         "u_max": (rows[:, nu.HIGH], rows[:, nu.BAR_HIGH]),
@@ -96,7 +112,9 @@ def outputs(rows, out, inertia, drift):
 
 
 def _smallest(rows):
-    """What the action of a regular precession may be, by the error bounds of its turning points; 0 of other wells."""
+    """What the action of a regular precession may be, by the error bounds of its turning points; 0
+    of other wells.
+    """
     wide = np.where(rows[:, nu.WIDTH] == 0.0, rows[:, nu.BAR_LOW] + rows[:, nu.BAR_HIGH], 0.0)
     near = np.minimum(rows[:, nu.HIGH_PLUS], rows[:, nu.LOW_MINUS])
     steep = np.sqrt(np.maximum(np.maximum(rows[:, nu.Q_LOW], rows[:, nu.Q_HIGH]), 0.0))
@@ -106,7 +124,10 @@ def _smallest(rows):
 def _named(found, good):
     result = {}
     for name, (value, error) in found.items():
-        result[name], result[f"{name}_error"] = np.where(good, value, np.nan), np.where(good, error, np.nan)
+        result[name], result[f"{name}_error"] = (
+            np.where(good, value, np.nan),
+            np.where(good, error, np.nan),
+        )
     return result
 
 
@@ -128,7 +149,9 @@ def motions(method, rows, kinds, starts, out, times, inertia, drift):
 
 
 def verdicts(rows, kinds):
-    """The verdict of each well: its kind, and a regular precession also where the well's width is within its bound."""
+    """The verdict of each well: its kind, and a regular precession also where the well's width is
+    within its bound.
+    """
     one = (kinds == nu.NUTATION) & (rows[..., nu.NOISE_WIDTH] >= 1.0)
     return np.where(one, nu.PRECESSION, np.maximum(kinds, UNDECIDED))
 
@@ -151,5 +174,7 @@ def distance(heights):
     near = np.abs(value) < FAR
     return {
         "separatrix_distance": np.where(near, value, np.nan),
-        "separatrix_distance_error": np.where(near, bar, np.where(np.isinf(heights[:, rc.ABOVE_BAR]), np.inf, np.nan)),
+        "separatrix_distance_error": np.where(
+            near, bar, np.where(np.isinf(heights[:, rc.ABOVE_BAR]), np.inf, np.nan)
+        ),
     }

@@ -1,4 +1,6 @@
-"""Brun's chart: precession in one period of random initial states, and of hard ones; errors by 60-digit references."""
+"""Brun's chart: precession in one period of random initial states, and of hard ones; errors by
+60-digit references.
+"""
 
 import json
 from functools import cache
@@ -14,7 +16,8 @@ ERROR = "precession"
 MOST = {"chebyshev": 200}  # points that a slow method is timed on
 _POINTS = 100_000  # as in a block of a map
 _STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
-# the family of references of each work and its least distance: nearer a pole some peers do not come to an end
+# the family of references of each work and its least distance: nearer a pole some peers do not come
+# to an end
 _WORKS = {
     "initial states": ("", 0.0),
     "near separatrices": ("separatrix", 1e-8),
@@ -25,7 +28,11 @@ _WORKS = {
 
 def states(family):
     """[(distance, parameters, {output: exact value}, {output: floor})] of a family (error below 1e-35)."""
-    data = json.loads(resources.files("survey.reference").joinpath("brun_distances.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference")
+        .joinpath("brun_distances.json")
+        .read_text(encoding="utf-8")
+    )
     return [
         (
             row["distance"],
@@ -44,7 +51,9 @@ def references(work):
     if family:
         rows = [row for row in states(family) if least < 1.1 * row[0] < 0.2]
         return [(point, {}, {ERROR: float(exact[ERROR])}, 1) for _, point, exact, _ in rows]
-    data = json.loads(resources.files("survey.reference").joinpath("brun.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference").joinpath("brun.json").read_text(encoding="utf-8")
+    )
     cases = []
     for case in data["cases"]:
         point = {key: float.fromhex(value) for key, value in case["inputs_hex"].items()}
@@ -64,14 +73,25 @@ def works():
     close, past = 10.0 ** random.uniform(-8.0, -2.0, n), 10.0 ** random.uniform(-2.0, -1.0, n)
     any_state = body | {"epsilon": field, "theta0": theta, "p_theta0": p, "p_psi": b, "p_phi": a}
     spin = random.choice([-1.0, 1.0], n) * random.uniform(0.5, 2.0, n)
-    passing = any_state | {"p_phi": spin, "p_psi": random.choice([-1.0, 1.0], n) * spin * (1.0 + past)}
+    passing = any_state | {
+        "p_phi": spin,
+        "p_psi": random.choice([-1.0, 1.0], n) * spin * (1.0 + past),
+    }
     k = abs(field)
     hill = random.uniform(-0.3, 0.3, n)
     wide = 0.5 * k * np.sqrt((1 - hill**2) * (1 - 9 * hill**2)) * random.uniform(-0.9, 0.9, n)
-    at_hill = _upright(body, k, hill, np.sqrt(0.5 * k * (1 - 3 * hill**2) + wide), np.sqrt(k * close))
+    at_hill = _upright(
+        body, k, hill, np.sqrt(0.5 * k * (1 - 3 * hill**2) + wide), np.sqrt(k * close)
+    )
     valley = random.uniform(-0.9, 0.9, n)
-    in_valley = _upright(body, k, valley, np.sqrt(k) * random.uniform(1.5, 5.0, n), np.sqrt(k) * close)
-    return dict(zip(_WORKS, ((point, {}) for point in (any_state, at_hill, passing, in_valley)), strict=True))
+    in_valley = _upright(
+        body, k, valley, np.sqrt(k) * random.uniform(1.5, 5.0, n), np.sqrt(k) * close
+    )
+    return dict(
+        zip(
+            _WORKS, ((point, {}) for point in (any_state, at_hill, passing, in_valley)), strict=True
+        )
+    )
 
 
 def _upright(body, k, u, y, p_theta):
@@ -82,9 +102,11 @@ def _upright(body, k, u, y, p_theta):
 
 
 def system(point, options):
-    """One period, which the peers are given, from the initial state: u, u' and both angles, phi less its drift.
+    """One period, which the peers are given, from the initial state: u, u' and both angles, phi
+    less its drift.
 
-    Measured with heyoka: theta with its sine and cosine, or the Euler-Poisson equations, take longer.
+    Measured with heyoka: theta with its sine and cosine, or the Euler-Poisson equations, take
+    longer.
     """
     shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
     flat = {name: np.broadcast_to(values, shape).ravel() for name, values in point.items()}

@@ -63,7 +63,13 @@ def system(point, options):
     a, b, p = values["p_phi"], values["p_psi"], values["p_theta0"]
     L = p**2 + ((b - a * u0) / sin) ** 2 - k * u0 * u0 + a * a
     rates = np.column_stack([-2.0 * k, k - L, a * b]) / (A * A)[:, None]
-    return System(_slope, np.column_stack([u0, -sin * p / A]), rates, values["t"], values["t"] * (1.0 + abs(L)))
+    return System(
+        _slope,
+        np.column_stack([u0, -sin * p / A]),
+        rates,
+        values["t"],
+        values["t"] * (1.0 + abs(L)),
+    )
 
 
 def _slope(state, parameters, _sin, _cos):

@@ -1,4 +1,6 @@
-"""The chart of Clebsch's case: w1 of bodies with three unequal moments, at t = 10 and at 100 times up to it."""
+"""The chart of Clebsch's case: w1 of bodies with three unequal moments, at t = 10 and at 100 times
+up to it.
+"""
 
 import json
 from functools import cache
@@ -20,7 +22,11 @@ _NAMES = (*_MOMENTS, "epsilon", *_STATE)
 @cache
 def references(_work=None):
     """w1 at the last time, of six bodies (error below 1e-27)."""
-    data = json.loads(resources.files("survey.reference").joinpath("brun_triaxial.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference")
+        .joinpath("brun_triaxial.json")
+        .read_text(encoding="utf-8")
+    )
     found = []
     for row in data["trajectories"]:
         body = {name: float.fromhex(text) for name, text in row["hex"].items()} | {"t": row["t"]}
@@ -33,16 +39,27 @@ def works():
     random = np.random.default_rng(1)
     first, second = random.uniform(0.6, 1.4, (2, NUMBER))
     third = random.uniform(abs(first - second) + 0.1, first + second - 0.1)
-    columns = (first, second, third, random.uniform(-1.0, 1.0, NUMBER), *random.normal(size=(6, NUMBER)))
+    columns = (
+        first,
+        second,
+        third,
+        random.uniform(-1.0, 1.0, NUMBER),
+        *random.normal(size=(6, NUMBER)),
+    )
     bodies = dict(zip(_NAMES, columns, strict=True))
     rows = {name: values[:100, None] for name, values in bodies.items()}
     dense = rows | {"t": np.linspace(0.0, LAST, TIMES + 1)[None, 1:]}
-    return {"one time": (bodies | {"t": np.full(NUMBER, LAST)}, _QUESTION), f"{TIMES} times": (dense, _QUESTION)}
+    return {
+        "one time": (bodies | {"t": np.full(NUMBER, LAST)}, _QUESTION),
+        f"{TIMES} times": (dense, _QUESTION),
+    }
 
 
 def system(point, options):
     """(1) in w and nu."""
-    *columns, span = (np.ravel(c) for c in np.broadcast_arrays(*(point[name] for name in (*_NAMES, "t"))))
+    *columns, span = (
+        np.ravel(c) for c in np.broadcast_arrays(*(point[name] for name in (*_NAMES, "t")))
+    )
     A, B, C, epsilon, *state = columns
     w, nu = np.stack(state[:3]), np.stack(state[3:])
     shares = [(B - C) / A, (C - A) / B, (A - B) / C]

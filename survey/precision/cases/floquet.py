@@ -1,8 +1,10 @@
-"""The chart of a system of one's own: two coupled, damped Mathieu oscillators; errors of the spectral radius.
+"""The chart of a system of one's own: two coupled, damped Mathieu oscillators; errors of the
+spectral radius.
 
     x'' + C x' + (K + e Q cos W t) x = 0,  C = diag(0.02, 0.05), K = diag(1.69, 0.49), Q = (1, 0.7; 0.7, 0.5)
 
-Peers integrate the four columns of the variational equations over a period, with cos W t and sin W t as states.
+Peers integrate the four columns of the variational equations over a period, with cos W t and sin W
+t as states.
 """
 
 import json
@@ -38,7 +40,9 @@ SCENE = floquet(K=_stiffness, C=_damping, period=_period, parameters=("W", "e"),
 @cache
 def references(_work=None):
     """The reference points, the same for every work (error below 1e-28)."""
-    data = json.loads(resources.files("survey.reference").joinpath("floquet_map.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference").joinpath("floquet_map.json").read_text(encoding="utf-8")
+    )
     return [
         ({"W": row["W"], "e": row["e"]}, {}, {ERROR: float(row["spectral_radius"])}, row["stable"])
         for row in data["points"]
@@ -76,7 +80,16 @@ def _slope(state, parameters, _sin, _cos):
     W, e = parameters[0], parameters[1]
     wave = e * c
     k1, k2, k3 = 1.69 + wave, 0.49 + 0.5 * wave, 0.7 * wave
-    x0, y0, u0, v0, x1, y1, u1, v1 = state[2], state[3], state[4], state[5], state[6], state[7], state[8], state[9]
+    x0, y0, u0, v0, x1, y1, u1, v1 = (
+        state[2],
+        state[3],
+        state[4],
+        state[5],
+        state[6],
+        state[7],
+        state[8],
+        state[9],
+    )
     x2, y2, u2, v2, x3, y3, u3, v3 = (
         state[10], state[11], state[12], state[13], state[14], state[15], state[16], state[17],
     )  # fmt: skip

@@ -1,4 +1,6 @@
-"""The gyrostat's chart: trajectories to t = 20 of random systems and states; errors by references of 30 digits."""
+"""The gyrostat's chart: trajectories to t = 20 of random systems and states; errors by references
+of 30 digits.
+"""
 
 import json
 from functools import cache
@@ -26,7 +28,9 @@ _CASES = {"trajectory": "trajectories", "b = 0": "still", "g = 0": "free", "(61)
 def references(work):
     """The reference cases of the work's kind (error of the JSON's own values below 1e-29)."""
     data = json.loads(
-        resources.files("survey.reference").joinpath("gyrostat_trajectories.json").read_text(encoding="utf-8")
+        resources.files("survey.reference")
+        .joinpath("gyrostat_trajectories.json")
+        .read_text(encoding="utf-8")
     )
     cases = []
     for row in data[_CASES[work]]:
@@ -54,7 +58,9 @@ def _trigonometric(random):
     n = np.ceil(64.0 * (1.6 * np.hypot(b12, b31) + random.uniform(0.1, 2.0, _POINTS))) / 64.0
     n *= random.choice([-1.0, 1.0], _POINTS)
     values = (b12, b31, -0.75 * (b12**2 - b31**2), -0.75 * b12 * b31, 0.5 * n * b12, 0.5 * n * b31)
-    return dict(zip(_NAMES, (*values, np.zeros(1), 1.5 * b31 + n), strict=True)) | {"t": np.array([_TIME])}
+    return dict(zip(_NAMES, (*values, np.zeros(1), 1.5 * b31 + n), strict=True)) | {
+        "t": np.array([_TIME])
+    }
 
 
 def system(point, options):
@@ -74,7 +80,9 @@ def _slope(state, parameters, sin, cos):
     b12, b31, d = parameters[0], parameters[1], parameters[2]
     c23, s2, s3 = parameters[3], parameters[4], parameters[5]
     s, c = sin(state[0]), cos(state[0])
-    return state[1], (b12 * c - b31 * s) * state[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s
+    return state[1], (b12 * c - b31 * s) * state[1] - d * c * s - c23 * (
+        c * c - s * s
+    ) + s2 * c - s3 * s
 
 
 def outcome(ends):
@@ -110,7 +118,9 @@ def operations_of(run):
 
 def _one_step():
     """All that `lockstep.trajectories` does per lane and step."""
-    plain = {name: value.py_func for name, value in vars(lockstep).items() if hasattr(value, "py_func")}
+    plain = {
+        name: value.py_func for name, value in vars(lockstep).items() if hasattr(value, "py_func")
+    }
     number = _Counted()
     work = np.full((lockstep.ROWS, lockstep.LANES), number, dtype=object)
     Counted.operations = 0

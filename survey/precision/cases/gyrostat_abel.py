@@ -1,4 +1,5 @@
-"""The chart of Abel's equation: w(phi) of random gyrostats after a turn, at 121 angles of it, and beside where it ends.
+"""The chart of Abel's equation: w(phi) of random gyrostats after a turn, at 121 angles of it, and
+beside where it ends.
 
 Peers integrate dw/dphi = f + g / w and dt/dphi = 1 / w (57), all three of whose works keep w > 0.
 """
@@ -21,33 +22,58 @@ _NAMES = ("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0")
 _QUESTION = {"question": "abel"}
 _POINTS = 20_000
 _ANGLES = np.linspace(0.0, 2.0 * np.pi, 121)
-_CASES = {"one turn": "turn", "121 angles of a turn": "angles", "0.9999 of the way to where it turns": "steep"}
+_CASES = {
+    "one turn": "turn",
+    "121 angles of a turn": "angles",
+    "0.9999 of the way to where it turns": "steep",
+}
 
 
 @cache
 def references(work):
     """The reference cases of the work's kind (error of the JSON's own values below 1e-29)."""
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_abel.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference")
+        .joinpath("gyrostat_abel.json")
+        .read_text(encoding="utf-8")
+    )
     cases = []
     for row in data[_CASES[work]]:
-        numbers = map(float.fromhex, (*row["p_hex"], row["phi0_hex"], row["w0_hex"], row["phi_hex"]))
-        cases.append((dict(zip((*_NAMES, "phi"), numbers, strict=True)), _QUESTION, {ERROR: float(row[ERROR])}, None))
+        numbers = map(
+            float.fromhex, (*row["p_hex"], row["phi0_hex"], row["w0_hex"], row["phi_hex"])
+        )
+        cases.append(
+            (
+                dict(zip((*_NAMES, "phi"), numbers, strict=True)),
+                _QUESTION,
+                {ERROR: float(row[ERROR])},
+                None,
+            )
+        )
     return cases
 
 
 @cache
 def works():
-    """Systems and states that share nothing; those of the second work start at phi = 0, so they share their angles."""
+    """Systems and states that share nothing; those of the second work start at phi = 0, so they
+    share their angles.
+    """
     random = np.random.default_rng(1)
     turn = _rows(random.uniform(-0.5, 0.5, (6, _POINTS)), random, (2.5, 5.0))
-    angles = {name: values[: _POINTS // 20, None] for name, values in turn.items()} | {"phi0": np.zeros((1, 1))}
+    angles = {name: values[: _POINTS // 20, None] for name, values in turn.items()} | {
+        "phi0": np.zeros((1, 1))
+    }
     steep = _rows(random.normal(size=(6, 2 * _POINTS)), random, (0.3, 1.5))
     rows = np.column_stack([steep[name] for name in _NAMES])
     floats, status = solution.abel(taylor, rows, rows[:, rc.PHI0, None] + 40.0, 1e-8)
     turning = np.flatnonzero(status[:, 0] == solution.TURNING)[:_POINTS]
     steep = {name: values[turning] for name, values in steep.items()}
     near = steep["phi0"] + 0.9999 * (floats[turning, 0, rc.VALUE] - steep["phi0"])
-    points = (turn | {"phi": turn["phi0"] + 2.0 * np.pi}, angles | {"phi": _ANGLES[None]}, steep | {"phi": near})
+    points = (
+        turn | {"phi": turn["phi0"] + 2.0 * np.pi},
+        angles | {"phi": _ANGLES[None]},
+        steep | {"phi": near},
+    )
     return {work: (point, _QUESTION) for work, point in zip(_CASES, points, strict=True)}
 
 
@@ -59,13 +85,21 @@ def _rows(six, random, fast):
 
 
 def system(point, options):
-    """(57) over phi: phi itself, w and t; where the last axis is that of the angles, one solution serves them."""
+    """(57) over phi: phi itself, w and t; where the last axis is that of the angles, one solution
+    serves them.
+    """
     dense = np.ndim(point["phi"]) > 1
     samples = np.ravel(point["phi"]) if dense else None
-    columns = [np.ravel(values) for values in np.broadcast_arrays(*(point[name] for name in _NAMES))]
+    columns = [
+        np.ravel(values) for values in np.broadcast_arrays(*(point[name] for name in _NAMES))
+    ]
     rows = np.column_stack(columns)
     start = np.column_stack([rows[:, rc.PHI0], rows[:, rc.W0], np.zeros(len(rows))])
-    span = np.full(len(rows), samples[-1]) if dense else np.broadcast_to(point["phi"], len(rows)) - rows[:, rc.PHI0]
+    span = (
+        np.full(len(rows), samples[-1])
+        if dense
+        else np.broadcast_to(point["phi"], len(rows)) - rows[:, rc.PHI0]
+    )
     return System(
         slope=_slope,
         start=start,

@@ -1,7 +1,8 @@
-"""The chart of a whole gyrostat: w1 of bodies that share nothing, at t = 10 and at 100 times up to it.
+"""The chart of a whole gyrostat: w1 of bodies that share nothing, at t = 10 and at 100 times up to
+it.
 
-The motions are those of the six Euler-Poisson equations (1)-(6), off the invariant set too; errors by references of
-25 digits.
+The motions are those of the six Euler-Poisson equations (1)-(6), off the invariant set too; errors
+by references of 25 digits.
 """
 
 import json
@@ -26,7 +27,9 @@ def _bodies():
     A = np.eye(3) + 0.2 * shape @ shape.swapaxes(1, 2)
     entries = [[A[:, i, j] for i, j in ENTRIES.values()], *(0.3 * part.T for part in tensors)]
     values = {
-        f"{name}{key}": v for name, part in zip("ABC", entries, strict=True) for key, v in zip(_KEYS, part, strict=True)
+        f"{name}{key}": v
+        for name, part in zip("ABC", entries, strict=True)
+        for key, v in zip(_KEYS, part, strict=True)
     }
     for name, size in (("lambda", 0.5), ("s", 0.5), ("omega", 1.0), ("gamma", 1.0)):
         values |= {f"{name}{i}": v for i, v in enumerate(size * random.normal(size=(3, NUMBER)), 1)}
@@ -36,7 +39,9 @@ def _bodies():
 @cache
 def references(_work=None):
     """w1 at the last time, of six bodies (error below 1e-22)."""
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_body.json").read_text())
+    data = json.loads(
+        resources.files("survey.reference").joinpath("gyrostat_body.json").read_text()
+    )
     found = []
     for row in data["trajectories"]:
         body = {name: float.fromhex(text) for name, text in row["hex"].items()} | {"t": row["t"]}
@@ -49,7 +54,10 @@ def works():
     bodies = _bodies()
     rows = {name: values[:100, None] for name, values in bodies.items()}
     dense = rows | {"t": np.linspace(0.0, LAST, TIMES + 1)[None, 1:]}
-    return {"one time": (bodies | {"t": np.full(NUMBER, LAST)}, _QUESTION), f"{TIMES} times": (dense, _QUESTION)}
+    return {
+        "one time": (bodies | {"t": np.full(NUMBER, LAST)}, _QUESTION),
+        f"{TIMES} times": (dense, _QUESTION),
+    }
 
 
 def system(point, options):
@@ -75,7 +83,9 @@ def system(point, options):
 
 
 def _slope(state, p, _sin, _cos):
-    """Symmetric tensors by their entries 11, 22, 33, 12, 23, 31, from p[0]: of A^-1, A, B, C; then lambda, s."""
+    """Symmetric tensors by their entries 11, 22, 33, 12, 23, 31, from p[0]: of A^-1, A, B, C; then
+    lambda, s.
+    """
     w1, w2, w3, n1, n2, n3 = state[0], state[1], state[2], state[3], state[4], state[5]
     h1 = p[6] * w1 + p[9] * w2 + p[11] * w3 + p[24]
     h2 = p[9] * w1 + p[7] * w2 + p[10] * w3 + p[25]

@@ -1,4 +1,6 @@
-"""The chart of the integrable cases: phi at t = 20 where it is an elliptic function, and where (49) gives phi'."""
+"""The chart of the integrable cases: phi at t = 20 where it is an elliptic function, and where (49)
+gives phi'.
+"""
 
 import json
 from functools import cache
@@ -18,12 +20,16 @@ _INCLINED = ("A11", "B12", "B31", "theta0", "n", "phi0")
 @cache
 def _cases(case):
     data = json.loads(
-        resources.files("survey.reference").joinpath("gyrostat_integrable.json").read_text(encoding="utf-8")
+        resources.files("survey.reference")
+        .joinpath("gyrostat_integrable.json")
+        .read_text(encoding="utf-8")
     )
     found = []
     for row in data["trajectories"]:
         if row["case"] == case:
-            point = {name: float.fromhex(text) for name, text in row["hex"].items()} | {"t": row["t"]}
+            point = {name: float.fromhex(text) for name, text in row["hex"].items()} | {
+                "t": row["t"]
+            }
             found.append((point, {"case": case}, {ERROR: float(row[ERROR])}, None))
     return found
 

@@ -1,7 +1,8 @@
 """The chart of portraits: the multiplier of the first cycle, by references of 18 digits.
 
-A portrait has all equilibria, cycles and ends of branches besides. Peers do less: they are given a point of that one
-cycle and its period, and integrate one turn of it, with the integral of f, whose exponential is the multiplier.
+A portrait has all equilibria, cycles and ends of branches besides. Peers do less: they are given a
+point of that one cycle and its period, and integrate one turn of it, with the integral of f, whose
+exponential is the multiplier.
 """
 
 import json
@@ -30,7 +31,11 @@ _POINTS = 100
 @cache
 def references(_work=None):
     """Systems whose first cycle is a rotation."""
-    data = json.loads(resources.files("survey.reference").joinpath("gyrostat_cycles.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference")
+        .joinpath("gyrostat_cycles.json")
+        .read_text(encoding="utf-8")
+    )
     cases = []
     for row in data["cycles"]:
         point = dict(zip(_NAMES, map(float.fromhex, row["p_hex"]), strict=True))
@@ -58,7 +63,9 @@ def _first(six):
 
 def system(point, options):
     """One turn of (57) and of the integral of f."""
-    rows = np.column_stack([np.ravel(values) for values in np.broadcast_arrays(*(point[name] for name in _NAMES))])
+    rows = np.column_stack(
+        [np.ravel(values) for values in np.broadcast_arrays(*(point[name] for name in _NAMES))]
+    )
     first = np.array([_first(tuple(row)) for row in rows.tolist()])
     return System(
         slope=_slope,

@@ -1,4 +1,6 @@
-"""The chart of the normal form at L4, order 6: below mu_R, beside poles, mu to 0; errors by 60-digit closed forms."""
+"""The chart of the normal form at L4, order 6: below mu_R, beside poles, mu to 0; errors by
+60-digit closed forms.
+"""
 
 from functools import cache
 
@@ -33,4 +35,6 @@ def references(work):
 @cache
 def works():
     """Mass ratios that share nothing."""
-    return {work: (_points(work, _NUMBER, 1), {}) for work in ("below mu_R", "beside poles", "mu to 0")}
+    return {
+        work: (_points(work, _NUMBER, 1), {}) for work in ("below mu_R", "beside poles", "mu to 0")
+    }

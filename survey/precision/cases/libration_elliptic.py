@@ -1,4 +1,6 @@
-"""The chart of Danby's map: a row, a map and scattered points up to e = 0.7; errors of b by 30-digit references."""
+"""The chart of Danby's map: a row, a map and scattered points up to e = 0.7; errors of b by
+30-digit references.
+"""
 
 import json
 from functools import cache
@@ -23,7 +25,9 @@ MOST = {"dop853": 200, "rk4": 300}
 def references(_work=None):
     """The reference points in the range of the works, the same for every work (error below 1e-31)."""
     data = json.loads(
-        resources.files("survey.reference").joinpath("libration_elliptic.json").read_text(encoding="utf-8")
+        resources.files("survey.reference")
+        .joinpath("libration_elliptic.json")
+        .read_text(encoding="utf-8")
     )
     return [
         ({"mu": row["mu"], "e": row["e"]}, {}, {ERROR: float(row["b"])}, row["stable"])
@@ -120,7 +124,9 @@ def _one_step():
     work = np.full((lanes.OWN + taylor16.WIDTH + lanes.COLUMN, 1), number, dtype=object)
 
     def plain(module):
-        return {name: value.py_func for name, value in vars(module).items() if hasattr(value, "py_func")}
+        return {
+            name: value.py_func for name, value in vars(module).items() if hasattr(value, "py_func")
+        }
 
     def empty(shape):
         return np.full(shape, number, dtype=object)

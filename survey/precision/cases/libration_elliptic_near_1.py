@@ -17,7 +17,10 @@ system, outcome = libration_elliptic.system, libration_elliptic.outcome
 
 def _points(work, number, seed):
     random = np.random.default_rng(seed)
-    return {"mu": random.uniform(0.0, 0.05, number), "e": 1.0 - 10.0 ** random.uniform(*WORKS[work], number)}
+    return {
+        "mu": random.uniform(0.0, 0.05, number),
+        "e": 1.0 - 10.0 ** random.uniform(*WORKS[work], number),
+    }
 
 
 @cache

@@ -1,4 +1,6 @@
-"""The chart of the normal form at L4, orders 8 and 10, with effective stability; errors of order 8 by a twin."""
+"""The chart of the normal form at L4, orders 8 and 10, with effective stability; errors of order 8
+by a twin.
+"""
 
 import json
 from functools import cache
@@ -19,10 +21,17 @@ _NUMBER = 256
 def references(work):
     """Coefficients of 24 digits at a few mu (`survey/reference/libration_order_8.json`)."""
     data = json.loads(
-        resources.files("survey.reference").joinpath("libration_order_8.json").read_text(encoding="utf-8")
+        resources.files("survey.reference")
+        .joinpath("libration_order_8.json")
+        .read_text(encoding="utf-8")
     )
     return [
-        ({"mu": row["mu"]}, {"order": work.split()[1]}, {ERROR: np.array([float(row["c8"][k]) for k in LABELS])}, None)
+        (
+            {"mu": row["mu"]},
+            {"order": work.split()[1]},
+            {ERROR: np.array([float(row["c8"][k]) for k in LABELS])},
+            None,
+        )
         for row in data["points"]
     ]
 

@@ -1,4 +1,6 @@
-"""Mathieu's chart: a row, a map, scattered points, and large a and q; errors of the discriminant by double-doubles."""
+"""Mathieu's chart: a row, a map, scattered points, and large a and q; errors of the discriminant by
+double-doubles.
+"""
 
 from functools import cache
 
@@ -17,7 +19,10 @@ ALL = ("map 400x600, all outputs",)
 def _group(large):
     random = np.random.default_rng(3)
     low, high, most = LARGE if large else SMALL
-    points = {"a": random.uniform(max(low, 0.0), high, 60), "q": random.uniform(0.0, most / (3 if large else 1), 60)}
+    points = {
+        "a": random.uniform(max(low, 0.0), high, 60),
+        "q": random.uniform(0.0, most / (3 if large else 1), 60),
+    }
     return known(mathieu, points, {}, ERROR)
 
 
@@ -30,8 +35,14 @@ def references(work):
 def works():
     """A row, a map for the verdict and for all outputs, points that share nothing, and large ones."""
     random = np.random.default_rng(1)
-    scattered = {"a": random.uniform(*SMALL[:2], 30_000), "q": random.uniform(0.0, SMALL[2], 30_000)}
-    large = {"a": random.uniform(0.0, LARGE[1], 3_000), "q": random.uniform(0.0, LARGE[2] / 3, 3_000)}
+    scattered = {
+        "a": random.uniform(*SMALL[:2], 30_000),
+        "q": random.uniform(0.0, SMALL[2], 30_000),
+    }
+    large = {
+        "a": random.uniform(0.0, LARGE[1], 3_000),
+        "q": random.uniform(0.0, LARGE[2] / 3, 3_000),
+    }
     whole = _map(np.linspace(0.0, SMALL[2], 400), 600)
     return {
         "row": (_map(np.array([3.0]), 10_000), {}), "map 400x600": (whole, {}), "map 400x600, all outputs": (whole, {}),
@@ -44,11 +55,15 @@ def _map(q, number):
 
 
 def system(point, options):
-    """A quarter of the cosine's turn, by symmetry: y1, y2 over half a period, with cos 2t and sin 2t as states."""
+    """A quarter of the cosine's turn, by symmetry: y1, y2 over half a period, with cos 2t and sin
+    2t as states.
+    """
     a, q = (np.ravel(values) for values in np.broadcast_arrays(point["a"], point["q"]))
     start = np.tile([1.0, 0.0, 1.0, 0.0, 0.0, 1.0], (a.size, 1))
     span = np.full(a.size, np.pi / 2)
-    return System(_slope, start, np.column_stack([a, 2.0 * q]), span, np.sqrt(abs(a) + 2.0 * abs(q)))
+    return System(
+        _slope, start, np.column_stack([a, 2.0 * q]), span, np.sqrt(abs(a) + 2.0 * abs(q))
+    )
 
 
 def _slope(state, parameters, _sin, _cos):

@@ -12,13 +12,17 @@ ROW, MAP, SCATTERED, POINTS = 2_000, (60, 80), 2_000, 24
 
 
 def case(path):
-    """What a file in `cases` offers, for a user's Hill equation in a file, or in a workflow with its ranges."""
+    """What a file in `cases` offers, for a user's Hill equation in a file, or in a workflow with
+    its ranges.
+    """
     found, truth = digits.of_file(path)
     names, fixed = list(found.axes), dict(found.fixed)
 
     def scattered(number, seed):
         random = np.random.default_rng(seed)
-        points = {name: found.values(name, 1001)[random.integers(0, 1001, number)] for name in names}
+        points = {
+            name: found.values(name, 1001)[random.integers(0, 1001, number)] for name in names
+        }
         return points | {name: np.full(number, value) for name, value in fixed.items()}
 
     across = {name: np.array([[value]]) for name, value in fixed.items()}
@@ -26,10 +30,18 @@ def case(path):
     row |= {names[0]: found.values(names[0], ROW)[None, :]}
     works = {"row": (row, {}), "scattered": (scattered(SCATTERED, 1), {})}
     if len(names) > 1:
-        whole = {names[1]: found.values(names[1], MAP[0])[:, None], names[0]: found.values(names[0], MAP[1])[None, :]}
+        whole = {
+            names[1]: found.values(names[1], MAP[0])[:, None],
+            names[0]: found.values(names[0], MAP[1])[None, :],
+        }
         works["map {}x{}".format(*MAP)] = (across | whole, {})
     exact = known(truth, scattered(POINTS, 5), {}, ERROR)
     most = {"rk4": 500, "dop853": 500}
     return SimpleNamespace(
-        SCENE=found.scene, ERROR=ERROR, MOST=most, NAME=found.name, works=lambda: works, references=lambda work: exact
+        SCENE=found.scene,
+        ERROR=ERROR,
+        MOST=most,
+        NAME=found.name,
+        works=lambda: works,
+        references=lambda work: exact,
     )

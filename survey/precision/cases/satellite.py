@@ -1,4 +1,6 @@
-"""The satellite's chart: a row and a map of prolate librations, scattered points; errors by 40-digit references."""
+"""The satellite's chart: a row and a map of prolate librations, scattered points; errors by
+40-digit references.
+"""
 
 import json
 from functools import cache
@@ -22,11 +24,20 @@ _FAMILIES = {"PL": "prolate", "PR": "prolate", "OL": "oblate", "OR": "oblate"}
 @cache
 def references(_work=None):
     """The reference cases, the same for every work (error of the JSON's own values below 1e-38)."""
-    data = json.loads(resources.files("survey.reference").joinpath("satellite.json").read_text(encoding="utf-8"))
+    data = json.loads(
+        resources.files("survey.reference").joinpath("satellite.json").read_text(encoding="utf-8")
+    )
     cases = []
     for row in data["libration"] + data["nasty"] + data["rotation"]:
         point = {"k": float.fromhex(row["k_hex"]), "rho": float.fromhex(row["rho_hex"])}
-        cases.append((point, {"body": _FAMILIES[row["fam"]]}, {ERROR: float(row["Delta"])}, int(row["stable"])))
+        cases.append(
+            (
+                point,
+                {"body": _FAMILIES[row["fam"]]},
+                {ERROR: float(row["Delta"])},
+                int(row["stable"]),
+            )
+        )
     return cases
 
 
@@ -34,7 +45,10 @@ def works():
     """A row, two maps, and points that share nothing."""
     random = np.random.default_rng(1)
     scattered = {"k": random.uniform(0.01, 0.99, 30_000), "rho": random.uniform(0.6, 4.0, 30_000)}
-    maps = {f"map {n}x{m}": (_map(np.linspace(0.0, 0.99, n), m), {}) for n, m in ((400, 600), (2000, 2000))}
+    maps = {
+        f"map {n}x{m}": (_map(np.linspace(0.0, 0.99, n), m), {})
+        for n, m in ((400, 600), (2000, 2000))
+    }
     return {"row": (_map(np.array([0.5]), 10_000), {})} | maps | {"scattered": (scattered, {})}
 
 
@@ -72,7 +86,10 @@ def _slope(state, parameters, _sin, _cos):
 def outcome(ends):
     """The discriminant and, as a user of an integrator would have it, the verdict by |D| > 2."""
     discriminant = 2 * (2 * ends[:, 2] * ends[:, 5] - 1)
-    return {ERROR: discriminant, "verdict": np.where(abs(discriminant) > 2, monodromy.UNSTABLE, monodromy.STABLE)}
+    return {
+        ERROR: discriminant,
+        "verdict": np.where(abs(discriminant) > 2, monodromy.UNSTABLE, monodromy.STABLE),
+    }
 
 
 def operations_of(run):
@@ -94,7 +111,9 @@ def operations_of(run):
 
 
 def _one_step(p):
-    """All that `lanes.chain` does per lane and step: the step, two columns with error ellipses, zeros and sums."""
+    """All that `lanes.chain` does per lane and step: the step, two columns with error ellipses,
+    zeros and sums.
+    """
     matrix = taylor16.hill_step(np.ones(2 * taylor16.WIDTH), 1.0, p, 0.1)
     for _ in range(2):
         lanes.column(matrix, p, p, p, p, p)

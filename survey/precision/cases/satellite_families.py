@@ -24,7 +24,10 @@ def _tongues(body, number, seed):
     random = np.random.default_rng(seed)
     k = 10.0 ** np.linspace(-3.7, -0.7, 24)
     centre = np.sqrt(1.25) if body == "prolate" else 1.5
-    ends = [edge("satellite", along="rho", rho=(centre - 4 * m * m, centre), k=m, body=body).edge.values for m in k]
+    ends = [
+        edge("satellite", along="rho", rho=(centre - 4 * m * m, centre), k=m, body=body).edge.values
+        for m in k
+    ]
     which = random.integers(0, k.size, number)
     low, high = np.array([[x[0], x[-1]] for x in ends])[which].T
     return {"k": k[which], "rho": low + random.uniform(-0.5, 1.5, number) * (high - low)}

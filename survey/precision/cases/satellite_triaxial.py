@@ -1,4 +1,5 @@
-"""The chart of satellites with three unequal moments: the spectral radius of librations out of plane.
+"""The chart of satellites with three unequal moments: the spectral radius of librations out of
+plane.
 
 Peers integrate the libration x and the four columns of the canonical equations over a period, in u.
 """
@@ -22,7 +23,9 @@ _ON_CIRCLE = 1e-9
 def references(_work=None):
     """Eight librations, the same for every work (error below 1e-25)."""
     data = json.loads(
-        resources.files("survey.reference").joinpath("satellite_triaxial.json").read_text(encoding="utf-8")
+        resources.files("survey.reference")
+        .joinpath("satellite_triaxial.json")
+        .read_text(encoding="utf-8")
     )
     return [
         (
@@ -38,7 +41,11 @@ def references(_work=None):
 def works():
     """A line and a map of one roll ratio, and points that share nothing."""
     random = np.random.default_rng(1)
-    columns = random.uniform(0.1, 0.9, 5_000), random.uniform(-0.6, 0.05, 5_000), random.uniform(0.05, 1.2, 5_000)
+    columns = (
+        random.uniform(0.1, 0.9, 5_000),
+        random.uniform(-0.6, 0.05, 5_000),
+        random.uniform(0.05, 1.2, 5_000),
+    )
     scattered = dict(zip(_NAMES, columns, strict=True))
     return {
         "line": (_map(np.array([-0.3]), 10_000), {}),
@@ -57,7 +64,9 @@ def _map(yaw, number):
 
 def system(point, options):
     """A period of a libration and of the four columns."""
-    roll, yaw, amplitude = (np.ravel(v) for v in np.broadcast_arrays(*(point[name] for name in _NAMES)))
+    roll, yaw, amplitude = (
+        np.ravel(v) for v in np.broadcast_arrays(*(point[name] for name in _NAMES))
+    )
     rest, k = 1.0 - roll * yaw, np.sin(amplitude)
     a, b, off = (1.0 - roll) / rest, (1.0 - yaw) / rest, (roll - yaw) / rest
     columns = np.tile(np.eye(4).ravel(), (k.size, 1))
@@ -78,7 +87,11 @@ def _slope(state, p, sin, cos):
     s, c, q = sin(state[0]), cos(state[0]), p[0] + state[1]
     both, square = s * c, q * q
     one, two = (1.0 - 0.5 * p[1]) * q, (1.0 - 0.5 * p[2]) * q
-    m1, m2, m3 = 0.25 * p[2] * square + p[3] * (s * s), 0.25 * p[1] * square + p[4] * (c * c), p[5] * both
+    m1, m2, m3 = (
+        0.25 * p[2] * square + p[3] * (s * s),
+        0.25 * p[1] * square + p[4] * (c * c),
+        p[5] * both,
+    )
 
     def column(e1, e2, p1, p2):
         return (

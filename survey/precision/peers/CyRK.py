@@ -1,7 +1,8 @@
-"""CyRK's C++ solver with a compiled right-hand side (`cyjit`), called from a compiled loop over the points.
+"""CyRK's C++ solver with a compiled right-hand side (`cyjit`), called from a compiled loop over the
+points.
 
-This is `cysolve_ivp` by its way in from Numba, `nbsolve2_ivp`; through Python, `pysolve_ivp` costs a call per stage.
-Measured: DOP853 and its newer Vern8 take the same time, Vern7 and Tsit5 more.
+This is `cysolve_ivp` by its way in from Numba, `nbsolve2_ivp`; through Python, `pysolve_ivp` costs
+a call per stage. Measured: DOP853 and its newer Vern8 take the same time, Vern7 and Tsit5 more.
 """
 
 from functools import cache

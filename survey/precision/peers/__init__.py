@@ -1,4 +1,5 @@
-"""Other programs that the work-precision charts measure beside survey's methods, each by its best documented use.
+"""Other programs that the work-precision charts measure beside survey's methods, each by its best
+documented use.
 
 One file per peer, found by its name, which is that of the package it imports:
 
@@ -18,9 +19,10 @@ import numpy as np
 class System:
     """An autonomous system of ODEs at many points, each over its own span from 0.
 
-    `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, divides and calls the sine
-    and cosine of the peer, so that every peer can take it as it is: as Python, compiled, traced or as symbols. `steps`
-    estimates the number of steps at each point, up to a common factor.
+    `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, divides
+    and calls the sine and cosine of the peer, so that every peer can take it as it is: as Python,
+    compiled, traced or as symbols. `steps` estimates the number of steps at each point, up to a
+    common factor.
     """
 
     slope: Callable
@@ -28,10 +30,13 @@ class System:
     parameters: np.ndarray
     span: np.ndarray
     steps: np.ndarray
-    samples: np.ndarray | None = None  # the shares of the span, ascending from 0, after which states are wanted, if any
+    # the shares of the span, ascending from 0, after which states are wanted, if any
+    samples: np.ndarray | None = None
 
 
 def batches(system, lanes):
-    """Indices (batches, lanes) of points, like numbers of steps together; the last points fill up the last batch."""
+    """Indices (batches, lanes) of points, like numbers of steps together; the last points fill up
+    the last batch.
+    """
     order = np.argsort(system.steps, kind="stable")
     return np.append(order, np.repeat(order[-1:], -order.size % lanes)).reshape(-1, lanes)

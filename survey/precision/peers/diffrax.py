@@ -1,14 +1,17 @@
-"""diffrax's Dopri8 in double precision, compiled by jax: vectorised over 300 points, then over all such batches.
+"""diffrax's Dopri8 in double precision, compiled by jax: vectorised over 300 points, then over all
+such batches.
 
-Measured: smaller batches cost more per point, a single `vmap` waits for its slowest point; Tsit5 takes longer for the
-same error wherever that is below 1e-2.
+Measured: smaller batches cost more per point, a single `vmap` waits for its slowest point; Tsit5
+takes longer for the same error wherever that is below 1e-2.
 """
 
 import os
 from functools import cache, partial
 
 # one thread: XLA reads this when it starts
-os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+os.environ.setdefault(
+    "XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1"
+)
 
 import diffrax
 import jax
@@ -18,7 +21,8 @@ from survey.precision.peers import batches
 
 POINTS = 600
 LANES = 300
-MOST_STEPS = 10_000  # beyond, a solution is lost: one that has slipped past a pole takes ever smaller steps
+# beyond, a solution is lost: one that has slipped past a pole takes ever smaller steps
+MOST_STEPS = 10_000
 
 jax.config.update("jax_enable_x64", True)
 
@@ -27,7 +31,9 @@ def integrate(system, rtol):
     order = batches(system, LANES)
     start, parameters = (list(values.T[:, order]) for values in (system.start, system.parameters))
     shares = None if system.samples is None else tuple(system.samples)
-    reached = np.asarray(_compiled(system.slope, shares)(start, parameters, system.span[order], rtol))
+    reached = np.asarray(
+        _compiled(system.slope, shares)(start, parameters, system.span[order], rtol)
+    )
     states = np.empty((len(system.start), reached.shape[-1], system.start.shape[1]))
     states[order] = reached.transpose(1, 2, 3, 0)
     return states[:, 0] if shares is None else states
@@ -50,6 +56,8 @@ def _compiled(slope, shares):
     @jax.jit
     def run(start, parameters, span, rtol):
         batch = jax.vmap(partial(one, rtol=rtol))
-        return jax.numpy.stack(jax.lax.map(lambda points: batch(*points), (start, parameters, span)))
+        return jax.numpy.stack(
+            jax.lax.map(lambda points: batch(*points), (start, parameters, span))
+        )
 
     return run

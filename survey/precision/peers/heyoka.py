@@ -1,7 +1,9 @@
-"""heyoka's adaptive Taylor integrator in batch mode: one integrator, built once, started again for every 16 points.
+"""heyoka's adaptive Taylor integrator in batch mode: one integrator, built once, started again for
+every 16 points.
 
-Measured: 16 lanes (twice `recommended_simd_size` where that is 8) beat 8, 32 and 48; `ensemble_propagate_until`, which
-copies the integrator for every batch, takes 40 times as long as this loop.
+Measured: 16 lanes (twice `recommended_simd_size` where that is 8) beat 8, 32 and 48;
+`ensemble_propagate_until`, which copies the integrator for every batch, takes 40 times as long as
+this loop.
 """
 
 from functools import cache
@@ -16,10 +18,13 @@ POINTS = 30_000
 
 def integrate(system, rtol):
     lanes = 2 * heyoka.recommended_simd_size()
-    integrator = _build(system.slope, system.start.shape[1], system.parameters.shape[1], lanes, rtol)
+    integrator = _build(
+        system.slope, system.start.shape[1], system.parameters.shape[1], lanes, rtol
+    )
     order = batches(system, lanes)
     start, parameters = (
-        np.ascontiguousarray(values[order].swapaxes(1, 2)) for values in (system.start, system.parameters)
+        np.ascontiguousarray(values[order].swapaxes(1, 2))
+        for values in (system.start, system.parameters)
     )
     span, reached = system.span[order], np.empty_like(start)
     if system.samples is not None:
@@ -42,7 +47,9 @@ def _sampled(integrator, start, parameters, span, order, system):
     for i in range(len(order)):
         integrator.set_time(0.0)
         integrator.state[...], integrator.pars[...] = start[i], parameters[i]
-        states[order[i]] = integrator.propagate_grid(np.outer(system.samples, span[i]))[1].transpose(2, 0, 1)
+        states[order[i]] = integrator.propagate_grid(np.outer(system.samples, span[i]))[
+            1
+        ].transpose(2, 0, 1)
     return states
 
 

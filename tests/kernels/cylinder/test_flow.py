@@ -80,11 +80,15 @@ def test_equilibria_are_all_roots_of_g():
             assert abs(flow.values(p, row[eq.ANGLE])[1]) <= 3 * abs(row[eq.DG]) * row[eq.BAR]
 
 
-@pytest.mark.parametrize(("gap", "kinds"), [(0.0, {eq.DEGENERATE}), (1e-9, {eq.SADDLE, eq.NODE}), (-1e-9, set())])
+@pytest.mark.parametrize(
+    ("gap", "kinds"), [(0.0, {eq.DEGENERATE}), (1e-9, {eq.SADDLE, eq.NODE}), (-1e-9, set())]
+)
 def test_a_double_root_is_degenerate_and_a_near_one_is_two(gap, kinds):
     """g = -cos 2phi - (1 - gap) cos phi = (3/2) x^2 - gap + ... at phi = pi + x."""
     p, table = flow.coefficients(0.1, 0.2, 0.0, 1.0, -1.0 + gap, 0.0), np.zeros((eq.MOST, 10))
-    near = [row for row in table[: eq.equilibria(p, table)[0]] if abs(row[eq.ANGLE] - math.pi) < 1e-3]
+    near = [
+        row for row in table[: eq.equilibria(p, table)[0]] if abs(row[eq.ANGLE] - math.pi) < 1e-3
+    ]
     assert {int(row[eq.KIND]) for row in near} == kinds
     assert len(near) == len(kinds)
     for row in near:
@@ -102,10 +106,14 @@ def test_regions_of_attraction_hold():
                 continue
             V = np.array([[row[eq.VAA], row[eq.VAB]], [row[eq.VAB], row[eq.VBB]]])
             angles = random.uniform(0, 2 * np.pi, 8)
-            x = np.linalg.solve(np.linalg.cholesky(V).T, [np.cos(angles), np.sin(angles)]) * math.sqrt(row[eq.LEVEL])
+            x = np.linalg.solve(
+                np.linalg.cholesky(V).T, [np.cos(angles), np.sin(angles)]
+            ) * math.sqrt(row[eq.LEVEL])
             starts = np.ascontiguousarray(x.T + np.array([row[eq.ANGLE], 0.0]))
             floats, n, s = np.zeros((8, 1, 4)), np.zeros((8, 1), dtype=int), np.zeros(8, dtype=int)
-            taylor.flow_trajectories(np.tile(p, (8, 1)), starts, np.full((8, 1), 300.0), 1e-14, 99999, floats, n, s)
+            taylor.flow_trajectories(
+                np.tile(p, (8, 1)), starts, np.full((8, 1), 300.0), 1e-14, 99999, floats, n, s
+            )
             assert np.abs(floats[:, 0, 0] - row[eq.ANGLE]).max() < 1e-6
             tried += 1
     assert tried > 10
@@ -126,7 +134,13 @@ def test_kernels_of_the_gyrostat_compile_no_program():
     own = np.zeros(program.OPERATIONS + 2 * program.WIDTH)
     for p in (flow.coefficients(*SIX), P[0], own):
         every(p, flow.table())
-    for kernel in (program.values, program.in_time, program.along, program.bound_near, program.longest_step):
+    for kernel in (
+        program.values,
+        program.in_time,
+        program.along,
+        program.bound_near,
+        program.longest_step,
+    ):
         assert {signature[0].mutable for signature in kernel.signatures} == {True}
 
 

@@ -1,4 +1,6 @@
-"""Trajectories in lock step against order 20 one by one, references of 30 digits and mpmath; bits whatever the lane."""
+"""Trajectories in lock step against order 20 one by one, references of 30 digits and mpmath; bits
+whatever the lane.
+"""
 
 import json
 from importlib.resources import files
@@ -43,7 +45,9 @@ def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
 
 
 def agree(rows, times, tolerance=1e-13):
-    """Where both solve them, values agree within both bars, and turnings where they are known; returns that share."""
+    """Where both solve them, values agree within both bars, and turnings where they are known;
+    returns that share.
+    """
     mine, turns, status = solved(rows, times, tolerance)
     best, counted, _ = solved(rows, times, 1e-17, one_by_one)
     both = np.isfinite(mine[..., 0]) & np.isfinite(best[..., 0])
@@ -56,24 +60,37 @@ def agree(rows, times, tolerance=1e-13):
 
 def test_sine_and_cosine_to_one_ulp():
     random = np.random.default_rng(1)
-    near = np.outer(np.arange(-4, 5) * (np.pi / 4), np.ones(40)) + random.normal(size=(9, 40)) * 10.0 ** random.uniform(
-        -17, -1, (9, 40)
+    near = np.outer(np.arange(-4, 5) * (np.pi / 4), np.ones(40)) + random.normal(
+        size=(9, 40)
+    ) * 10.0 ** random.uniform(-17, -1, (9, 40))
+    x = np.concatenate(
+        [random.uniform(-np.pi, np.pi, 3000), near.ravel(), [0.0, 1e-300, np.pi, -np.pi]]
     )
-    x = np.concatenate([random.uniform(-np.pi, np.pi, 3000), near.ravel(), [0.0, 1e-300, np.pi, -np.pi]])
     out = np.empty((2, x.size))
     sines(x, out)
     with mp.workdps(40):
         for function, found in ((mp.sin, out[0]), (mp.cos, out[1])):
             exact = [function(mp.mpf(float(value))) for value in x]
             ulp = np.spacing(np.abs(np.array(exact, float)))
-            assert max(abs(mp.mpf(float(f)) - e) / u for f, e, u in zip(found, exact, ulp, strict=True)) <= 1
+            assert (
+                max(
+                    abs(mp.mpf(float(f)) - e) / u for f, e, u in zip(found, exact, ulp, strict=True)
+                )
+                <= 1
+            )
 
 
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-12])
 def test_references_to_t_20_lie_within_their_bars(rtol):
-    data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())["trajectories"]
-    rows = np.array([[point[n] for n in gyrostat._NAMES] for point, *_ in gyrostat.references("trajectory")])
-    floats, _turnings, status = solution.trajectories(taylor, rows, np.full((len(rows), 1), 20.0), rtol)
+    data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())[
+        "trajectories"
+    ]
+    rows = np.array(
+        [[point[n] for n in gyrostat._NAMES] for point, *_ in gyrostat.references("trajectory")]
+    )
+    floats, _turnings, status = solution.trajectories(
+        taylor, rows, np.full((len(rows), 1), 20.0), rtol
+    )
     assert (status == steps.OK).all()
     for found, case in zip(floats[:, 0], data, strict=True):
         for value, bar, name in zip(found[:2], found[2:], ("phi", "w"), strict=True):
@@ -123,13 +140,19 @@ def test_a_row_of_nan_costs_itself_alone(place):
     bad = solved(rows, [5.0])
     assert np.isnan(bad[0][3]).all() and bad[2][3] != steps.OK
     for one, other in zip(good, bad, strict=True):
-        assert np.array_equal(np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True)
+        assert np.array_equal(
+            np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True
+        )
 
 
 def test_a_row_of_times_ends_at_its_first_infinity_and_a_budget_ends_a_row():
     rows = drawn(TURN, 8)
     floats, _turnings, status = solved(rows, [2.0, np.inf, 3.0])
-    assert np.isfinite(floats[:, 0]).all() and np.isnan(floats[:, 1:]).all() and (status == steps.OK).all()
+    assert (
+        np.isfinite(floats[:, 0]).all()
+        and np.isnan(floats[:, 1:]).all()
+        and (status == steps.OK).all()
+    )
     assert (solved(rows, [np.inf])[2] == steps.OK).all()
     assert (solved(rows, [1e9], limit=5)[2] == steps.STEP_LIMIT).all()
 
@@ -149,7 +172,9 @@ def test_a_negative_zero_is_a_zero():
 
 
 def test_bars_hold_where_every_second_coefficient_vanishes():
-    """At rest with b = 0, w is odd in t; where one more coefficient is small by chance, the last two tell nothing."""
+    """At rest with b = 0, w is odd in t; where one more coefficient is small by chance, the last
+    two tell nothing.
+    """
     rows = drawn(3000, 9, (0, 0, 1, 1, 1, 1, 1, 0))
     times = np.tile([0.2, 0.5, 1.0], (len(rows), 1))
     exact, _, known = solution.trajectories(closed, rows, times, 1e-10)

@@ -1,4 +1,6 @@
-"""Abel solutions in lock step against order 20 one by one, closed forms and mpmath; bits whatever the lane."""
+"""Abel solutions in lock step against order 20 one by one, closed forms and mpmath; bits whatever
+the lane.
+"""
 
 import mpmath as mp
 import numpy as np
@@ -35,12 +37,15 @@ def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
 
 
 def agree(rows, over, tolerance=1e-13):
-    """Where both solve them, values agree within both bars; returns the share of answers, theirs and both's."""
+    """Where both solve them, values agree within both bars; returns the share of answers, theirs
+    and both's.
+    """
     mine, status = solved(rows, over, tolerance)
     best, other = solved(rows, over, 1e-17, one_by_one)
     good, theirs = ((codes == steps.OK) | (codes == steps.TURNING) for codes in (status, other))
     same = good & theirs & (status == other)
-    # where one says that it turns and the other does not, the target lies within the bar of the turning point
+    # where one says that it turns and the other does not, the target lies within the bar of the
+    # turning point
     differ = good & theirs & (status != other)
     edge = np.where(status == steps.TURNING, mine[..., 2], best[..., 2])
     turn = np.where(status == steps.TURNING, mine[..., 0], best[..., 0])
@@ -93,20 +98,27 @@ def test_phi_is_the_variable_far_from_turning_points():
 
         def slope(x, y, b12=b12, b31=b31, d=d, c23=c23, s2=s2, s3=s3):
             c, s = mp.cos(x), mp.sin(x)
-            return [b12 * c - b31 * s + (s2 * c - s3 * s - d * c * s - c23 * (c * c - s * s)) / y[0], 1 / y[0]]
+            return [
+                b12 * c - b31 * s + (s2 * c - s3 * s - d * c * s - c23 * (c * c - s * s)) / y[0],
+                1 / y[0],
+            ]
 
         with mp.workdps(20):
             true = mp.odefun(slope, mp.mpf(rows[i, 6]), [mp.mpf(rows[i, 7]), mp.mpf(0)])
             for j in (3, 12, 24):
                 off = [
                     abs(mp.mpf(a) - b)
-                    for a, b in zip(floats[i, j, :2], true(mp.mpf(rows[i, 6] + over[j])), strict=True)
+                    for a, b in zip(
+                        floats[i, j, :2], true(mp.mpf(rows[i, 6] + over[j])), strict=True
+                    )
                 ]
                 assert off[0] < floats[i, j, 2] and off[1] < floats[i, j, 3], (i, j, off)
 
 
 def test_every_angle_beside_a_turning_point():
-    """w^2 = 2 (cos phi - cos 1) for a pendulum: near phi = 1, w is a square root, and where it ends is known."""
+    """w^2 = 2 (cos phi - cos 1) for a pendulum: near phi = 1, w is a square root, and where it ends
+    is known.
+    """
     row = [[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 2.0 * np.sin(0.5)]]
     places = np.concatenate([np.linspace(0.0, 1.0, 300), 1.0 + np.linspace(-1e-9, 1e-9, 201)])
     places.sort()
@@ -150,7 +162,10 @@ def test_an_angle_is_served_alike_alone_and_among_others():
     for k in (0, 1, 7, 123, 399):
         alone = solved(rows, over[k : k + 1])
         sure = status[:, k] == steps.OK
-        assert np.array_equal(alone[0][sure, 0], floats[sure, k]) and (alone[1][sure, 0] == steps.OK).all()
+        assert (
+            np.array_equal(alone[0][sure, 0], floats[sure, k])
+            and (alone[1][sure, 0] == steps.OK).all()
+        )
 
 
 @pytest.mark.parametrize("column", range(8))
@@ -161,14 +176,20 @@ def test_a_row_of_nan_affects_itself_alone(column):
     bad = solved(rows, [5.0])
     assert bad[1][3, 0] not in (steps.OK, steps.TURNING)
     for one, other in zip(good, bad, strict=True):
-        assert np.array_equal(np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True)
+        assert np.array_equal(
+            np.delete(one, 3, axis=0), np.delete(other, 3, axis=0), equal_nan=True
+        )
 
 
 def test_a_row_ends_at_its_first_infinity_and_a_budget_ends_it():
     rows = drawn(MANY, 8, (1, 1, 1, 1, 1, 1, 3, 9))
     rows[:, 7] += 5.0
     floats, status = solved(rows, [2.0, np.inf, 3.0])
-    assert np.isfinite(floats[:, 0]).all() and np.isnan(floats[:, 1:]).all() and (status[:, 0] == steps.OK).all()
+    assert (
+        np.isfinite(floats[:, 0]).all()
+        and np.isnan(floats[:, 1:]).all()
+        and (status[:, 0] == steps.OK).all()
+    )
     assert (solved(rows, [np.inf])[1] == 99).all()
     assert (solved(rows, [1e5], limit=5)[1] == steps.STEP_LIMIT).all()
 

@@ -1,4 +1,6 @@
-"""Roots of g beside degenerate ones, against polynomial roots with 60 digits: numbers, angles, multiplicities."""
+"""Roots of g beside degenerate ones, against polynomial roots with 60 digits: numbers, angles,
+multiplicities.
+"""
 
 import math
 
@@ -15,7 +17,12 @@ ANGLES = (0.0, 0.5 * math.pi, math.pi, 1.5 * math.pi)
 
 def fold(angle, d, c23):
     """A system with g = g' = 0 at an angle, up to rounding."""
-    s, c, double_s, double_c = math.sin(angle), math.cos(angle), math.sin(2 * angle), math.cos(2 * angle)
+    s, c, double_s, double_c = (
+        math.sin(angle),
+        math.cos(angle),
+        math.sin(2 * angle),
+        math.cos(2 * angle),
+    )
     g, slope = 0.5 * d * double_s + c23 * double_c, d * double_c - 2.0 * c23 * double_s
     return [0.0, 0.0, d, c23, g * c - slope * s, -g * s - slope * c]
 
@@ -35,9 +42,13 @@ def exact(random, triple):
 
 
 def systems(seed, folds, specials, triples):
-    """Random folds and cusps, up to rounding, beside each other or exact; every other one off by 1e-16 to 1e-4."""
+    """Random folds and cusps, up to rounding, beside each other or exact; every other one off by
+    1e-16 to 1e-4.
+    """
     random = np.random.default_rng(seed)
-    rows = [exact(random, False) for _ in range(specials)] + [exact(random, True) for _ in range(triples)]
+    rows = [exact(random, False) for _ in range(specials)] + [
+        exact(random, True) for _ in range(triples)
+    ]
     for i in range(folds):
         angle = random.uniform(-math.pi, math.pi) if i % 5 else ANGLES[i // 5 % 4]
         d, c23 = random.normal(size=2) * 10.0 ** random.uniform(-3, 3, 2)
@@ -52,7 +63,9 @@ def systems(seed, folds, specials, triples):
 
 @mp.workdps(60)
 def checked(six):
-    """Are the roots where `clustered` says, as many as it says? Returns the number of rows, and of degenerate ones."""
+    """Are the roots where `clustered` says, as many as it says? Returns the number of rows, and of
+    degenerate ones.
+    """
     p, table = coefficients(*six), np.zeros((eq.MOST, 10))
     rows = table[: eq.clustered(p, table)[0]]
     assert (np.diff(rows[:, eq.ANGLE]) > 0).all() and (rows[:, eq.ANGLE] < 2 * math.pi).all()
@@ -67,11 +80,16 @@ def checked(six):
             if rows[i, eq.KIND] != eq.DEGENERATE:
                 d, c23, s2, s3 = map(mp.mpf, six[2:])
                 x = angle.real
-                slope = -d * mp.cos(2 * x) + 2 * c23 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+                slope = (
+                    -d * mp.cos(2 * x) + 2 * c23 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+                )
                 assert (rows[i, eq.KIND] == eq.SADDLE) == (slope > 0)
                 assert abs(rows[i, eq.DG] - slope) <= p[BOUND_DDG] * rows[i, eq.BAR]
     degenerate = rows[:, eq.KIND] == eq.DEGENERATE
-    assert (inside[~degenerate] == 1).all() and np.isin(inside[degenerate], (2, 3)).all(), (list(six), inside)
+    assert (inside[~degenerate] == 1).all() and np.isin(inside[degenerate], (2, 3)).all(), (
+        list(six),
+        inside,
+    )
     assert (rows[~degenerate, eq.BAR] < 1e-10).all()
     return len(rows), int(degenerate.sum())
 
@@ -104,7 +122,9 @@ def test_clusters_are_the_roots_that_bisection_finds():
     assert tried > 190
 
 
-@pytest.mark.parametrize("six", [(0.7, -0.4, 1.1, 0.3, 0.3, -1.1), (0, 0, 1, 0.5, 1, 0.5), (0, 0, 0, 1, -1, 0)])
+@pytest.mark.parametrize(
+    "six", [(0.7, -0.4, 1.1, 0.3, 0.3, -1.1), (0, 0, 1, 0.5, 1, 0.5), (0, 0, 0, 1, -1, 0)]
+)
 def test_a_double_root_is_one_degenerate_row(six):
     p, table = coefficients(*map(float, six)), np.zeros((eq.MOST, 10))
     count, hidden = eq.equilibria(p, table)
@@ -112,4 +132,7 @@ def test_a_double_root_is_one_degenerate_row(six):
 
 
 def test_without_g_there_are_no_rows():
-    assert eq.clustered(coefficients(1.0, 2.0, 0.0, 0.0, 0.0, 0.0), np.zeros((eq.MOST, 10))) == (0, False)
+    assert eq.clustered(coefficients(1.0, 2.0, 0.0, 0.0, 0.0, 0.0), np.zeros((eq.MOST, 10))) == (
+        0,
+        False,
+    )

@@ -34,7 +34,9 @@ def test_trajectories_lie_within_narrow_bars(row):
     """Also where float64's bar has grown by 1e13: the doubles phi and w are then as good as they can be."""
     row, times = np.array([row]), np.array([[0.5, 18.0]])
     floats, _turnings, status = solution.trajectories(taylor_double, row, times, 0.0)
-    assert (status == OK).all() and (floats[0, :, 2:] < 3e-16 * (1 + np.abs(floats[0, :, :2]))).all()
+    assert (status == OK).all() and (
+        floats[0, :, 2:] < 3e-16 * (1 + np.abs(floats[0, :, :2]))
+    ).all()
     for t, found in zip(times[0], floats[0], strict=True):
         assert within(found, exact(row[0, :6], *row[0, 6:], t, 45, float_out=False))
 
@@ -56,18 +58,24 @@ def test_auto_asks_it_where_float64_misses():
     if status[0, 0] == OK:
         assert abs(phi - 6.0) <= w * floats[0, 0, 3] + 1e-15 and abs(w - floats[0, 0, 0]) < 1e-12
     else:
-        assert abs(w) <= 3 * floats[0, 0, 3] and abs(phi - floats[0, 0, 0]) <= floats[0, 0, 2] + 1e-15
+        assert (
+            abs(w) <= 3 * floats[0, 0, 3] and abs(phi - floats[0, 0, 0]) <= floats[0, 0, 2] + 1e-15
+        )
 
 
 def test_too_many_steps_are_given_up_at_once():
-    floats, turnings, status = solution.trajectories(taylor_double, np.array([[*SIX, *NEAR]]), np.array([[1e9]]), 0.0)
+    floats, turnings, status = solution.trajectories(
+        taylor_double, np.array([[*SIX, *NEAR]]), np.array([[1e9]]), 0.0
+    )
     assert status[0, 0] == STEP_LIMIT and np.isnan(floats).all() and turnings[0, 0] == -2
 
 
 @pytest.mark.parametrize("method", [taylor, dop853])
 @pytest.mark.parametrize("fast", [0.0, 4.0])
 def test_one_short_step_keeps_within_its_rounding(method, fast):
-    """A bar of one step is little more than an ulp: sums of stages must not be rounded at the size of phi and w."""
+    """A bar of one step is little more than an ulp: sums of stages must not be rounded at the size
+    of phi and w.
+    """
     random = np.random.default_rng(4)
     rows = random.normal(size=(1500, 8)) * [1, 1, 1, 1, 1, 1, 2, 10.0**fast]
     rows[::2, :2] = 0.0
@@ -81,7 +89,9 @@ def test_one_short_step_keeps_within_its_rounding(method, fast):
 
 @pytest.mark.parametrize("method", [dop853, taylor, rk4])
 def test_beside_saddles_a_short_step_counts_the_rounding_of_every_stage(method):
-    """There w and its change are so small that nothing hides what the stages round: phi, and terms that cancel."""
+    """There w and its change are so small that nothing hides what the stages round: phi, and terms
+    that cancel.
+    """
     random = np.random.default_rng(1)
     rows = random.normal(size=(3000, 8))
     rows[::3, :4] = random.integers(-2, 3, (1000, 4))
@@ -89,7 +99,8 @@ def test_beside_saddles_a_short_step_counts_the_rounding_of_every_stage(method):
     saddle = random.uniform(-np.pi, np.pi, 3000)
     s, c, double = np.sin(saddle), np.cos(saddle), np.cos(2 * saddle)
     across = rows[:, 2] * c * s + rows[:, 3] * double  # g(saddle) = 0
-    along = -rows[:, 2] * double + 4 * rows[:, 3] * s * c - 2 * np.abs(rows[:, 4])  # g'(saddle) >= 0
+    # g'(saddle) >= 0
+    along = -rows[:, 2] * double + 4 * rows[:, 3] * s * c - 2 * np.abs(rows[:, 4])
     rows[:, 4], rows[:, 5] = across * c + along * s, along * c - across * s
     rows[:, 6] = saddle + random.choice([-1, 1], 3000) * 10.0 ** random.uniform(-6, -1, 3000)
     rows[:, 7] = random.choice([-1, 1], 3000) * 10.0 ** random.uniform(-6, -1, 3000)
@@ -113,7 +124,9 @@ def test_beside_saddles_a_short_step_counts_the_rounding_of_every_stage(method):
     ],
 )  # fmt: skip
 def test_dop853_beside_saddles_as_mpmath_has_it(six, phi, w, t):
-    found, _turnings, _status = solution.trajectories(dop853, np.array([[*six, phi, w]]), np.array([[t]]), 1.5e-11)
+    found, _turnings, _status = solution.trajectories(
+        dop853, np.array([[*six, phi, w]]), np.array([[t]]), 1.5e-11
+    )
     assert within(found[0, 0], exact(six, phi, w, t, float_out=False))
 
 
@@ -129,19 +142,33 @@ def test_thousands_beside_separatrices_rests_and_double_roots(still):
     across = rows[:, 2] * c * s + rows[:, 3] * double  # g(rest) = 0
     along = random.normal(size=n) * 10.0 ** random.uniform(-9, 1, n)
     third = np.arange(n) % 3 == 0
-    along[third] = (-rows[:, 2] * double + 4 * rows[:, 3] * s * c)[third]  # g'(rest) = 0, but for roundings
+    # g'(rest) = 0, but for roundings
+    along[third] = (-rows[:, 2] * double + 4 * rows[:, 3] * s * c)[third]
     rows[:, 4], rows[:, 5] = across * c + along * s, along * c - across * s
     rows[:, 6] = random.uniform(-np.pi, np.pi, n)
 
     def potential(x):
         sine, cosine = np.sin(x), np.cos(x)
-        return rows[:, 2] * sine**2 / 2 + rows[:, 3] * sine * cosine - rows[:, 4] * sine - rows[:, 5] * cosine
+        return (
+            rows[:, 2] * sine**2 / 2
+            + rows[:, 3] * sine * cosine
+            - rows[:, 4] * sine
+            - rows[:, 5] * cosine
+        )
 
     kinetic = 2 * (potential(rest) - potential(rows[:, 6]))
-    level = random.choice([-1, 1], n) * np.sqrt(np.abs(kinetic)) * (1 + 10.0 ** random.uniform(-17, -1, n))
-    rows[:, 7] = np.where(np.arange(n) % 2 == 0, level, rows[:, 7] * 10.0 ** random.uniform(-17, 0, n))
+    level = (
+        random.choice([-1, 1], n)
+        * np.sqrt(np.abs(kinetic))
+        * (1 + 10.0 ** random.uniform(-17, -1, n))
+    )
+    rows[:, 7] = np.where(
+        np.arange(n) % 2 == 0, level, rows[:, 7] * 10.0 ** random.uniform(-17, 0, n)
+    )
     beside = np.arange(n) % 5 == 0
-    rows[beside, 6] = (rest + random.choice([-1, 0, 1], n) * 10.0 ** random.uniform(-17, 0, n))[beside]
+    rows[beside, 6] = (rest + random.choice([-1, 0, 1], n) * 10.0 ** random.uniform(-17, 0, n))[
+        beside
+    ]
     times = random.uniform(0, 20, (n, 1))
     truth, counted, fine = solution.trajectories(taylor_double, rows, times, 0.0)
     for measure in (solution, auto):
@@ -158,7 +185,9 @@ def test_thousands_beside_separatrices_rests_and_double_roots(still):
 @pytest.mark.parametrize(("six", "phi0", "w0"), [((0, 0, 1.1, 0.3, 0.5, -0.2), 1.5, 0.5145879417558026),
                                                  ((0, 0, 0, 0, 0, 4.0), 0.25, 3.968790668917316)])  # fmt: skip
 def test_bars_stay_narrow_from_one_passage_of_a_saddle_to_the_next(six, phi0, w0, off):
-    """What errs along the flow must not come across it: at each saddle it would grow by as much as solutions part."""
+    """What errs along the flow must not come across it: at each saddle it would grow by as much as
+    solutions part.
+    """
     row, times = np.array([[*six, phi0, w0 * (1.0 + off)]]), np.array([[40.0, 90.0]])
     floats, turnings, status = solution.trajectories(taylor_double, row, times, 0.0)
     assert (status == OK).all() and (turnings >= 0).all()

@@ -19,18 +19,28 @@ def exponentials(y, out):
 
 def test_falling_exponential_to_two_ulp():
     random = np.random.default_rng(1)
-    y = np.concatenate([random.uniform(0, 700, 500), 10.0 ** random.uniform(-18, 0, 300), [0.0, 700.0, np.log(2.0)]])
+    y = np.concatenate(
+        [
+            random.uniform(0, 700, 500),
+            10.0 ** random.uniform(-18, 0, 300),
+            [0.0, 700.0, np.log(2.0)],
+        ]
+    )
     out = np.empty((2, y.size))
     exponentials(y, out)
     with mp.workdps(40):
         for at, *found in zip(y, *out, strict=True):
-            for value, exact in zip(found, (mp.exp(-mp.mpf(at)), -mp.expm1(-mp.mpf(at))), strict=True):
+            for value, exact in zip(
+                found, (mp.exp(-mp.mpf(at)), -mp.expm1(-mp.mpf(at))), strict=True
+            ):
                 assert abs(mp.mpf(float(value)) - exact) <= 2 * np.spacing(float(exact))
 
 
 def solved(rows, times, method=closed, rtol=1e-13):
     rows = np.asarray(rows, float)
-    return solution.trajectories(method, rows, np.tile(np.asarray(times, float), (len(rows), 1)), rtol)
+    return solution.trajectories(
+        method, rows, np.tile(np.asarray(times, float), (len(rows), 1)), rtol
+    )
 
 
 def free(count, seed, b=1.0, phi0=3.0, w0=1.0, gap=None):
@@ -49,13 +59,17 @@ def curved(count, seed, mu, gap=None):
     b12, b31, phi0 = rows[:, 0], rows[:, 1], rows[:, 6]
     n = n if gap is None else abs(mu) * np.hypot(b12, b31) * (1.0 + gap)
     delta, sigma = mu * (1.0 - mu), (mu - 1.0) * n
-    rows[:, 2:6] = np.transpose([delta * (b12**2 - b31**2), delta * b12 * b31, sigma * b12, sigma * b31])
+    rows[:, 2:6] = np.transpose(
+        [delta * (b12**2 - b31**2), delta * b12 * b31, sigma * b12, sigma * b31]
+    )
     rows[:, 7] = mu * (b12 * np.sin(phi0) + b31 * np.cos(phi0)) + n
     return rows
 
 
 def exact(row, t):
-    """phi and w of g = 0 at t: phi' = F + n, u = tan(x/2) = w0 tanh z/(D - f0 tanh z), z = D t/2, D^2 = b^2 - n^2."""
+    """phi and w of g = 0 at t: phi' = F + n, u = tan(x/2) = w0 tanh z/(D - f0 tanh z), z = D t/2,
+    D^2 = b^2 - n^2.
+    """
     b12, b31, *_rest, phi0, w0 = map(mp.mpf, map(float, row))
     F, f = b12 * mp.sin(phi0) + b31 * mp.cos(phi0), b12 * mp.cos(phi0) - b31 * mp.sin(phi0)
     square = w0 * (w0 - 2 * F) - f * f
@@ -80,7 +94,8 @@ def exact(row, t):
         {"w0": 100.0},
         {"b": 30.0},  # stiff
         {"b": 1e-9},
-        *({"gap": gap} for gap in (1e-3, 1e-8, 1e-13, 0.0, -1e-13, -1e-8, -1e-3)),  # Delta^2 changes sign
+        # Delta^2 changes sign
+        *({"gap": gap} for gap in (1e-3, 1e-8, 1e-13, 0.0, -1e-13, -1e-8, -1e-3)),
     ],
     ids=str,
 )
@@ -94,7 +109,10 @@ def test_bars_hold_and_are_narrow_where_g_is_0(scale):
             for t, (phi, w, bar_phi, bar_w) in zip(times, found, strict=True):
                 if np.isfinite(phi):
                     wanted = exact(row, t)
-                    assert abs(float(phi) - wanted[0]) <= bar_phi and abs(float(w) - wanted[1]) <= bar_w
+                    assert (
+                        abs(float(phi) - wanted[0]) <= bar_phi
+                        and abs(float(w) - wanted[1]) <= bar_w
+                    )
                     shares.append(float(abs(float(phi) - wanted[0]) / bar_phi))
     assert np.median(shares) > 1e-3
 
@@ -107,12 +125,18 @@ def series(row, t):
         S, C, W = [mp.sin(phi)], [mp.cos(phi)], [w]
         for n in range(30):
             double = [sum(a * b for a, b in zip(S, reversed(B), strict=True)) for B in (C, S)]
-            turn = [sum(a * b for a, b in zip(W, reversed(B), strict=True)) / (n + 1) for B in (C, S)]
+            turn = [
+                sum(a * b for a, b in zip(W, reversed(B), strict=True)) / (n + 1) for B in (C, S)
+            ]
             g = s2 * C[n] - s3 * S[n] - d * double[0] - c23 * ((1 if n == 0 else 0) - 2 * double[1])
             S.append(turn[0])
             C.append(-turn[1])
             W.append(b12 * S[-1] + b31 * C[-1] + g / (n + 1))
-        h = min(rest, (mp.mpf(10) ** -34 / max(abs(W[-1]), abs(W[-2]), mp.mpf(10) ** -60)) ** (mp.mpf(1) / 30))
+        h = min(
+            rest,
+            (mp.mpf(10) ** -34 / max(abs(W[-1]), abs(W[-2]), mp.mpf(10) ** -60))
+            ** (mp.mpf(1) / 30),
+        )
         phi += sum(a * h ** (k + 1) / (k + 1) for k, a in enumerate(W))
         w, rest = sum(a * h**k for k, a in enumerate(W)), rest - h
     return phi, w
@@ -151,7 +175,9 @@ def test_numbers_that_meet_61_exactly_have_no_part_in_the_bar():
     rows = np.transpose([*exactly, zero, 1.5 * b31 + n])
     moved = rows * (1.0 + 4e-15 * (np.arange(8) == 3))
     phi, _w, narrow, _bar = solved(rows, [20.0])[0][:, 0].T
-    assert (narrow < 2e-13 * phi).all() and np.median(solved(moved, [20.0])[0][:, 0, 2] / narrow) > 1.5
+    assert (narrow < 2e-13 * phi).all() and np.median(
+        solved(moved, [20.0])[0][:, 0, 2] / narrow
+    ) > 1.5
 
 
 def test_the_same_bits_in_any_lane_beside_any_neighbour():

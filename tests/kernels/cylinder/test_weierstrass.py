@@ -1,4 +1,6 @@
-"""Trajectories with b = 0 by Weierstrass's functions: references of 30 digits, Taylor series, bits in any lane."""
+"""Trajectories with b = 0 by Weierstrass's functions: references of 30 digits, Taylor series, bits
+in any lane.
+"""
 
 import json
 from importlib.resources import files
@@ -22,7 +24,9 @@ def angles(y, x, out):
 
 def solved(rows, times, method=closed, rtol=1e-13):
     rows = np.asarray(rows, float)
-    return solution.trajectories(method, rows, np.tile(np.asarray(times, float), (len(rows), 1)), rtol)
+    return solution.trajectories(
+        method, rows, np.tile(np.asarray(times, float), (len(rows), 1)), rtol
+    )
 
 
 def drawn(count, seed, scale=(1, 1, 1, 1, 3, 1)):
@@ -36,7 +40,11 @@ def test_arctangent_to_two_ulp():
     y, x = np.sin(turn), np.cos(turn)
     near = np.tile([0.0, 1.0, -1.0, np.tan(np.pi / 8), 1.0], 60)
     y = np.concatenate(
-        [y, near + random.normal(size=300) * 10.0 ** random.uniform(-17, -1, 300), [0.0, 1e-300, 1.0, 1.0]]
+        [
+            y,
+            near + random.normal(size=300) * 10.0 ** random.uniform(-17, -1, 300),
+            [0.0, 1e-300, 1.0, 1.0],
+        ]
     )
     x = np.concatenate([x, random.choice([-1.0, 1.0, 1e-9], 300), [1.0, 1.0, 0.0, -1e-300]])
     out = np.empty(x.size)
@@ -56,7 +64,9 @@ def series(row, t):
         for n in range(30):
             double = [sum(a * b for a, b in zip(S, reversed(B), strict=True)) for B in (C, S)]
             cosine = (1 if n == 0 else 0) - 2 * double[1]
-            turn = [sum(a * b for a, b in zip(W, reversed(B), strict=True)) / (n + 1) for B in (C, S)]
+            turn = [
+                sum(a * b for a, b in zip(W, reversed(B), strict=True)) / (n + 1) for B in (C, S)
+            ]
             W.append((s2 * C[n] - s3 * S[n] - d * double[0] - c23 * cosine) / (n + 1))
             S.append(turn[0])
             C.append(-turn[1])
@@ -71,10 +81,17 @@ def within(found, exact):
 
 
 def test_references_to_t_20_lie_within_narrow_bars():
-    data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())["still"]
-    rows = [[float.fromhex(x) for x in (*case["p_hex"], case["phi0_hex"], case["w0_hex"])] for case in data]
+    data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())[
+        "still"
+    ]
+    rows = [
+        [float.fromhex(x) for x in (*case["p_hex"], case["phi0_hex"], case["w0_hex"])]
+        for case in data
+    ]
     floats, _turnings, status = solved(rows, [20.0])
-    assert (status == OK).all() and (floats[..., 2:] < 1e-12 * (1 + np.abs(floats[..., :2]))).mean() > 0.9
+    assert (status == OK).all() and (
+        floats[..., 2:] < 1e-12 * (1 + np.abs(floats[..., :2]))
+    ).mean() > 0.9
     for found, case in zip(floats[:, 0], data, strict=True):
         assert within(found, [mp.mpf(case["phi"]), mp.mpf(case["w"])])
 

@@ -1,4 +1,6 @@
-"""Multipliers from coefficients known within bounds: roots of every polynomial within them are in the error bars."""
+"""Multipliers from coefficients known within bounds: roots of every polynomial within them are in
+the error bars.
+"""
 
 import mpmath
 import numpy as np
@@ -50,7 +52,13 @@ def test_roots_of_all_polynomials_within_the_doubts(n):
         roots = np.concatenate([own, own.conj(), 1.5 * rng.normal(size=n - 2 * pairs)])
         c = np.poly(roots)[1:].real
         doubts = 10.0 ** rng.uniform(-13, -5) * rng.uniform(size=n)
-        answer = answered(c, doubts, roots * (1 + 0.05 * rng.normal(size=n)) + 0.01j * rng.normal(size=n), n, False)
+        answer = answered(
+            c,
+            doubts,
+            roots * (1 + 0.05 * rng.normal(size=n)) + 0.01j * rng.normal(size=n),
+            n,
+            False,
+        )
         if not np.isfinite(answer.floats).all() or answer.missed[0]:
             continue
         served += 1
@@ -89,7 +97,11 @@ def test_sums_of_multipliers_and_their_inverses(m):
                 mpmath.mpf(a) + mpmath.mpf(g * b) for a, b, g in zip(c, doubts, signs, strict=True)
             ]
             roots = mpmath.polyroots(other[::-1], asc=True, maxsteps=400, extraprec=200)
-            exact = [(z + sign * mpmath.sqrt(mpmath.mpc(z) ** 2 - 4)) / 2 for z in roots for sign in (1, -1)]
+            exact = [
+                (z + sign * mpmath.sqrt(mpmath.mpc(z) ** 2 - 4)) / 2
+                for z in roots
+                for sign in (1, -1)
+            ]
             on_circle = all(abs(mpmath.im(z)) < 1e-25 and abs(mpmath.re(z)) < 2 for z in roots)
         assert inside(answer, exact) <= 1.0
         assert answer.verdict[0] in (-1, int(on_circle))
@@ -99,5 +111,7 @@ def test_sums_of_multipliers_and_their_inverses(m):
 
 def test_double_roots_are_left_to_the_point_itself():
     roots = np.array([0.5, 0.5 + 1e-9, -0.3])
-    answer = answered(np.poly(roots)[1:], np.full(3, 1e-14), roots + np.array([1e-3, -1e-3, 0]), 3, False)
+    answer = answered(
+        np.poly(roots)[1:], np.full(3, 1e-14), roots + np.array([1e-3, -1e-3, 0]), 3, False
+    )
     assert answer.missed[0] and answer.verdict[0] == -1

@@ -9,12 +9,20 @@ from survey.kernels.math import chebyshev
 
 
 def by_the_kernel(x, n):
-    """The magnitudes (n, L) of the n polynomials at x (L): each is the bound of a row known at all nodes but one."""
+    """The magnitudes (n, L) of the n polynomials at x (L): each is the bound of a row known at all
+    nodes but one.
+    """
     at_nodes = np.zeros((n, -(-n // TERMS) * TERMS))
     at_nodes[:, :n] = np.eye(n)
-    floats, verdict, missed = np.empty((2, n * x.size)), np.empty(n * x.size, np.int8), np.empty(n * x.size, np.bool_)
+    floats, verdict, missed = (
+        np.empty((2, n * x.size)),
+        np.empty(n * x.size, np.int8),
+        np.empty(n * x.size, np.bool_),
+    )
     zeros = np.zeros_like(at_nodes)
-    discriminants(np.arange(n), zeros, zeros[:, 0].copy(), at_nodes, n, x, 1e-9, floats, verdict, missed)
+    discriminants(
+        np.arange(n), zeros, zeros[:, 0].copy(), at_nodes, n, x, 1e-9, floats, verdict, missed
+    )
     assert (missed == ~(floats[1] <= 1e-9)).all() and (floats[0] == 0).all()
     return floats[1].reshape(n, x.size)
 
@@ -23,7 +31,13 @@ def by_the_kernel(x, n):
 @pytest.mark.parametrize("n", [8, 10, 20, 48])
 def test_lagranges_polynomials_are_bounded_at_and_beside_their_nodes(magnitudes, n):
     nodes = chebyshev.symmetric_nodes(n)
-    beside = [np.nextafter(nodes, 2), np.nextafter(nodes, -2), nodes + 1e-12, nodes - 1e-8, nodes + 1e-4]
+    beside = [
+        np.nextafter(nodes, 2),
+        np.nextafter(nodes, -2),
+        nodes + 1e-12,
+        nodes - 1e-8,
+        nodes + 1e-4,
+    ]
     x = np.concatenate([nodes, *beside, np.random.default_rng(n).uniform(-1, 1, 100), [-1.0, 1.0]])
     x = np.clip(x, -1, 1)
     found = magnitudes(x, n)
@@ -32,7 +46,9 @@ def test_lagranges_polynomials_are_bounded_at_and_beside_their_nodes(magnitudes,
         t = [mpmath.cos(n * mpmath.acos(mpmath.mpf(float(place)))) for place in x]
         for i, angle in enumerate(angles):
             weight, node = mpmath.sin(angle) / n, mpmath.cos(angle)
-            exact = np.array([float(abs(weight * top / (place - node))) for top, place in zip(t, x, strict=True)])
+            exact = np.array(
+                [float(abs(weight * top / (place - node))) for top, place in zip(t, x, strict=True)]
+            )
             assert (found[i] >= exact * (1 - 1e-15)).all()
             far = abs(x - nodes[i]) > 1e-5
             assert (found[i][far] <= exact[far] + 1e-9).all() and (found[i] <= 1.4143).all()

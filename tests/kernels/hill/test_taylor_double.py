@@ -10,19 +10,33 @@ from survey.kernels.hill.answers import STABLE, UNSTABLE
 from survey.kernels.lanes import RESULTS
 from survey.scenes import mathieu
 
-FAMILIES = {("prolate", True): "PL", ("prolate", False): "PR", ("oblate", True): "OL", ("oblate", False): "OR"}
+FAMILIES = {
+    ("prolate", True): "PL",
+    ("prolate", False): "PR",
+    ("oblate", True): "OL",
+    ("oblate", False): "OR",
+}
 
 
 @pytest.mark.parametrize(
     ("body", "k", "rho"),
-    [("prolate", 0.5, 1.3), ("oblate", 0.9, 0.7), ("prolate", 1.4, -0.8), ("oblate", 3.0, 2.0), ("prolate", 0.05, 4.0)],
+    [
+        ("prolate", 0.5, 1.3),
+        ("oblate", 0.9, 0.7),
+        ("prolate", 1.4, -0.8),
+        ("oblate", 3.0, 2.0),
+        ("prolate", 0.05, 4.0),
+    ],
 )
 def test_factors_lie_within_their_bars(body, k, rho):
     out = factors(body, rho, k=k)
     assert out.shape == (RESULTS,)
     exact = mp_factors(FAMILIES[body, k < 1], k, rho, digits=40)
     for i, value in enumerate(exact[:4]):
-        assert abs(value - mpf(float(out[i]))) <= out[4 + i] < 3e-16 * abs(out[i]) + 1e-24, (i, value)
+        assert abs(value - mpf(float(out[i]))) <= out[4 + i] < 3e-16 * abs(out[i]) + 1e-24, (
+            i,
+            value,
+        )
     assert tuple(out[8:]) == exact[4:]
 
 
@@ -39,10 +53,16 @@ def test_beside_lames_edge_the_verdict_is_given(body, rho):
 
 @pytest.mark.slow
 def test_both_sides_of_the_edge_of_a_tongue_two_ulp_apart():
-    """An edge of the prolate tongue n = 4 at k = 0.3, closed in by mpmath to 1e-30: its neighbours are decided."""
+    """An edge of the prolate tongue n = 4 at k = 0.3, closed in by mpmath to 1e-30: its neighbours
+    are decided.
+    """
     k = 0.3
     with mp.workdps(40):
-        rho = mp.findroot(lambda x: mp_factors("PL", k, x, digits=40)[2], (mpf("1.66"), mpf("1.67")), solver="anderson")
+        rho = mp.findroot(
+            lambda x: mp_factors("PL", k, x, digits=40)[2],
+            (mpf("1.66"), mpf("1.67")),
+            solver="anderson",
+        )
     below = np.nextafter(float(rho), 0.0) if mpf(float(rho)) > rho else float(rho)
     ds = survey.evaluate("satellite", k=k, rho=[below, np.nextafter(below, 9.0)])
     assert sorted(ds.verdict.values) == [UNSTABLE, STABLE]
@@ -50,7 +70,9 @@ def test_both_sides_of_the_edge_of_a_tongue_two_ulp_apart():
 
 
 def test_mathieus_narrow_tongue():
-    """n = 3 opens as q^3 (DLMF 28.6(ii)): at q = 1e-4 it is 1e-13 wide, and a = 9 + q^2/16 +- q^3/64 its edges."""
+    """n = 3 opens as q^3 (DLMF 28.6(ii)): at q = 1e-4 it is 1e-13 wide, and a = 9 + q^2/16 +-
+    q^3/64 its edges.
+    """
     q = 1e-4
     centre, half = 9 + q**2 / 16, q**3 / 64
     a = np.array([centre - 3e-15 - 4 * half, centre + 4 * half + 3e-15])

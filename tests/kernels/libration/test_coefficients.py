@@ -1,4 +1,6 @@
-"""Closed forms at L4 against exact fractions, Lie series of 30 digits and mpmath, next to the poles too; resonances."""
+"""Closed forms at L4 against exact fractions, Lie series of 30 digits and mpmath, next to the poles
+too; resonances.
+"""
 
 import json
 import os
@@ -30,17 +32,26 @@ def solved(kernel, mu):
     return values, bars
 
 
-@pytest.mark.parametrize("point", exact.REFERENCE["exact_rational_points"], ids=lambda point: point["w1"])
+@pytest.mark.parametrize(
+    "point", exact.REFERENCE["exact_rational_points"], ids=lambda point: point["w1"]
+)
 def test_the_table_at_rational_frequencies(point):
     w1, w2 = Fraction(point["w1"]), Fraction(point["w2"])
     for label, value in point["c"].items():
         assert exact.form(label, w1, w2) == Fraction(value)
     c = {label: exact.form(label, w1, w2) for label in LABELS}
     assert exact.form("a20", w1, w2) == c["200"] - c["101"] * w1 + c["002"] * w1**2
-    assert exact.form("a11", w1, w2) == c["110"] + c["101"] * w2 - c["011"] * w1 - 2 * c["002"] * w1 * w2
+    assert (
+        exact.form("a11", w1, w2)
+        == c["110"] + c["101"] * w2 - c["011"] * w1 - 2 * c["002"] * w1 * w2
+    )
     assert exact.form("a02", w1, w2) == c["020"] + c["011"] * w2 + c["002"] * w2**2
     assert exact.form("D4", w1, w2) == c["200"] * w2**2 + c["110"] * w1 * w2 + c["020"] * w1**2
-    planar = sum(c[label] * w2 ** int(label[0]) * w1 ** int(label[1]) for label in LABELS[6:] if label[2] == "0")
+    planar = sum(
+        c[label] * w2 ** int(label[0]) * w1 ** int(label[1])
+        for label in LABELS[6:]
+        if label[2] == "0"
+    )
     assert exact.form("D6", w1, w2) == planar
 
 
@@ -75,7 +86,9 @@ def test_double_double_keeps_every_digit():
 
 
 def test_float64_keeps_its_digits(truth):
-    """Bars of some 50 roundings, and of the conditioning of the numerators where these vanish; poles cost nothing."""
+    """Bars of some 50 roundings, and of the conditioning of the numerators where these vanish;
+    poles cost nothing.
+    """
     values, bars = solved(closed_forms.closed_forms, MASSES)
     assert np.median(bars / abs(values)) < 4e-15 and (bars / abs(values)).max() < 3e-11
     errors = np.array([[float(abs(mpf(v) - known[name])) for v, known in zip(row, truth, strict=True)]
@@ -95,7 +108,8 @@ def test_limits_and_poles():
     near = 10.0 ** -np.arange(9, 12)
     for critical, name, power in ((0, "110", 1), (0, "111", 2), (0, "210", 3), (1, "120", 1), (2, "200", 1),
                                   (2, "300", 2.5)):  # fmt: skip
-        # at the floats themselves, as they lie: their distance to the critical value is known to all digits
+        # at the floats themselves, as they lie: their distance to the critical value is known to
+        # all digits
         mu = closed_forms.__dict__[("MU_1", "MU_2", "MU_R")[critical]][0] - near
         gaps = np.array([float(exact.CRITICAL[critical] - mpf(m)) for m in mu])
         scaled = solved(closed_forms.closed_forms, mu)[0][NAMES.index(name)] * gaps**power
@@ -104,14 +118,22 @@ def test_limits_and_poles():
 
 def test_critical_values_are_the_roots():
     with mp.workdps(60):
-        for name, square in (("MU_1", mpf(611) / 675), ("MU_2", mpf(71) / 75), ("MU_R", mpf(23) / 27)):
+        for name, square in (
+            ("MU_1", mpf(611) / 675),
+            ("MU_2", mpf(71) / 75),
+            ("MU_R", mpf(23) / 27),
+        ):
             parts = getattr(closed_forms, name)
             assert abs(sum(map(mpf, parts)) - (1 - mp.sqrt(square)) / 2) < 1e-50
             assert parts[0] == float((1 - mp.sqrt(square)) / 2)
 
 
 def linear(mu):
-    omega, nearest, distance = np.empty((2, mu.size)), np.empty(mu.size, dtype=np.int64), np.empty((2, mu.size))
+    omega, nearest, distance = (
+        np.empty((2, mu.size)),
+        np.empty(mu.size, dtype=np.int64),
+        np.empty((2, mu.size)),
+    )
     closed_forms.linear(mu, VECTORS, omega, nearest, distance)
     return omega, nearest, distance
 
@@ -132,7 +154,9 @@ def test_the_distance_of_a_resonance_lies_within_its_bar():
     """Next to the resonances nearly all digits of k . omega cancel, and as mu -> 0 those of 2 omega1 - 2."""
     known = [float(entry["mu"]) for entry in exact.REFERENCE["resonances_order_le_8_k3_even"]]
     near = [
-        mu + n * np.spacing(mu) for mu in [*known, closed_forms.MU_1[0], closed_forms.MU_2[0]] for n in range(-4, 5)
+        mu + n * np.spacing(mu)
+        for mu in [*known, closed_forms.MU_1[0], closed_forms.MU_2[0]]
+        for n in range(-4, 5)
     ]
     mu = np.array([*near, *10 ** np.random.default_rng(1).uniform(-100, -4, 60)])
     _, nearest, distance = linear(mu)
@@ -146,7 +170,9 @@ def test_the_distance_of_a_resonance_lies_within_its_bar():
 
 
 def test_no_resonance_is_missed():
-    """Those of the reference are the nearest at the float64 next to them, but where three meet at (4/5, 3/5)."""
+    """Those of the reference are the nearest at the float64 next to them, but where three meet at
+    (4/5, 3/5).
+    """
     known = exact.REFERENCE["resonances_order_le_8_k3_even"]
     mu = np.array([float(entry["mu"]) for entry in known])
     _, nearest, distance = linear(mu)
@@ -182,7 +208,9 @@ def test_plain_python_gives_the_same_bits():
     texts = []
     for off in ("0", "1"):
         environment = os.environ | {"NUMBA_DISABLE_JIT": off}
-        run = subprocess.run([sys.executable, "-c", PLAIN], capture_output=True, text=True, env=environment)
+        run = subprocess.run(
+            [sys.executable, "-c", PLAIN], capture_output=True, text=True, env=environment
+        )
         assert run.returncode == 0, run.stderr
         texts.append(run.stdout)
     assert json.loads(texts[0]) and texts[0] == texts[1]

@@ -9,7 +9,9 @@ ERROR = 1e-12
 
 
 def step(span, steps):
-    """exp(h J), J all ones: the columns grow, and every step's errors have the same share in the last ones."""
+    """exp(h J), J all ones: the columns grow, and every step's errors have the same share in the
+    last ones.
+    """
     return np.eye(4) + np.expm1(4 * span / steps) / 4
 
 
@@ -18,7 +20,11 @@ def off(matrix, steps):
     right = wrong = np.eye(4)
     total = np.zeros((4, 4))
     for _ in range(steps):  # the difference of the two products, without cancellation
-        total, right, wrong = matrix @ total + ERROR * np.ones((4, 4)) @ wrong, matrix @ right, (matrix + ERROR) @ wrong
+        total, right, wrong = (
+            matrix @ total + ERROR * np.ones((4, 4)) @ wrong,
+            matrix @ right,
+            (matrix + ERROR) @ wrong,
+        )
     return total
 
 
@@ -29,7 +35,11 @@ def test_errors_that_add_up_lie_within_the_bars(steps, span):
     danby.start(work, danby.VECTOR)
     for c in range(4):
         column = danby.COLUMNS + danby.COLUMN * c
-        work[column : column + 4], work[column + 4 + c], work[column + 8] = matrix[:, c, None], 1.0, ERROR
+        work[column : column + 4], work[column + 4 + c], work[column + 8] = (
+            matrix[:, c, None],
+            1.0,
+            ERROR,
+        )
     for _ in range(steps):
         danby.advance(work, 0)
     found = np.array(danby.bars(work, 0, steps))
@@ -42,6 +52,8 @@ def test_errors_that_add_up_lie_within_the_bars_of_many_digits(steps, span):
     matrix, spread, found = step(span, steps), np.zeros((4, 4)), np.empty(4)
     whole = np.stack([np.eye(4), np.zeros((4, 4))])
     for _ in range(steps):
-        danby_double.advance(np.stack([matrix, np.zeros((4, 4))]), np.full((4, 4), ERROR), whole, spread)
+        danby_double.advance(
+            np.stack([matrix, np.zeros((4, 4))]), np.full((4, 4), ERROR), whole, spread
+        )
     danby_double.row_bars(spread, steps, found)
     assert (off(matrix, steps).max(axis=1) <= found).all()

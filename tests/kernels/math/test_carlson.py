@@ -43,7 +43,9 @@ def test_integrals():
 
 
 def test_the_third_kind_where_its_parameter_is_extreme():
-    """p from 1e-80 to 1e80 times x y, as beside poles that a motion nearly aims at: a closed form ends the sum."""
+    """p from 1e-80 to 1e80 times x y, as beside poles that a motion nearly aims at: a closed form
+    ends the sum.
+    """
     random, out = np.random.default_rng(2), np.empty(9)
     with mp.workdps(100):
         for _ in range(200):

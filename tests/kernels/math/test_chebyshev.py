@@ -11,10 +11,14 @@ from survey.kernels.math import chebyshev
 def test_nodes_and_coefficients(n):
     assert abs(chebyshev.nodes(n) - known.chebpts1(n)[::-1]).max() < 1e-15
     symmetric = chebyshev.symmetric_nodes(n)
-    assert (symmetric == -symmetric[::-1]).all() and abs(symmetric - chebyshev.nodes(n)).max() < 1e-15
+    assert (symmetric == -symmetric[::-1]).all() and abs(
+        symmetric - chebyshev.nodes(n)
+    ).max() < 1e-15
     series = np.random.default_rng(n).normal(size=n)
     values = known.chebval(chebyshev.nodes(n), series)
-    assert chebyshev.to_coefficients(chebyshev.cosines(n)) @ values == pytest.approx(series, abs=1e-13)
+    assert chebyshev.to_coefficients(chebyshev.cosines(n)) @ values == pytest.approx(
+        series, abs=1e-13
+    )
     assert values @ chebyshev.by_columns(n) == pytest.approx(series, abs=1e-13)
     found, doubt = chebyshev.expand(values[None], chebyshev.by_columns(n), 1.0)
     assert (abs(found - series).sum() <= doubt).all()

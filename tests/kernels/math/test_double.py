@@ -40,7 +40,10 @@ split = inline(dd.split_error)
 @kernel
 def both_errors(x, y, out):
     for i in range(len(x)):
-        out[0, i], out[1, i] = dd.fused_error(x[i], y[i], x[i] * y[i]), split(x[i], y[i], x[i] * y[i])
+        out[0, i], out[1, i] = (
+            dd.fused_error(x[i], y[i], x[i] * y[i]),
+            split(x[i], y[i], x[i] * y[i]),
+        )
 
 
 def exact(x, y):
@@ -61,12 +64,15 @@ def check(x, y):
         wanted = exact(x, y)
         assert value(out[0]) == wanted[0] and value(out[1]) == wanted[1]
         for i, (pair, number) in enumerate(zip(out[2:], wanted[2:], strict=True)):
-            size = abs(number) if i < 12 else abs(value(x)) + abs(value(y))  # the last one may cancel
+            # the last one may cancel
+            size = abs(number) if i < 12 else abs(value(x)) + abs(value(y))
             assert abs(value(pair) - number) <= (8 if i == 7 else 4) * PAIR_ROUNDOFF * size, i
             assert pair[0] == pair[0] + pair[1], i
 
 
-HIGH = st.floats(1e-12, 1e12) | st.sampled_from([1.0, 3.0, 1 + 2.0**-52, 2.0 - 2.0**-52, 134217729.0, 0.1])
+HIGH = st.floats(1e-12, 1e12) | st.sampled_from(
+    [1.0, 3.0, 1 + 2.0**-52, 2.0 - 2.0**-52, 134217729.0, 0.1]
+)
 LOW = st.floats(-1.0, 1.0).map(lambda part: round(part, 9))  # the reference has 80 digits
 SIGN = st.sampled_from([-1.0, 1.0])
 
@@ -115,7 +121,9 @@ def test_series():
         a, b = ([value(s[:, n]) for n in range(orders)] for s in series)
         for n in range(orders):
             terms = [a[i] * b[n - i] for i in range(n + 1)]
-            assert abs(value(out[n]) - mp.fsum(terms)) <= 2 * PAIR_ROUNDOFF * mp.fsum(map(abs, terms))
+            assert abs(value(out[n]) - mp.fsum(terms)) <= 2 * PAIR_ROUNDOFF * mp.fsum(
+                map(abs, terms)
+            )
         for got, terms in ((out[-2], a), (out[-1], [n * v for n, v in enumerate(a)])):
             assert abs(value(got) - mp.fsum(terms)) <= 8 * PAIR_ROUNDOFF * mp.fsum(map(abs, terms))
 
@@ -126,23 +134,31 @@ def half_of(row, exact):
     return satellite.half_period(exact)
 
 
-@pytest.mark.parametrize("short", [1.0 - 1e-9, 0.5, 1e-3, 1e-8, 1e-14, 1e-20, -1e-20, -1e-8, -0.3, -7.0, -1e9])
+@pytest.mark.parametrize(
+    "short", [1.0 - 1e-9, 0.5, 1e-3, 1e-8, 1e-14, 1e-20, -1e-20, -1e-8, -0.3, -7.0, -1e9]
+)
 def test_half_period_from_one_minus_k(short):
     """2 K(k), K(1/k) / k to 30 digits: 1 - k is an exact number, however small."""
     row = np.array([0.0, 0.0, 0.0, 0.0, short, satellite.ONE_MINUS_K])
     with mp.workdps(60):
         k = 1 - mpf(short)
         wanted = 2 * mp.ellipk(k**2) if k < 1 else mp.ellipk(1 / k**2) / k
-        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * PAIR_ROUNDOFF
+        assert (
+            abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * PAIR_ROUNDOFF
+        )
 
 
-@pytest.mark.parametrize("amplitude", [0.0, 1e-9, 0.03, 0.8, 1.5, 1.5707963, np.nextafter(np.pi / 2, 0)])
+@pytest.mark.parametrize(
+    "amplitude", [0.0, 1e-9, 0.03, 0.8, 1.5, 1.5707963, np.nextafter(np.pi / 2, 0)]
+)
 def test_half_period_from_the_amplitude(amplitude):
     """2 K(sin amplitude) to 30 digits, also where cos amplitude is 6e-17."""
     row = np.array([0.0, 0.0, 0.0, 0.0, amplitude, satellite.AMPLITUDE])
     with mp.workdps(60):
         wanted = mp.pi / mp.agm(1, mp.cos(mpf(amplitude)))
-        assert abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * PAIR_ROUNDOFF
+        assert (
+            abs(value(half_of(row, np.empty(satellite.EXACTLY))) / wanted - 1) < 16 * PAIR_ROUNDOFF
+        )
 
 
 def test_both_ways_to_the_error_of_a_product_give_the_same_bits():

@@ -35,7 +35,8 @@ def test_sn_cn_dn(short):
         all_at(u, float(kc), got)
         for i, value in enumerate(u):
             wanted = [mp.ellipfun(name, mpf(float(value)), m=k**2) for name in ("sn", "cn", "dn")]
-            # The argument itself moves by half an ulp, which the derivative (at most 1) carries over.
+            # The argument itself moves by half an ulp, which the derivative (at most 1) carries
+            # over.
             bound = 6e-16 + 2.3e-16 * value * float(abs(wanted[1] * wanted[2]) + abs(wanted[0]))
             assert max(abs(float(w - g)) for w, g in zip(wanted, got[i], strict=True)) < bound
 

@@ -45,7 +45,9 @@ def test_the_classical_step_is_of_order_4():
     def slope(t, y):
         return [y[1], -(y[0] ** 2) - 0.1 * y[1] + np.cos(t)]
 
-    exact = solve_ivp(slope, (0.0, 2.0), [0.3, -0.2], method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+    exact = solve_ivp(slope, (0.0, 2.0), [0.3, -0.2], method="DOP853", rtol=1e-13, atol=1e-15).y[
+        :, -1
+    ]
     errors = [np.linalg.norm(np.array(steps(n, 2.0)) - exact) for n in (20, 40, 80)]
     assert np.diff(-np.log2(errors)) == pytest.approx([4.0, 4.0], abs=0.15)
 

@@ -26,7 +26,9 @@ WELLS = (
 
 
 def exactly(width, roots, square, at_plus, at_minus):
-    """1/pi times the integral of sqrt P/(1 - u^2), u = ul + D r, by tanh-sinh quadrature; Q as under (S22)."""
+    """1/pi times the integral of sqrt P/(1 - u^2), u = ul + D r, by tanh-sinh quadrature; Q as
+    under (S22).
+    """
     low, high = mpf(roots[0]), mpf(roots[1])
 
     def integrand(r, rest):
@@ -38,7 +40,12 @@ def exactly(width, roots, square, at_plus, at_minus):
     scale = mpf(width) ** 2 / mp.pi
     places = [mpf(10) ** -n for n in range(30, 0, -2)]
     first = sum(mp.quad(lambda r: integrand(r, 1 - r), ends) for ends in _between(places, nearest))
-    return scale * (first + sum(mp.quad(lambda r: integrand(1 - r, r), ends) for ends in _between(places, 1 - nearest)))
+    return scale * (
+        first
+        + sum(
+            mp.quad(lambda r: integrand(1 - r, r), ends) for ends in _between(places, 1 - nearest)
+        )
+    )
 
 
 def _between(places, end):
@@ -71,7 +78,11 @@ def test_what_errors_change(well, place):
     value, moved = action.positive(*well, tuple(noise))
     change = abs(action.positive(*other, (0.0, 0.0, 0.0))[0] - value)
     assert change <= 1.01 * moved + 1e-15 * value and moved <= 1e-4 * value
-    if (place == 0 and low < 1e-5) or (place == 1 and high < 1e-5) or (place == 2 and square < 1e-5):
+    if (
+        (place == 0 and low < 1e-5)
+        or (place == 1 and high < 1e-5)
+        or (place == 2 and square < 1e-5)
+    ):
         assert moved < 1e-8 * value
 
 
@@ -80,14 +91,24 @@ def exact():
     """(action, what half an ulp of the state changes) of STATES."""
     with mp.workdps(60):
         found = [truth(state) for state in STATES]
-        return [(values[-1], max(floors[-1], abs(values[-1]) * mpf(2) ** -53)) for values, floors in found]
+        return [
+            (values[-1], max(floors[-1], abs(values[-1]) * mpf(2) ** -53))
+            for values, floors in found
+        ]
 
 
 @pytest.mark.parametrize("method", ["auto", "agm", "carlson"])
 def test_near_separatrices_poles_and_double_roots(method, exact):
-    """Every method shares the sum where the terms of (S14) cancel: within the bar, and both near the floor."""
-    arrays = {name: xr.DataArray(column, dims="point") for name, column in zip(NAMES, STATES.T, strict=True)}
+    """Every method shares the sum where the terms of (S14) cancel: within the bar, and both near
+    the floor.
+    """
+    arrays = {
+        name: xr.DataArray(column, dims="point")
+        for name, column in zip(NAMES, STATES.T, strict=True)
+    }
     ds = survey.evaluate("brun", method=method, variables=["action"], **arrays)
     with mp.workdps(60):
-        for (value, floor), found, bar in zip(exact, ds.action.values, ds.action_error.values, strict=True):
+        for (value, floor), found, bar in zip(
+            exact, ds.action.values, ds.action_error.values, strict=True
+        ):
             assert abs(mpf(float(found)) - value) <= min(bar, 100 * floor) and bar <= 500 * floor

@@ -48,7 +48,9 @@ def test_curves_on_a_map_of_shapes_part_the_verdicts(tmp_path, epsilon, axis):
     verdicts = []
     for side in (1, -1):
         a, b = (xr.DataArray(values, dims="row") for values in x[:, inner] + side * aside)
-        found = survey.evaluate("brun_triaxial", axis=axis, A=a, B=b, C=1.0, epsilon=epsilon, Omega=0.8)
+        found = survey.evaluate(
+            "brun_triaxial", axis=axis, A=a, B=b, C=1.0, epsilon=epsilon, Omega=0.8
+        )
         verdicts.append(found.verdict.values)
     assert inner.size > 20
     assert (np.sort(verdicts, axis=0) == [[0], [1]]).all()
@@ -59,8 +61,11 @@ def test_margins_of_a_rotation():
     margin = point.survey.margin()
     distance = dict(zip(margin.parameter.values.tolist(), margin.distance.values, strict=True))
     assert distance["Omega"] == pytest.approx(float(point.critical_rate) - 0.9, abs=1e-10)
-    assert distance["epsilon"] == pytest.approx((0.9 / float(point.critical_rate)) ** 2 - 1.0, abs=1e-8)
-    assert distance["A"] == pytest.approx(1.7677 - 2.0, abs=1e-3)  # nearer than where the search is coarse
+    assert distance["epsilon"] == pytest.approx(
+        (0.9 / float(point.critical_rate)) ** 2 - 1.0, abs=1e-8
+    )
+    # nearer than where the search is coarse
+    assert distance["A"] == pytest.approx(1.7677 - 2.0, abs=1e-3)
 
 
 def test_stability_of_critical_motions_has_its_boundary():
@@ -68,7 +73,9 @@ def test_stability_of_critical_motions_has_its_boundary():
     found = survey.edge("brun_triaxial", along="p_psi", p_psi=(0.0, 9.0), **given)
     assert found.edge.size == 1
     aside = found.edge.values + 10 * found.edge_error.values * np.array([-1.0, 1.0])
-    assert sorted(survey.evaluate("brun_triaxial", p_psi=aside, **given).verdict.values.tolist()) == [0, 1]
+    assert sorted(
+        survey.evaluate("brun_triaxial", p_psi=aside, **given).verdict.values.tolist()
+    ) == [0, 1]
 
 
 @pytest.mark.parametrize(
@@ -79,7 +86,11 @@ def test_stability_of_critical_motions_has_its_boundary():
             {"along": "omega1", "question": "trajectory", "t": 1.0, **BODY},
             "no boundaries are known along omega1",
         ),
-        ("brun_triaxial", {"along": "A", "question": "trajectory", "t": 1.0, "B": 1.5, "C": 1.0}, "has no verdict"),
+        (
+            "brun_triaxial",
+            {"along": "A", "question": "trajectory", "t": 1.0, "B": 1.5, "C": 1.0},
+            "has no verdict",
+        ),
         ("gyrostat_body", {"along": "A11"}, "no boundaries are known for the scene gyrostat_body"),
     ],
 )
@@ -93,6 +104,8 @@ def test_a_body_that_cannot_exist_has_no_critical_rate():
     """One moment exceeds the sum of the others, by a little or by much; at equality the body is a plate."""
     body = {"along": "Omega", "Omega": (-9.0, 9.0), "axis": "B", "A": 0.5, "B": 1.0}
     for C in (0.3, 0.4999):
-        with pytest.raises(BadInput, match="no moment of inertia is larger than the sum of the others"):
+        with pytest.raises(
+            BadInput, match="no moment of inertia is larger than the sum of the others"
+        ):
             survey.edge("brun_triaxial", **body, C=C)
     assert survey.edge("brun_triaxial", **body, C=0.5).place.size == 2

@@ -12,7 +12,8 @@ from survey.measures.square import Square
 from survey.methods import taylor
 from survey.scene import Request
 
-SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)  # an unstable cycle with the multiplier 1.006: windings beside it
+# an unstable cycle with the multiplier 1.006: windings beside it
+SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
 WHOLE = basins.Map(60_000, 14.0)
 
 
@@ -26,7 +27,9 @@ def random_system(random, i):
 
 
 def compared(six, starts):
-    """(share of the starts that are told, how many are told otherwise than they end when they are followed)."""
+    """(share of the starts that are told, how many are told otherwise than they end when they are
+    followed).
+    """
     s = fate.remembered(taylor, six)
     found = basins.found(taylor, s, 1e-10, WHOLE)
     if found is None:
@@ -40,13 +43,19 @@ def compared(six, starts):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("systems, starts, seed", [(4, 150, 11), (400, 300, 12)], ids=["few", "many"])
+@pytest.mark.parametrize(
+    "systems, starts, seed", [(4, 150, 11), (400, 300, 12)], ids=["few", "many"]
+)
 def test_no_start_is_told_otherwise_than_it_ends(systems, starts, seed):
-    """Verdict, limit, turning points and turns, of starts over two turns and at rest; 120,000 of them where slow."""
+    """Verdict, limit, turning points and turns, of starts over two turns and at rest; 120,000 of
+    them where slow.
+    """
     random = np.random.default_rng(seed)
     shares = []
     for i in range(systems):
-        states = np.stack([random.uniform(-7.0, 7.0, starts), random.normal(size=starts) * 4.0], axis=1)
+        states = np.stack(
+            [random.uniform(-7.0, 7.0, starts), random.normal(size=starts) * 4.0], axis=1
+        )
         states[: starts // 10, 1] = 0.0
         share, wrong = compared(random_system(random, i), states)
         assert wrong == 0
@@ -61,7 +70,9 @@ def test_an_unstable_libration_is_a_curve_between_basins_however_slow_the_system
     s = fate.remembered(taylor, six)
     assert (s.librations[:, rt.BELOW] < 0.0).any()
     random = np.random.default_rng(3)
-    states = np.stack([random.uniform(-3.1, 3.1, 100), random.normal(size=100) * 2.0 * unit], axis=1)
+    states = np.stack(
+        [random.uniform(-3.1, 3.1, 100), random.normal(size=100) * 2.0 * unit], axis=1
+    )
     share, wrong = compared(six, states)
     assert wrong == 0 and share > 0.98
 
@@ -110,13 +121,17 @@ def test_own_flows_are_told_alike(point):
     """A user's f and g on the cylinder: the same door, the same fates as those followed."""
     (row,) = equation.flows(_damping, _torque, np.array([point]), True)
     random = np.random.default_rng(7)
-    share, wrong = compared(row, np.stack([random.uniform(-7.0, 7.0, 60), random.normal(size=60) * 2.0], axis=1))
+    share, wrong = compared(
+        row, np.stack([random.uniform(-7.0, 7.0, 60), random.normal(size=60) * 2.0], axis=1)
+    )
     assert wrong == 0 and share > 0.8
 
 
 @pytest.mark.slow
 def test_curves_of_an_own_flow_on_a_map_of_states():
-    """The junction's stable manifolds, over (phi0, w0), part the fates: at I = 0.5, a = 0.3 rest from rotation."""
+    """The junction's stable manifolds, over (phi0, w0), part the fates: at I = 0.5, a = 0.3 rest
+    from rotation.
+    """
     f, g = (lambda phi, p: -p[0]), (lambda phi, p: p[1] - np.sin(phi))
     junction = survey.abel(f, g, parameters=("a", "I"), period=2 * np.pi)
     square = Square(np.array([-3.0, -3.0]), np.array([3.0, 3.0]), np.array([False, False]))
@@ -129,7 +144,11 @@ def test_curves_of_an_own_flow_on_a_map_of_states():
     assert away.min() < 1e-12
     i = int(np.argmin(np.abs(points[:, 0] - 1.0) + np.abs(points[:, 1] - 1.0)))
     verdicts = [
-        int(survey.evaluate(junction, a=0.3, I=0.5, phi0=points[i, 0], w0=points[i, 1] + off, question="fate").verdict)
+        int(
+            survey.evaluate(
+                junction, a=0.3, I=0.5, phi0=points[i, 0], w0=points[i, 1] + off, question="fate"
+            ).verdict
+        )
         for off in (-1e-6, 1e-6)
     ]
     assert verdicts[0] != verdicts[1]

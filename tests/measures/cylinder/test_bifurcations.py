@@ -29,11 +29,18 @@ def closed_forms_alone(monkeypatch):
 
 def points(axes, changes, square=SQUARE):
     """[(class, {name: value} of the system, error, equilibrium_phi, its error)] of points of the curves."""
-    found = curves.closed(square, list(axes), {k: v for k, v in (BASE | changes).items() if k not in axes}, {})
+    found = curves.closed(
+        square, list(axes), {k: v for k, v in (BASE | changes).items() if k not in axes}, {}
+    )
     kinds = np.repeat(found.kind, found.count)
     angles = zip(*found.along["equilibrium_phi"], strict=True)
     for kind, xy, error, angle in zip(kinds, found.parameters, found.error, angles, strict=True):
-        yield NAMES[kind], BASE | changes | dict(zip(axes, map(mp.mpf, xy), strict=True)), error, *angle
+        yield (
+            NAMES[kind],
+            BASE | changes | dict(zip(axes, map(mp.mpf, xy), strict=True)),
+            error,
+            *angle,
+        )
 
 
 def derivatives(system, phi):
@@ -84,7 +91,8 @@ def next_level(system):
 
 @each
 def test_each_point_lies_on_its_curve_within_its_error(axes, changes):
-    flat = level(BASE | changes | dict(zip(axes, (0.1, 0.2), strict=True))) == 0  # K = 0 all over the map
+    # K = 0 all over the map
+    flat = level(BASE | changes | dict(zip(axes, (0.1, 0.2), strict=True))) == 0
     with mp.workdps(40):
         for kind, system, error, phi, _ in list(points(axes, changes))[::5]:
             assert 0 < error < 1e-10
@@ -94,12 +102,19 @@ def test_each_point_lies_on_its_curve_within_its_error(axes, changes):
             f, _, slope, _ = derivatives(system, phi)
             if kind == "fold":
                 assert abs(slope) < 1e-9
-                assert meets(discriminant, system, axes, error) or changes == {"c23": 0.0, "s2": 0.0}
+                assert meets(discriminant, system, axes, error) or changes == {
+                    "c23": 0.0,
+                    "s2": 0.0,
+                }
             elif kind.endswith("critical_hopf") and abs(system["b12"]) > 1e-12:
                 assert abs(f) < 1e-11
                 assert slope < 1e-12
                 assert any(meets(turning(side), system, axes, error) for side in (0, mp.pi))
-                assert (level(system) < 1e-15) if kind == "supercritical_hopf" else (level(system) > -1e-15)
+                assert (
+                    (level(system) < 1e-15)
+                    if kind == "supercritical_hopf"
+                    else (level(system) > -1e-15)
+                )
 
 
 @each
@@ -128,11 +143,22 @@ def test_points_of_codimension_two_are_all_found():
     """On the plane of s2 and s3 the fold is an astroid: four cusps, and two Bogdanov-Takens points."""
     wide = Square(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), SQUARE.log)
     kinds = [kind for kind, *_ in points(("s2", "s3"), {}, wide)]
-    assert [kinds.count(name) for name in ("cusp", "bogdanov_takens", "generalised_hopf")] == [4, 2, 0]
-    kinds = [
-        kind for kind, *_ in points(("s2", "d"), {}, Square(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), SQUARE.log))
+    assert [kinds.count(name) for name in ("cusp", "bogdanov_takens", "generalised_hopf")] == [
+        4,
+        2,
+        0,
     ]
-    assert [kinds.count(name) for name in ("cusp", "bogdanov_takens", "generalised_hopf")] == [0, 2, 2]
+    kinds = [
+        kind
+        for kind, *_ in points(
+            ("s2", "d"), {}, Square(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), SQUARE.log)
+        )
+    ]
+    assert [kinds.count(name) for name in ("cusp", "bogdanov_takens", "generalised_hopf")] == [
+        0,
+        2,
+        2,
+    ]
 
 
 def test_logarithmic_axes_and_planes_without_g_or_f():

@@ -1,4 +1,6 @@
-"""Saddle connections: branches traced with mpmath miss each other to either side; cycles appear at homoclinic ones."""
+"""Saddle connections: branches traced with mpmath miss each other to either side; cycles appear at
+homoclinic ones.
+"""
 
 import mpmath as mp
 import numpy as np
@@ -52,7 +54,9 @@ def first_turn(six, row):
             step = mp.findroot(at[1], (0, step), solver="anderson", tol=1e-60)
         end = at[0](step)
         while k < len(columns) and columns[k] <= end:
-            t = mp.findroot(lambda t, k=k, at=at: at[0](t) - columns[k], (0, step), solver="anderson", tol=1e-60)
+            t = mp.findroot(
+                lambda t, k=k, at=at: at[0](t) - columns[k], (0, step), solver="anderson", tol=1e-60
+            )
             new[2 * k], k = float(at[1](t)), k + 1
         phi, w = end, at[1](step)
         if turned:
@@ -65,7 +69,9 @@ def miss(connection, x):
     out = connections._traced(PLANE, x[None], np.ones((4, 2)))[0]
     s2, d = SQUARE.parameters(x)
     six = [mp.mpf(v) for v in (0.7, -0.4, float(d), 0.3, float(s2), -0.2)]
-    rows = [first_turn(of_system(six, branch[0]), out[branch])[None] for branch in connection.branches]
+    rows = [
+        first_turn(of_system(six, branch[0]), out[branch])[None] for branch in connection.branches
+    ]
     return connection.miss(*rows)[0][0]
 
 
@@ -90,7 +96,8 @@ def test_branches_miss_each_other_to_either_side(shares):
             for i in (int(len(x) * share) for share in shares):
                 assert error[i] < 1e-11
                 sides = [
-                    [miss(connection, x[i] + side * 1.01 * error[i] * axis) for side in (1, -1)] for axis in np.eye(2)
+                    [miss(connection, x[i] + side * 1.01 * error[i] * axis) for side in (1, -1)]
+                    for axis in np.eye(2)
                 ]
                 assert any(one * two < 0 for one, two in sides)
     assert len(kinds) == 4
@@ -102,18 +109,25 @@ def test_a_cycle_is_born_in_a_homoclinic_connection():
     kinds = np.repeat(found.kind, found.count)
     left, right = (found.along[name][0] for name in ("cycles_left", "cycles_right"))
     names = "homoclinic", "supercritical_hopf", "subcritical_hopf"
-    known = np.isin(kinds, [curves.CLASSES[name] for name in names]) & np.isfinite(left) & np.isfinite(right)
+    known = (
+        np.isin(kinds, [curves.CLASSES[name] for name in names])
+        & np.isfinite(left)
+        & np.isfinite(right)
+    )
     assert known.sum() > 8
     assert np.mean(abs(left - right)[known] == 1) > 0.9
 
 
 @pytest.mark.slow
 def test_curves_run_into_each_other_and_explain_the_numbers_of_cycles(monkeypatch):
-    """Connections end at points of codimension two or in one another; without one of them segments are missed."""
+    """Connections end at points of codimension two or in one another; without one of them segments
+    are missed.
+    """
     monkeypatch.setattr(cycle_counts, "LINES", 15)
     rows = bifurcations.found(PLANE)
     counts = cycle_counts.on_lattice(PLANE)
-    assert cycle_counts.unexplained(PLANE, rows, counts) <= 1  # a loop with two turning points is not looked for
+    # a loop with two turning points is not looked for
+    assert cycle_counts.unexplained(PLANE, rows, counts) <= 1
     long = [i for i, (kind, xy, *_) in enumerate(rows) if kind == "homoclinic" and len(xy) > 30]
     without = [cycle_counts.unexplained(PLANE, rows[:i] + rows[i + 1 :], counts) for i in long]
     assert len(long) > 4 and sum(number > 3 for number in without) > 2

@@ -1,4 +1,6 @@
-"""Folds of cycles: return maps traced with mpmath touch the identity there; two cycles are lost from side to side."""
+"""Folds of cycles: return maps traced with mpmath touch the identity there; two cycles are lost
+from side to side.
+"""
 
 import mpmath as mp
 import numpy as np
@@ -25,7 +27,12 @@ def change(six, phi, w):
             if at[1](step) * side <= 0:
                 return None
             if at[0](step) * side >= 2 * mp.pi:
-                t = mp.findroot(lambda t, at=at: at[0](t) - side * 2 * mp.pi, (0, step), solver="anderson", tol=1e-50)
+                t = mp.findroot(
+                    lambda t, at=at: at[0](t) - side * 2 * mp.pi,
+                    (0, step),
+                    solver="anderson",
+                    tol=1e-50,
+                )
                 return mp.log(at[1](t) / start[1])
         elif v and at[1](step) * v <= 0:
             t = mp.findroot(at[1], (0, step), solver="anderson", tol=1e-50)
@@ -85,7 +92,8 @@ def test_two_cycles_are_lost(found):
     left, right = (found.along[name][0][on_folds] for name in ("cycles_left", "cycles_right"))
     known = np.isfinite(left) & np.isfinite(right)
     assert known.sum() > 5
-    assert np.mean(abs(left - right)[known] == 2.0) > 0.7  # else there is another curve within ASIDE
+    # else there is another curve within ASIDE
+    assert np.mean(abs(left - right)[known] == 2.0) > 0.7
     assert (found.along["multiplier"][0][on_folds] == 1.0).all()
     assert (found.error[on_folds] < 1e-8).all()
 

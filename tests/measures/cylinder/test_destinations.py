@@ -1,4 +1,6 @@
-"""Where the branches of the saddles go: long integration by SciPy from the eigenvectors, exact cases, time reversal."""
+"""Where the branches of the saddles go: long integration by SciPy from the eigenvectors, exact
+cases, time reversal.
+"""
 
 import math
 
@@ -20,13 +22,18 @@ def rates(six):
 
     def right(_t, y):
         s, c = math.sin(y[0]), math.cos(y[0])
-        return [y[1], (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s]
+        return [
+            y[1],
+            (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s,
+        ]
 
     return right
 
 
 def long_run(six, found, angle, branch, section):
-    """(end, limit) of a branch by DOP853 from its eigenvector, or None where it is not clear at the end of time."""
+    """(end, limit) of a branch by DOP853 from its eigenvector, or None where it is not clear at the
+    end of time.
+    """
     b12, b31, d, c23, s2, s3 = six
     s, c = math.sin(angle), math.cos(angle)
     f, dg = b12 * c - b31 * s, -d * (c * c - s * s) + 4 * c23 * s * c - s2 * s - s3 * c
@@ -36,17 +43,33 @@ def long_run(six, found, angle, branch, section):
     far = lambda _t, y: abs(y[1]) - 30.0  # noqa: E731
     far.terminal = True
     passing = lambda _t, y: math.sin(0.5 * (y[0] - section))  # noqa: E731
-    run = solve_ivp(rates(six), (0, sign * 250), [angle + x, w], "DOP853", events=(far, passing), rtol=1e-9, atol=1e-11)
+    run = solve_ivp(
+        rates(six),
+        (0, sign * 250),
+        [angle + x, w],
+        "DOP853",
+        events=(far, passing),
+        rtol=1e-9,
+        atol=1e-11,
+    )
     phi, w = run.y[:, -1]
     if len(run.t_events[0]):
         return (ds.PLUS_INFINITY if w > 0 else ds.MINUS_INFINITY), 0
     gaps = np.abs(np.sin(0.5 * (found["equilibrium_phi"] - phi)))
     if np.nanmin(gaps) + abs(w) < 1e-3:
         return ds.EQUILIBRIUM, 1 + int(np.nanargmin(gaps))
-    passages = run.y_events[1][-20:, 1] if len(run.t_events[1]) and abs(run.t_events[1][-1] - run.t[-1]) < 50 else ()
+    passages = (
+        run.y_events[1][-20:, 1]
+        if len(run.t_events[1]) and abs(run.t_events[1][-1] - run.t[-1]) < 50
+        else ()
+    )
     for i, (kind, own) in enumerate(zip(found["cycle_kind"], found["cycle_w"], strict=True)):
         off = np.abs(passages - own)
-        if kind in (1, 2) and len(off) > 5 and off[-1] < max(0.05 * abs(own) * (off[-1] < off[0]), 1e-5):
+        if (
+            kind in (1, 2)
+            and len(off) > 5
+            and off[-1] < max(0.05 * abs(own) * (off[-1] < off[0]), 1e-5)
+        ):
             return (ds.ROTATION_PLUS if kind == 1 else ds.ROTATION_MINUS), i + 1
     tail = run.y[:, abs(run.t) > 200]
     own = np.flatnonzero(found["cycle_kind"] == 3)
@@ -69,7 +92,13 @@ def against_long_runs(rows):
         assert (one["branch_end"][one["equilibrium_type"] != 1] == ds.NONE).all()
         for row in np.flatnonzero(one["equilibrium_type"] == 1):
             for at, branch in enumerate(ds.BRANCHES):
-                true = long_run(six, one, one["equilibrium_phi"][row], branch, cf.remembered(taylor, six).section)
+                true = long_run(
+                    six,
+                    one,
+                    one["equilibrium_phi"][row],
+                    branch,
+                    cf.remembered(taylor, six).section,
+                )
                 said = int(one["branch_end"][row, at]), int(one["branch_limit"][row, at])
                 if true is not None and said[0] != ds.UNDECIDED:
                     assert said == true, (six, row, branch)
@@ -99,7 +128,8 @@ def test_the_reversed_skeleton_is_that_of_the_reversed_flow(six):
         one, two = getattr(turned, name), getattr(own, name)
         assert len(one) == len(two)
         np.testing.assert_allclose(one[:, :2], two[:, :2], rtol=1e-9)
-        np.testing.assert_array_equal(one[:, 6:], two[:, 6:])  # class, interval and the signs beside it
+        # class, interval and the signs beside it
+        np.testing.assert_array_equal(one[:, 6:], two[:, 6:])
 
 
 def ends(**six):
@@ -109,7 +139,11 @@ def ends(**six):
 
 def test_of_a_pendulum_all_come_back():
     end, limit = ends(s3=1.0)
-    assert (end[1] == ds.EQUILIBRIUM).all() and (limit[1] == 2).all() and (end[[0, 2, 3]] == ds.NONE).all()
+    assert (
+        (end[1] == ds.EQUILIBRIUM).all()
+        and (limit[1] == 2).all()
+        and (end[[0, 2, 3]] == ds.NONE).all()
+    )
 
 
 def test_of_two_saddles_of_one_energy_each_goes_to_the_other():
@@ -124,7 +158,8 @@ def test_a_lower_saddle_has_a_loop_of_its_own():
 
 
 @pytest.mark.parametrize(
-    ("current", "to_the_right"), [pytest.param(0.1, ds.EQUILIBRIUM, marks=pytest.mark.slow), (0.2, ds.ROTATION_PLUS)]
+    ("current", "to_the_right"),
+    [pytest.param(0.1, ds.EQUILIBRIUM, marks=pytest.mark.slow), (0.2, ds.ROTATION_PLUS)],
 )
 def test_of_a_junction_the_branch_changes_its_end_at_the_homoclinic_curve(current, to_the_right):
     """Its damping is 0.1: I = 0.4 / pi = 0.127."""

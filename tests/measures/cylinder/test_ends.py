@@ -12,7 +12,10 @@ from survey.measures.cylinder import ends, equation
 
 RNG = np.random.default_rng(4)
 JUNCTION = survey.abel(
-    lambda phi, p: -p[0], lambda phi, p: p[1] - math.sin(phi), parameters=("a", "I"), period=2 * math.pi
+    lambda phi, p: -p[0],
+    lambda phi, p: p[1] - math.sin(phi),
+    parameters=("a", "I"),
+    period=2 * math.pi,
 )
 
 
@@ -40,7 +43,14 @@ def harmonics(phi, p):
 def turn(f, g, w):
     """By how much |w| grows over one turn in the direction of w, by SciPy."""
     side = math.copysign(1.0, w)
-    run = solve_ivp(lambda x, y: [f(x) + g(x) / y[0]], (0, side * 2 * math.pi), [w], "DOP853", rtol=3e-14, atol=1e-14)
+    run = solve_ivp(
+        lambda x, y: [f(x) + g(x) / y[0]],
+        (0, side * 2 * math.pi),
+        [w],
+        "DOP853",
+        rtol=3e-14,
+        atol=1e-14,
+    )
     return side * (run.y[0, -1] - w)
 
 
@@ -67,7 +77,12 @@ def test_ends_grow_as_the_expansion_says(order):
         size = (300.0, 3000.0, 100.0, 100.0)[order]
         for i, w in enumerate((size, -size)):
             growth = turn(lambda x, p=p: harmonics(x, p), lambda x, q=q: harmonics(x, q), w)
-            expansion = 2 * leading[0], 2 * leading[1] / w, leading[2] / w**2, leading[3] / w**3 / math.pi
+            expansion = (
+                2 * leading[0],
+                2 * leading[1] / w,
+                leading[2] / w**2,
+                leading[3] / w**3 / math.pi,
+            )
             assert growth == pytest.approx(math.pi * expansion[order], rel=0.3)
             assert np.sign(growth) == found.attract[i]
 
@@ -76,7 +91,9 @@ def test_the_gyrostat_as_an_equation_of_ones_own_is_the_gyrostat():
     """Ends, equilibria, cycles and fates are the same from six parameters, and from two functions."""
     for _ in range(6):
         six = dict(zip(NAMES, RNG.normal(size=6).round(3).tolist(), strict=True))
-        own, known = (survey.evaluate(scene, question="portrait", **six) for scene in (TWIN, "gyrostat"))
+        own, known = (
+            survey.evaluate(scene, question="portrait", **six) for scene in (TWIN, "gyrostat")
+        )
         for name in ("K", "L", "mean_f"):
             wanted = 0.0 if name == "mean_f" else known[name]
             assert abs(own[name] - wanted) <= own[f"{name}_error"] + 1e-15
@@ -87,9 +104,14 @@ def test_the_gyrostat_as_an_equation_of_ones_own_is_the_gyrostat():
             size = min(own[name].size, known[name].size)
             one, two = own[name].values[:size], known[name].values[:size]
             bars = own[f"{name}_error"].values[:size] + known[f"{name}_error"].values[:size]
-            assert (np.isnan(one) == np.isnan(two)).all() and not (abs(one - two) > bars).any(), (six, name)
+            assert (np.isnan(one) == np.isnan(two)).all() and not (abs(one - two) > bars).any(), (
+                six,
+                name,
+            )
         starts = {"phi0": RNG.uniform(-3, 3, 8), "w0": RNG.uniform(-3, 3, 5)}
-        one, two = (survey.evaluate(scene, question="fate", **six, **starts) for scene in (TWIN, "gyrostat"))
+        one, two = (
+            survey.evaluate(scene, question="fate", **six, **starts) for scene in (TWIN, "gyrostat")
+        )
         both = (one.verdict >= 0) & (two.verdict >= 0)
         assert (one.verdict == two.verdict).where(both, True).all() and both.mean() > 0.95
         assert (one.turnings == two.turnings).where(both, True).all()
@@ -102,7 +124,10 @@ def homoclinic(a):
         saddle = math.pi - math.asin(current)
         root = math.sqrt(a * a - 4 * math.cos(saddle))
         speeds = []
-        for rate, start, side in ((0.5 * (root - a), saddle - 2 * math.pi, 1), (0.5 * (-root - a), saddle, -1)):
+        for rate, start, side in (
+            (0.5 * (root - a), saddle - 2 * math.pi, 1),
+            (0.5 * (-root - a), saddle, -1),
+        ):
             x = start + side * 1e-5
 
             def middle(_t, y):
@@ -127,7 +152,9 @@ def test_the_homoclinic_curve_of_the_junction():
         low, high, exact = 0.9 * a, 1.4 * a, homoclinic(a)
         for _ in range(18):
             middle = 0.5 * (low + high)
-            cycles = int(survey.evaluate(JUNCTION, question="portrait", a=a, I=middle).rotations_plus)
+            cycles = int(
+                survey.evaluate(JUNCTION, question="portrait", a=a, I=middle).rotations_plus
+            )
             low, high = (low, middle) if cycles else (middle, high)
         assert low - 1e-6 < exact < high + 1e-6
         assert abs(exact - 4 * a / math.pi) < 0.5 * a**3
@@ -135,13 +162,21 @@ def test_the_homoclinic_curve_of_the_junction():
 
 def test_portraits_of_the_junction():
     ds = survey.evaluate(JUNCTION, question="portrait", a=[0.3, 1.5], I=[0.2, 0.6, 1.3])
-    assert ds.rotations_plus.values.tolist() == [[0, 1, 1], [0, 0, 1]] and (ds.rotations_minus == 0).all()
+    assert (
+        ds.rotations_plus.values.tolist() == [[0, 1, 1], [0, 0, 1]]
+        and (ds.rotations_minus == 0).all()
+    )
     assert ds.equilibria.values.tolist() == [[2, 2, 0]] * 2 and (ds.verdict == 1).all()
     assert (ds.end_plus == 0).all() and (ds.end_minus == 0).all() and (ds.librations == 0).all()
-    assert abs(ds.equilibrium_phi.values[0, 1, :2] - [math.asin(0.6), math.pi - math.asin(0.6)]).max() < 1e-14
+    assert (
+        abs(ds.equilibrium_phi.values[0, 1, :2] - [math.asin(0.6), math.pi - math.asin(0.6)]).max()
+        < 1e-14
+    )
     one = ds.isel(a=0, I=1, cycle=0)
     period, w, multiplier = (float(one[f"cycle_{name}"]) for name in ("period", "w", "multiplier"))
-    assert multiplier == pytest.approx(math.exp(-0.3 * period), abs=float(one.cycle_multiplier_error) + 1e-15)
+    assert multiplier == pytest.approx(
+        math.exp(-0.3 * period), abs=float(one.cycle_multiplier_error) + 1e-15
+    )
     saddle = math.pi - math.asin(0.6)
     run = solve_ivp(lambda t, y: [y[1], -0.3 * y[1] + 0.6 - math.sin(y[0])], (0, period), [saddle, w], "DOP853",
                     rtol=1e-12, atol=1e-12)  # fmt: skip
@@ -150,7 +185,9 @@ def test_portraits_of_the_junction():
     assert int(fold.status) == 21 and int(fold.verdict) == 0
     lossless = survey.evaluate(JUNCTION, question="portrait", a=0.0, I=0.3)
     assert int(lossless.status) == 22 and int(lossless.equilibria) == 2
-    assert int(survey.evaluate(JUNCTION, question="fate", a=0.0, I=0.3, phi0=1.0, w0=1.0).status) == 22
+    assert (
+        int(survey.evaluate(JUNCTION, question="fate", a=0.0, I=0.3, phi0=1.0, w0=1.0).status) == 22
+    )
 
 
 @pytest.mark.slow
@@ -172,7 +209,10 @@ def test_fates_of_the_junction_agree_with_long_integration():
 def test_no_equilibrium_is_missed():
     """Roots of random trigonometric polynomials of degree 5, as eigenvalues of a companion matrix."""
     five = survey.abel(
-        lambda phi, p: -0.5 + math.cos(phi), harmonics, parameters=[f"q{k}" for k in range(11)], period=2 * math.pi
+        lambda phi, p: -0.5 + math.cos(phi),
+        harmonics,
+        parameters=[f"q{k}" for k in range(11)],
+        period=2 * math.pi,
     )
     for _ in range(8):
         q = RNG.normal(size=11)

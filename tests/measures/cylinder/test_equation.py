@@ -1,4 +1,6 @@
-"""A user's f and g as programs: their series and balls against mpmath, and solutions against series in 30 digits."""
+"""A user's f and g as programs: their series and balls against mpmath, and solutions against series
+in 30 digits.
+"""
 
 import math
 
@@ -17,11 +19,34 @@ RNG = np.random.default_rng(20)
 
 def everything(x, p):
     """All operations and functions, within their domains for |x| < 2."""
-    y = math.sin(x) * p[0] - np.cos(2 * x) / (3 + x * x) + 2 ** (x / 3) + (2 + x**2) ** 1.3 - 1 / (x + 4) ** 3
-    y += math.atan(x) * math.asin(x / 3) + math.acos(x / 4) - math.tanh(x) * math.sinh(x) + math.cosh(x / 2)
-    y += math.asinh(x) + math.acosh(3 + x * x) + math.atanh(x / 5) + math.log(3 + x) * math.exp(-x) + math.erf(x)
+    y = (
+        math.sin(x) * p[0]
+        - np.cos(2 * x) / (3 + x * x)
+        + 2 ** (x / 3)
+        + (2 + x**2) ** 1.3
+        - 1 / (x + 4) ** 3
+    )
+    y += (
+        math.atan(x) * math.asin(x / 3)
+        + math.acos(x / 4)
+        - math.tanh(x) * math.sinh(x)
+        + math.cosh(x / 2)
+    )
+    y += (
+        math.asinh(x)
+        + math.acosh(3 + x * x)
+        + math.atanh(x / 5)
+        + math.log(3 + x) * math.exp(-x)
+        + math.erf(x)
+    )
     return (
-        y + math.tan(x / 3) * math.sqrt(5 - x) + math.hypot(x, 2.0) + np.expm1(x) - np.log1p(x / 9) + (-x) ** 2 + p[1]
+        y
+        + math.tan(x / 3) * math.sqrt(5 - x)
+        + math.hypot(x, 2.0)
+        + np.expm1(x)
+        - np.log1p(x / 9)
+        + (-x) ** 2
+        + p[1]
     )
 
 
@@ -34,10 +59,31 @@ def truth(x, p, order):
     p = [mp.mpf(value) for value in p]
 
     def f(x):
-        y = mp.sin(x) * p[0] - mp.cos(2 * x) / (3 + x * x) + 2 ** (x / 3) + (2 + x**2) ** mp.mpf(1.3) - 1 / (x + 4) ** 3
+        y = (
+            mp.sin(x) * p[0]
+            - mp.cos(2 * x) / (3 + x * x)
+            + 2 ** (x / 3)
+            + (2 + x**2) ** mp.mpf(1.3)
+            - 1 / (x + 4) ** 3
+        )
         y += mp.atan(x) * mp.asin(x / 3) + mp.acos(x / 4) - mp.tanh(x) * mp.sinh(x) + mp.cosh(x / 2)
-        y += mp.asinh(x) + mp.acosh(3 + x * x) + mp.atanh(x / 5) + mp.log(3 + x) * mp.exp(-x) + mp.erf(x)
-        return y + mp.tan(x / 3) * mp.sqrt(5 - x) + mp.hypot(x, 2) + mp.exp(x) - 1 - mp.log(1 + x / 9) + x**2 + p[1]
+        y += (
+            mp.asinh(x)
+            + mp.acosh(3 + x * x)
+            + mp.atanh(x / 5)
+            + mp.log(3 + x) * mp.exp(-x)
+            + mp.erf(x)
+        )
+        return (
+            y
+            + mp.tan(x / 3) * mp.sqrt(5 - x)
+            + mp.hypot(x, 2)
+            + mp.exp(x)
+            - 1
+            - mp.log(1 + x / 9)
+            + x**2
+            + p[1]
+        )
 
     return mp.taylor(f, mp.mpf(x), order)
 
@@ -79,7 +125,9 @@ def test_what_depends_on_the_parameters_alone_may_branch():
         return total if p[0] > 0 else -math.sin(x)
 
     one, two = (equation.program(plain, g, point, True) for point in ((1.0, 3.0), (-1.0, 3.0)))
-    assert pg.values(one, 0.4)[1] == pytest.approx(sum(math.sin(k * 0.4) / k for k in (1, 2, 3)), rel=1e-15)
+    assert pg.values(one, 0.4)[1] == pytest.approx(
+        sum(math.sin(k * 0.4) / k for k in (1, 2, 3)), rel=1e-15
+    )
     assert pg.values(two, 0.4)[1] == -math.sin(0.4)
     assert one[pg.AT_REST] == 1.0  # g(0) = 0 exactly
 
@@ -103,12 +151,17 @@ def test_what_is_not_analytic_is_refused(g, words):
 
 
 def test_periods_are_checked():
-    for g in (lambda x, p: math.sin(x) + 1e-12 * x, lambda x, p: math.sin(0.5 * x), lambda x, p: 1 / math.sin(x)):
+    for g in (
+        lambda x, p: math.sin(x) + 1e-12 * x,
+        lambda x, p: math.sin(0.5 * x),
+        lambda x, p: 1 / math.sin(x),
+    ):
         assert np.isnan(equation.program(plain, g, (1.0,), True)).all()
     assert np.isnan(equation.program(plain, lambda x, p: math.log(p[0]) + x, (-1.0,), False)).all()
     assert np.isnan(equation.program(plain, lambda x, p: x / (p[0] - 1), (1.0,), False)).all()
     peak = equation.program(plain, lambda x, p: 1 / (1.001 + math.cos(x)), (1.0,), True)
-    assert 1e6 < peak[pg.BOUND_G] < 5e6  # roundoffs of 1.001 + cos, 10^6 times as large beside the peak
+    # roundoffs of 1.001 + cos, 10^6 times as large beside the peak
+    assert 1e6 < peak[pg.BOUND_G] < 5e6
 
 
 def lienard(x, p):
@@ -138,7 +191,9 @@ def exactly(p, phi, w, t, digits=24):
                 s.append(sine)
                 c.append(cosine)
                 square.append(mp.fdot(x, x[::-1]))
-            largest = max(abs(row[k]) ** (mp.mpf(1) / k) for row in (x, v) for k in (digits - 1, digits))
+            largest = max(
+                abs(row[k]) ** (mp.mpf(1) / k) for row in (x, v) for k in (digits - 1, digits)
+            )
             step = mp.sign(left) * min(abs(left), 1 / (12 * largest))
             phi, w = (mp.fdot(row, [step**n for n in range(digits + 1)]) for row in (x, v))
             left -= step
@@ -146,7 +201,9 @@ def exactly(p, phi, w, t, digits=24):
 
 
 def hard_point(i):
-    """Parameters, start and time: van der Pol, Lienard, Duffing, the pendulum with torque; stiff ones among them."""
+    """Parameters, start and time: van der Pol, Lienard, Duffing, the pendulum with torque; stiff
+    ones among them.
+    """
     p = [*RNG.normal(size=3), *RNG.normal(size=4)]
     if i % 4 == 0:
         mu = 10.0 ** RNG.uniform(-1, 1.3)
@@ -161,13 +218,17 @@ def hard_point(i):
 
 
 @pytest.mark.parametrize("points", [8, pytest.param(24, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("method", [taylor, pytest.param(dop853, marks=pytest.mark.slow)], ids=["taylor", "dop853"])
+@pytest.mark.parametrize(
+    "method", [taylor, pytest.param(dop853, marks=pytest.mark.slow)], ids=["taylor", "dop853"]
+)
 def test_trajectories_lie_within_their_bars(method, points):
     wide = answered = 0
     for i in range(points):
         p, phi, w, t = hard_point(i)
         rows = solution.rows(equation.program(lienard, force, tuple(p), False)[None], [phi], [w])
-        floats, _turnings, status = solution.trajectories(method, rows, np.array([[0.5 * t, t, -0.1 * t]]), 1e-10)
+        floats, _turnings, status = solution.trajectories(
+            method, rows, np.array([[0.5 * t, t, -0.1 * t]]), 1e-10
+        )
         for row, code, at in zip(floats[0], status[0], (0.5 * t, t, -0.1 * t), strict=True):
             if code != OK:
                 continue
@@ -192,8 +253,12 @@ def test_angles_agree_with_times_also_near_turning_points(points):
             back = exactly(p, phi, w, time)
             slope = abs(lienard(phi2, p) + force(phi2, p) / w2) if w2 else np.inf
             doubt = 1e-15 * (1 + abs(phi2)) * slope
-            assert abs(value - w2) <= value_bar + doubt and abs(time - 0.3 * t) <= time_bar + 2e-16 * abs(phi2 / w2)
-            assert abs(float(back[0]) - phi2) <= time_bar * (abs(w2) + value_bar) * 1.1 + 1e-15 * (1 + abs(phi2))
+            assert abs(value - w2) <= value_bar + doubt and abs(
+                time - 0.3 * t
+            ) <= time_bar + 2e-16 * abs(phi2 / w2)
+            assert abs(float(back[0]) - phi2) <= time_bar * (abs(w2) + value_bar) * 1.1 + 1e-15 * (
+                1 + abs(phi2)
+            )
             checked += 1
         elif status[0, 0] == TURNING:
             turned = exactly(p, phi, w, time)

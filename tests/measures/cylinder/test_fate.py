@@ -1,4 +1,6 @@
-"""Fates and skeletons: the reference, symmetries, integrable strata, long integration by an independent code."""
+"""Fates and skeletons: the reference, symmetries, integrable strata, long integration by an
+independent code.
+"""
 
 import json
 import math
@@ -17,7 +19,19 @@ from survey.methods import dop853, taylor
 
 REFERENCE = json.loads((files("survey.reference") / "gyrostat.json").read_text())
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
-UNDECIDED, REST, SADDLE, PLUS, MINUS, LIBRATION, UP, DOWN, TURNS, SWINGS, START = -1, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9
+UNDECIDED, REST, SADDLE, PLUS, MINUS, LIBRATION, UP, DOWN, TURNS, SWINGS, START = (
+    -1,
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+)
 
 
 def fates(six, starts, method=taylor, rtol=1e-10):
@@ -41,7 +55,13 @@ def test_reference_skeletons(case):
     s = cf.skeleton(taylor, case["p"])
     assert s.K == pytest.approx(case["K"], rel=1e-8) and s.L == pytest.approx(case["L"], rel=1e-8)
     assert s.section % (2 * math.pi) == pytest.approx(case["section"], abs=1e-8)
-    names = {(eq.SADDLE, 0): "S", (eq.NODE, -1): "n-", (eq.NODE, 1): "n+", (eq.FOCUS, -1): "f-", (eq.FOCUS, 1): "f+"}
+    names = {
+        (eq.SADDLE, 0): "S",
+        (eq.NODE, -1): "n-",
+        (eq.NODE, 1): "n+",
+        (eq.FOCUS, -1): "f-",
+        (eq.FOCUS, 1): "f+",
+    }
     for row, wanted in zip(s.equilibria, case["equilibria"], strict=True):
         assert row[eq.ANGLE] == pytest.approx(wanted["phi"], abs=1e-8)
         kind = int(row[eq.KIND])
@@ -52,9 +72,13 @@ def test_reference_skeletons(case):
             assert sign * row[rt.CYCLE_X] == pytest.approx(wanted["w"], rel=3e-9)
             assert row[rt.MULTIPLIER] == pytest.approx(wanted["multiplier"], rel=1e-8)
             assert row[rt.PERIOD] == pytest.approx(wanted["period"], rel=1e-8)
-    for (threshold, _w_d), name in zip(s.thresholds, ("rotation_plus", "rotation_minus"), strict=True):
+    for (threshold, _w_d), name in zip(
+        s.thresholds, ("rotation_plus", "rotation_minus"), strict=True
+    ):
         wanted = case[name]["w_c"]
-        assert math.isnan(threshold) if wanted == 0 else threshold == pytest.approx(wanted, abs=1e-8)
+        assert (
+            math.isnan(threshold) if wanted == 0 else threshold == pytest.approx(wanted, abs=1e-8)
+        )
     for row, wanted in zip(s.librations, case["libration"], strict=True):
         assert row[rt.CYCLE_X] == pytest.approx(wanted["phi_right"], abs=1e-8)
         assert row[rt.CYCLE_LEFT] == pytest.approx(wanted["phi_left"], abs=1e-8)
@@ -73,7 +97,9 @@ def test_reference_cycle():
 
 
 @pytest.mark.parametrize("method", [taylor, dop853], ids=["taylor", "dop853"])
-@pytest.mark.parametrize("case", REFERENCE["fate"], ids=lambda case: f"{case['fate']}-{case['phi0']}")
+@pytest.mark.parametrize(
+    "case", REFERENCE["fate"], ids=lambda case: f"{case['fate']}-{case['phi0']}"
+)
 def test_reference_fates(case, method):
     found = fates(case["p"], [float(case["phi0"]), float(case["w0"])], method)
     verdict, detail = found["verdict"][0], case["detail"]
@@ -92,7 +118,9 @@ def test_reference_fates(case, method):
 
 
 def images(six, starts, angle, factor):
-    """Symmetric systems and starts: S2, S3, S4 (by `angle`), S5 (by `factor`), and whether signs are exchanged."""
+    """Symmetric systems and starts: S2, S3, S4 (by `angle`), S5 (by `factor`), and whether signs
+    are exchanged.
+    """
     b12, b31, d, c23, s2, s3 = six
     phi, w = starts.T
     c, s = math.cos(angle), math.sin(angle)
@@ -109,7 +137,11 @@ def images(six, starts, angle, factor):
     yield [b12, -b31, d, -c23, -s2, s3], np.stack([-phi, -w], 1), True
     yield [-b12, -b31, d, c23, -s2, -s3], np.stack([phi + math.pi, w], 1), False
     yield turned, np.stack([phi - angle, w], 1), False
-    yield [b12 * k, b31 * k, d * k * k, c23 * k * k, s2 * k * k, s3 * k * k], np.stack([phi, w * k], 1), False
+    yield (
+        [b12 * k, b31 * k, d * k * k, c23 * k * k, s2 * k * k, s3 * k * k],
+        np.stack([phi, w * k], 1),
+        False,
+    )
 
 
 EXCHANGED = {-1: -1, 0: 0, 1: 1, 2: 3, 3: 2, 4: 4, 5: 6, 6: 5, 7: 7, 8: 8, 9: 9}
@@ -117,14 +149,18 @@ EXCHANGED = {-1: -1, 0: 0, 1: 1, 2: 3, 3: 2, 4: 4, 5: 6, 6: 5, 7: 7, 8: 8, 9: 9}
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_symmetries_carry_fates(seed):
-    """Verdict, turning points, net turns and multipliers under S2-S5; the numbers differ, so all decisions do."""
+    """Verdict, turning points, net turns and multipliers under S2-S5; the numbers differ, so all
+    decisions do.
+    """
     random, undecided, count = np.random.default_rng(seed), 0, 40 if seed == 1 else 400
     for i in range(count):
         six = random_system(random, i)
         starts = np.stack([random.uniform(-4, 4, 12), random.normal(size=12) * 4], 1)
         one = fates(six, starts)
         undecided += (one["verdict"] < 0).sum()
-        for other_six, other_starts, exchanged in images(six, starts, random.uniform(0, 6), math.exp(random.normal())):
+        for other_six, other_starts, exchanged in images(
+            six, starts, random.uniform(0, 6), math.exp(random.normal())
+        ):
             two = fates(other_six, other_starts)
             mine = np.array([EXCHANGED[v] for v in one["verdict"]]) if exchanged else one["verdict"]
             both = (mine >= 0) & (two["verdict"] >= 0)
@@ -132,7 +168,9 @@ def test_symmetries_carry_fates(seed):
             known = both & (one["turnings"] > -2) & (two["turnings"] > -2)
             assert np.array_equal(one["turnings"][known], two["turnings"][known])
             turns = both & (one["net_turns"] != cf.NO_TURNS)
-            assert np.array_equal((-1 if exchanged else 1) * one["net_turns"][turns], two["net_turns"][turns])
+            assert np.array_equal(
+                (-1 if exchanged else 1) * one["net_turns"][turns], two["net_turns"][turns]
+            )
             gap = np.abs(one["multiplier"] - two["multiplier"])
             assert not (gap > one["multiplier_error"] + two["multiplier_error"]).any()
     assert undecided <= 0.003 * 12 * count
@@ -144,7 +182,10 @@ def ended(six, phi, w, time):
 
     def rates(_t, y):
         s, c = math.sin(y[0]), math.cos(y[0])
-        return [y[1], (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s]
+        return [
+            y[1],
+            (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s,
+        ]
 
     options = {"method": "DOP853", "rtol": 1e-10, "atol": 1e-11, "max_step": 0.5}
     run = solve_ivp(rates, (0, time), [phi, w], events=lambda _t, y: y[1], **options)
@@ -180,30 +221,43 @@ def test_long_integration_agrees(seed):
 
 
 def test_equilibrium_starts():
-    """Of binary64 angles only 0 is exactly an equilibrium; the fall from pi is not claimed to end anywhere."""
+    """Of binary64 angles only 0 is exactly an equilibrium; the fall from pi is not claimed to end
+    anywhere.
+    """
     pendulum = (0, 0, 0, 0, 0, 1.0)
     found = fates(pendulum, [[0, 0], [math.pi, 0], [-math.pi, 0], [7 * math.pi, 0], [1e-9, 0]])
     assert found["verdict"].tolist() == [START] + [UNDECIDED] * 3 + [SWINGS]
     for s3 in (1.0, -1.0):  # g(0) = s2 - c23 = 0: a focus, a saddle
         found = fates((0.3, 0.2, 0.5, 0.7, 0.7, s3), [[0.0, 0.0], [5e-324, 0.0], [0.0, 1e-300]])
-        assert found["verdict"].tolist() == [START, UNDECIDED, UNDECIDED] and found["limit_phi"][0] == 0.0
+        assert (
+            found["verdict"].tolist() == [START, UNDECIDED, UNDECIDED]
+            and found["limit_phi"][0] == 0.0
+        )
 
 
 def test_a_start_beside_an_equilibrium_is_not_at_it():
-    """One ulp and less from a focus that attracts it is reached; a saddle is left to the side to which g points."""
+    """One ulp and less from a focus that attracts it is reached; a saddle is left to the side to
+    which g points.
+    """
     s = cf.skeleton(taylor, SIX)
     for row in s.equilibria:
         x = row[eq.ANGLE]
         starts = [np.nextafter(x, -9), x, np.nextafter(x, 9), x + 1e-12]
         found = fates(SIX, [[phi, 0] for phi in starts])
         if row[eq.KIND] != eq.SADDLE:
-            assert (found["verdict"] == REST).all() if row[eq.STABLE] < 0 else (found["verdict"] >= 0).all()
+            assert (
+                (found["verdict"] == REST).all()
+                if row[eq.STABLE] < 0
+                else (found["verdict"] >= 0).all()
+            )
             assert (found["turnings"] == -1).all() or row[eq.STABLE] >= 0
             continue
         with mp.workdps(40):
             g = [force(SIX, mp.mpf(phi)) for phi in starts]
         aside = fates(SIX, [[x + 1e-5 * mp.sign(value), 0] for value in g])
-        assert found["verdict"].tolist() == aside["verdict"].tolist() and (aside["verdict"] >= 0).all()
+        assert (
+            found["verdict"].tolist() == aside["verdict"].tolist() and (aside["verdict"] >= 0).all()
+        )
 
 
 def force(six, phi):
@@ -214,7 +268,9 @@ def force(six, phi):
 
 @pytest.mark.parametrize("ulps", [9, 18, 45, 450, 1e10])
 def test_a_small_K_is_not_taken_as_none(ulps):
-    """Beside the stratum I2: nothing periodic, and no cycles out of the rounding of D: spin-up, or undecided."""
+    """Beside the stratum I2: nothing periodic, and no cycles out of the rounding of D: spin-up, or
+    undecided.
+    """
     for side in (1, -1):
         six = (0.7, -0.4, 0.0, 0.0, 0.7, -0.4 * (1 + side * ulps * 2.0**-52))
         assert cf.stratum_of(*six) == cf.G
@@ -232,7 +288,10 @@ def test_stratum_I0():
     assert found["verdict"].tolist() == [REST, TURNS, START]
     y = w - b12 * math.sin(phi) - b31 * math.cos(phi)
     x = found["limit_phi"][0]
-    assert abs(y + b12 * math.sin(x) + b31 * math.cos(x)) < 1e-15 and b12 * math.cos(x) - b31 * math.sin(x) < 0
+    assert (
+        abs(y + b12 * math.sin(x) + b31 * math.cos(x)) < 1e-15
+        and b12 * math.cos(x) - b31 * math.sin(x) < 0
+    )
 
 
 def test_stratum_I1():
@@ -243,7 +302,9 @@ def test_stratum_I1():
 
 
 def test_stratum_I2():
-    """K = L = 0: fast rotations are periodic; w has the same value a turn later, which `trajectories` confirms."""
+    """K = L = 0: fast rotations are periodic; w has the same value a turn later, which
+    `trajectories` confirms.
+    """
     delta, sigma, b12, b31 = 0.8, 0.35, 0.5, 0.8
     six = (b12, b31, delta * (b12**2 - b31**2), delta * b12 * b31, sigma * b12, sigma * b31)
     assert cf.stratum_of(*six) == cf.I2
@@ -278,13 +339,17 @@ def test_parity_law():
 
 
 def test_cycles_are_searched_where_fates_need_them():
-    """Fates by equilibria, and by the cycles above a motion that grows, are those by all cycles; most need none."""
+    """Fates by equilibria, and by the cycles above a motion that grows, are those by all cycles;
+    most need none.
+    """
     random, searched = np.random.default_rng(17), []
     for i in range(60):
         system, starts = random_system(random, i), random.normal(size=(3, 2)) * [1, 2]
         few, whole = cf.skeleton(taylor, system), cf.skeleton(taylor, system)
         assert len(whole.plus) + len(whole.minus) + len(whole.librations) < 20  # all are known
-        assert np.array_equal(cf.fates(taylor, few, starts, 1e-9), cf.fates(taylor, whole, starts, 1e-9))
+        assert np.array_equal(
+            cf.fates(taylor, few, starts, 1e-9), cf.fates(taylor, whole, starts, 1e-9)
+        )
         searched.append(len(few.found))
     assert 20 < searched.count(0) < 60 and max(searched) > 1
 
@@ -292,10 +357,16 @@ def test_cycles_are_searched_where_fates_need_them():
 def test_beside_a_separatrix_fates_are_those_of_its_sides():
     """N1: double-double tells on which side of the stable branch of a saddle the doubles next to it start."""
     phi, nearest, saddle = 3.5, 1.85414457907569906, 4.65094863594827606
-    starts = [nearest - 1e-9, *(nearest + i * np.spacing(nearest) for i in (-1, 0, 1)), nearest + 1e-9]
+    starts = [
+        nearest - 1e-9,
+        *(nearest + i * np.spacing(nearest) for i in (-1, 0, 1)),
+        nearest + 1e-9,
+    ]
     found = fates(SIX, [[phi, w] for w in starts])
     assert (found["verdict"] >= 0).all() and (found["status"] == 0).all()
-    known = list(zip(*(found[name].tolist() for name in ("verdict", "turnings", "net_turns")), strict=True))
+    known = list(
+        zip(*(found[name].tolist() for name in ("verdict", "turnings", "net_turns")), strict=True)
+    )
     passed = [exact(SIX, phi, w, 25.0, 40)[0] > saddle for w in starts]
     assert known[0] != known[-1] and passed[-1] and not passed[0]
     assert known == [known[-1] if beyond else known[0] for beyond in passed]

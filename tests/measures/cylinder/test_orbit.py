@@ -1,4 +1,6 @@
-"""The picture of a motion on the cylinder: its cycles close, its branches end at saddles and keep the energy."""
+"""The picture of a motion on the cylinder: its cycles close, its branches end at saddles and keep
+the energy.
+"""
 
 import numpy as np
 import pytest
@@ -22,7 +24,11 @@ def test_cycles_close_and_are_those_of_the_portrait():
     point = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
     ds = motion(**point, phi0=0.3, w0=0.2)
     phi, w = lines(ds, "unstable_cycle")
-    assert len(phi) == 1 and abs(phi[0, 0] - phi[0, -1] - TURN) < 1e-9 and abs(w[0, 0] - w[0, -1]) < 1e-9
+    assert (
+        len(phi) == 1
+        and abs(phi[0, 0] - phi[0, -1] - TURN) < 1e-9
+        and abs(w[0, 0] - w[0, -1]) < 1e-9
+    )
     known = survey.evaluate("gyrostat", question="portrait", **point)
     assert w[0, 0] == pytest.approx(float(known.cycle_w[0]), rel=1e-9)
     np.testing.assert_allclose(ds.equilibrium_phi, known.equilibrium_phi)

@@ -1,4 +1,6 @@
-"""Curves of a user's flow: against the gyrostat's closed forms, and the Josephson junction's traced with mpmath."""
+"""Curves of a user's flow: against the gyrostat's closed forms, and the Josephson junction's traced
+with mpmath.
+"""
 
 from math import cos, pi, sin
 
@@ -7,7 +9,14 @@ import numpy as np
 import pytest
 
 import survey
-from survey.measures.cylinder import bifurcations, connections, curves, cycle_counts, cycle_folds, own_bifurcations
+from survey.measures.cylinder import (
+    bifurcations,
+    connections,
+    curves,
+    cycle_counts,
+    cycle_folds,
+    own_bifurcations,
+)
 from survey.measures.square import Square
 
 EVEN = np.array([False, False])
@@ -39,7 +48,10 @@ def points(scene, square):
     axes = [p.name for p in scene.own]
     found = curves.searched(scene, square, axes, {}, {})
     kinds = np.repeat(found.kind, found.count)
-    return {NAMES[kind]: (found.parameters[kinds == kind], found.error[kinds == kind]) for kind in set(kinds)}
+    return {
+        NAMES[kind]: (found.parameters[kinds == kind], found.error[kinds == kind])
+        for kind in set(kinds)
+    }
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +76,8 @@ def test_an_equation_written_out_has_the_gyrostats_curves(monkeypatch):
         marks = all(len(part) == 1 for part, _ in known[kind])
         for x, bar in zip(xy, error, strict=True):
             off = min(distance(plane, kind, x, part) for part, _ in known[kind])
-            assert off <= (bar + 1e-13 if marks else bar + 1e-4), kind  # chords of the closed forms are 3e-5 off
+            # chords of the closed forms are 3e-5 off
+            assert off <= (bar + 1e-13 if marks else bar + 1e-4), kind
         assert (error < 1e-9).all()
         if marks:
             assert len(xy) == len(known[kind])
@@ -79,7 +92,9 @@ def distance(plane, kind, x, part):
     if len(part) == 1:
         return np.hypot(*(part[0] - x))
     low, chord = part[:-1], np.diff(part, axis=0)
-    share = np.clip(((x - low) * chord).sum(axis=1) / np.maximum((chord**2).sum(axis=1), 1e-300), 0.0, 1.0)
+    share = np.clip(
+        ((x - low) * chord).sum(axis=1) / np.maximum((chord**2).sum(axis=1), 1e-300), 0.0, 1.0
+    )
     return np.hypot(*(low + share[:, None] * chord - x).T).min()
 
 
@@ -100,7 +115,9 @@ def discriminant_changes(x, step):
 
 
 def outcome(a, current):
-    """+1 where the branch to the right of the junction's saddle passes its next copy, -1 where it turns before."""
+    """+1 where the branch to the right of the junction's saddle passes its next copy, -1 where it
+    turns before.
+    """
     saddle, order = mp.pi - mp.asin(current), 30
     x, a1 = mp.mpf(10) ** -9, (-a + mp.sqrt(a * a - 4 * mp.cos(mp.pi - mp.asin(current)))) / 2
     a2 = mp.sin(saddle) / 2 / (3 * a1 + a)

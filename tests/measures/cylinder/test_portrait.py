@@ -1,4 +1,6 @@
-"""Portraits: K, L and equilibria in multiprecision, cycles by another integrator, symmetries, laws, exact strata."""
+"""Portraits: K, L and equilibria in multiprecision, cycles by another integrator, symmetries, laws,
+exact strata.
+"""
 
 import math
 
@@ -56,7 +58,9 @@ def test_K_and_L(some):
         with mpmath.workdps(50):
             exact = b12 * s3 - b31 * s2, mpmath.pi / 2 * (c23 * (b12**2 - b31**2) - d * b12 * b31)
             for name, value in zip(("K", "L"), exact, strict=True):
-                assert abs(mpmath.mpf(float(found[name][i])) - value) <= mpmath.mpf(float(found[name + "_error"][i]))
+                assert abs(mpmath.mpf(float(found[name][i])) - value) <= mpmath.mpf(
+                    float(found[name + "_error"][i])
+                )
                 assert found[name + "_error"][i] < 1e-14
 
 
@@ -77,7 +81,9 @@ def test_equilibria_are_the_roots_of_the_quartic(some):
             angles = sorted(angle % (2 * mpmath.pi) for angle in angles)
         assert found["equilibria"][i] == len(angles) == 2 * found["saddles"][i]
         for k, angle in enumerate(angles):
-            assert abs(found["equilibrium_phi"][i, k] - angle) <= found["equilibrium_phi_error"][i, k]
+            assert (
+                abs(found["equilibrium_phi"][i, k] - angle) <= found["equilibrium_phi_error"][i, k]
+            )
         assert np.isnan(found["equilibrium_phi"][i, len(angles) :]).all()
 
 
@@ -97,7 +103,9 @@ def test_types_of_equilibria(some):
 
 
 def period_by_dop853(six, section, w, kind, right):
-    """Period, integral of f over it and w at the return, from the section (rotations) or the turning point."""
+    """Period, integral of f over it and w at the return, from the section (rotations) or the
+    turning point.
+    """
     if kind == 3:
         event = lambda t, y: y[1] if t > 0 else -1.0  # noqa: E731
         event.direction, start = -1, [right, 0.0, 0.0]
@@ -105,7 +113,9 @@ def period_by_dop853(six, section, w, kind, right):
         goal = section + math.copysign(2 * math.pi, w)
         event, start = (lambda _t, y: y[0] - goal), [section, w, 0.0]
     event.terminal = True
-    run = solve_ivp(rates(six), (0, 1e4), start, "DOP853", events=event, rtol=1e-13, atol=1e-13, max_step=0.5)
+    run = solve_ivp(
+        rates(six), (0, 1e4), start, "DOP853", events=event, rtol=1e-13, atol=1e-13, max_step=0.5
+    )
     end = run.y_events[0][0]
     return run.t_events[0][0], end[2], end[0 if kind == 3 else 1]
 
@@ -128,7 +138,10 @@ def test_cycles_close_with_their_periods_and_multipliers(some):
                 assert abs(time - T) <= bars[2] + noise * T
                 assert abs(math.exp(area) - m) <= bars[1] + noise * m
                 checked[kind], place = checked[kind] + 1, place + 1
-        assert np.isnan(found["cycle_w"][i, place:]).all() and (found["cycle_kind"][i, place:] == 0).all()
+        assert (
+            np.isnan(found["cycle_w"][i, place:]).all()
+            and (found["cycle_kind"][i, place:] == 0).all()
+        )
     assert min(checked.values()) >= 2
 
 
@@ -148,7 +161,10 @@ def cycle_lists(found, i, exchanged=False, power=1):
     names = {1: 2, 2: 1, 3: 3} if exchanged else {1: 1, 2: 2, 3: 3}
     own = found["cycle_kind"][i] > 0
     kinds = [names[k] for k in found["cycle_kind"][i, own]]
-    bars = found["cycle_multiplier_error"][i, own] / np.minimum(found["cycle_multiplier"][i, own], 1) ** 2
+    bars = (
+        found["cycle_multiplier_error"][i, own]
+        / np.minimum(found["cycle_multiplier"][i, own], 1) ** 2
+    )
     return sorted(zip(kinds, found["cycle_multiplier"][i, own] ** power, bars, strict=True))
 
 
@@ -169,14 +185,19 @@ def test_symmetries(some):
     rows, found = some
     random = np.random.default_rng(5)
     for i, six in enumerate(rows[:24]):
-        for image, (on_K, on_L), exchanged, power in images(six, random.uniform(0, 6), math.exp(random.normal())):
+        for image, (on_K, on_L), exchanged, power in images(
+            six, random.uniform(0, 6), math.exp(random.normal())
+        ):
             other = portraits(image)
             for name, factor in (("K", on_K), ("L", on_L)):
                 size = abs(factor) * np.prod(np.abs(six) + 1)
                 assert abs(other[name][0] - factor * found[name][i]) < 1e-14 * size
             for name in ("stratum", "equilibria", "saddles", "librations"):
                 assert other[name][0] == found[name][i]
-            for name, twin in (("rotations_plus", "rotations_minus"), ("rotations_minus", "rotations_plus")):
+            for name, twin in (
+                ("rotations_plus", "rotations_minus"),
+                ("rotations_minus", "rotations_plus"),
+            ):
                 assert other[name][0] == found[twin if exchanged else name][i]
             one, two = cycle_lists(found, i, exchanged, power), cycle_lists(other, 0)
             for (kind, m, bar), (kind_two, m_two, bar_two) in zip(one, two, strict=True):
@@ -193,7 +214,9 @@ def test_parity_law_and_ends(some):
         if found["verdict"][i] != 1:
             continue
         s = cf.remembered(taylor, six)
-        for name, (w_c, w_d) in zip(("rotations_plus", "rotations_minus"), s.thresholds, strict=True):
+        for name, (w_c, w_d) in zip(
+            ("rotations_plus", "rotations_minus"), s.thresholds, strict=True
+        ):
             same = np.sign(w_d - w_c) == np.sign(s.K) if w_c > 0 else s.K > 0
             assert found[name][i] % 2 == (not same)
             checked += 1
@@ -209,22 +232,29 @@ def test_far_cycle():
     assert (np.abs(w + found["L"] / (math.pi * K)) < 1 + found["cycle_w_error"][:, 0]).all()
     assert (np.abs(w * T / (2 * math.pi) - 1) < 2 / w).all()
     slope = math.pi * K / w**3
-    assert (np.abs(m - 1 - slope) <= np.abs(slope) * 30 / w + found["cycle_multiplier_error"][:, 0]).all()
+    assert (
+        np.abs(m - 1 - slope) <= np.abs(slope) * 30 / w + found["cycle_multiplier_error"][:, 0]
+    ).all()
     assert (found["verdict"] == 1).all()
 
 
 def test_hopf():
     """Amplitude of the cycle born at f = 0: per turn ln(m) = 0 at a^2 = -8 f omega / (3 K) (gyrostat.md)."""
-    for f in (1e-3, 1e-4):  # at phi = 0: f = b12, g' = -d - s3, K = b12 s3 - b31 s2 ~ -b31 s2; g = -c23 + s2 = 0
+    # at phi = 0: f = b12, g' = -d - s3, K = b12 s3 - b31 s2 ~ -b31 s2; g = -c23 + s2 = 0
+    for f in (1e-3, 1e-4):
         b31, s2, d, s3 = 0.5, 0.8, 0.3, 0.9
         found = portraits((f, b31, d, s2, s2, s3))
         omega2 = d + s3
         amplitude2 = -8 * f * omega2 / (3 * found["K"][0])
         assert found["librations"][0] == 1 and found["verdict"][0] == 1
         own = found["cycle_kind"][0] == 3
-        assert found["cycle_w"][0, own][0] ** 2 == pytest.approx(omega2 * amplitude2, rel=30 * math.sqrt(f))
+        assert found["cycle_w"][0, own][0] ** 2 == pytest.approx(
+            omega2 * amplitude2, rel=30 * math.sqrt(f)
+        )
         assert found["cycle_multiplier"][0, own][0] < 1
-        assert found["cycle_period"][0, own][0] == pytest.approx(2 * math.pi / math.sqrt(omega2), rel=10 * f)
+        assert found["cycle_period"][0, own][0] == pytest.approx(
+            2 * math.pi / math.sqrt(omega2), rel=10 * f
+        )
 
 
 def test_degenerate_points():
@@ -232,7 +262,11 @@ def test_degenerate_points():
     delta, sigma, b12, b31 = 0.8, 0.35, 0.5, 0.75
     I2 = (b12, b31, delta * (b12**2 - b31**2), delta * b12 * b31, sigma * b12, sigma * b31)
     found = portraits([(0.5, 0.3, 0, 0, 0, 0), (0, 0, 0, 0, 0, 1.0), I2])
-    assert found["stratum"].tolist() == [0, 1, 2] and (found["verdict"] == 0).all() and (found["status"] == 0).all()
+    assert (
+        found["stratum"].tolist() == [0, 1, 2]
+        and (found["verdict"] == 0).all()
+        and (found["status"] == 0).all()
+    )
     assert found["equilibria"].tolist()[:2] == [-1, 2] and (found["end_plus"] == 1).all()
 
 
@@ -254,7 +288,9 @@ def test_where_K_is_zero_within_its_rounding_only_the_verdict_is_degenerate():
     ],
 )
 def test_at_degenerate_equilibria_no_cycles_are_counted(six, off):
-    """g = -c23 + s2, g' = -d - s3 and f = b12 at phi = 0; `off` splits or lifts the roots, by 1e-16 to 1e-5 rad."""
+    """g = -c23 + s2, g' = -d - s3 and f = b12 at phi = 0; `off` splits or lifts the roots, by 1e-16
+    to 1e-5 rad.
+    """
     six = np.array(six)
     six[5 if six[5] < 0 else 0] += off
     found = portraits(six)
@@ -265,11 +301,15 @@ def test_at_degenerate_equilibria_no_cycles_are_counted(six, off):
     assert np.isfinite(bars).sum() == size
     inside = np.zeros(size)
     for angle in filter(is_real, roots(six)):
-        slips = [abs(mpmath.expj(angle) - mpmath.expj(phi)) for phi in found["equilibrium_phi"][0, :size]]
+        slips = [
+            abs(mpmath.expj(angle) - mpmath.expj(phi)) for phi in found["equilibrium_phi"][0, :size]
+        ]
         home = np.flatnonzero(np.array(slips) <= bars[:size])
         assert len(home) == 1
         inside[home] += 1
-    assert (inside >= 1).all() and ((inside > 1) == (found["equilibrium_type"][0, :size] == 8)).all()
+    assert (inside >= 1).all() and (
+        (inside > 1) == (found["equilibrium_type"][0, :size] == 8)
+    ).all()
     assert found["K"][0] == pytest.approx(six[0] * six[5] - six[1] * six[4], abs=1e-15)
     assert found["stratum"][0] == (3 if six[1] else 1)
 
@@ -283,7 +323,8 @@ def test_beside_degenerate_equilibria_roots_are_counted_right():
         six[5] = -six[2]  # g' = 0
         six[4] = six[3] = six[3] * (i % 2)  # g = 0, of g'' too
         six[4 + i // 2 % 2] += random.choice([-1, 1]) * 10.0 ** random.uniform(-16, -6)
-        rows.append([0.0, 0.0, *six[2:]])  # without Barnett-London effect there are no maps to follow
+        # without Barnett-London effect there are no maps to follow
+        rows.append([0.0, 0.0, *six[2:]])
     found = portraits(rows)
     told = found["equilibria"] >= 0
     for i in np.flatnonzero(told & ~(found["equilibrium_type"] == 8).any(axis=1)):
@@ -292,7 +333,9 @@ def test_beside_degenerate_equilibria_roots_are_counted_right():
 
 
 def test_beside_a_saddle_connection_nothing_is_claimed():
-    """Bisection in s2 between portraits with and without a rotation: the last bits are undecided or degenerate."""
+    """Bisection in s2 between portraits with and without a rotation: the last bits are undecided or
+    degenerate.
+    """
 
     def rotations(s2):
         return portraits((0.7, -0.4, 1.1, 0.3, s2, -0.2))
@@ -334,16 +377,23 @@ def test_portraits_of_many_systems():
 
 
 def test_beside_a_connection_a_repelling_cycle_may_be_lost_and_then_the_verdict_is_open():
-    """A junction in reversed time (a < 0): its stable branch is what the unstable one is in the mirror image."""
+    """A junction in reversed time (a < 0): its stable branch is what the unstable one is in the
+    mirror image.
+    """
     junction = survey.abel(
-        lambda phi, p: -p[0], lambda phi, p: p[1] - np.sin(phi), parameters=("a", "I"), period=2 * np.pi
+        lambda phi, p: -p[0],
+        lambda phi, p: p[1] - np.sin(phi),
+        parameters=("a", "I"),
+        period=2 * np.pi,
     )
     one, other = (survey.evaluate(junction, a=a, I=0.965, question="portrait") for a in (1.0, -1.0))
     assert int(one.verdict) == 1 and int(one.rotations_plus) == 1
     assert int(other.verdict) == -1 or (int(other.verdict) == 1 and int(other.rotations_minus) == 1)
     system = {"b12": 0.26, "b31": 1.02, "c23": -0.4, "s2": -0.15, "s3": -0.4}
     for distance in (1e-6, 1e-7):  # one libration, whose multiplier 2e5 is not near 1
-        ds = survey.evaluate("gyrostat", question="portrait", d=1.996611983589767 - distance, **system)
+        ds = survey.evaluate(
+            "gyrostat", question="portrait", d=1.996611983589767 - distance, **system
+        )
         assert int(ds.verdict) == -1 or (int(ds.verdict) == 1 and int(ds.librations) == 1)
     far = survey.evaluate("gyrostat", question="portrait", d=1.996611983589767 - 1e-4, **system)
     assert int(far.verdict) == 1 and int(far.librations) == 1

@@ -1,4 +1,6 @@
-"""Branches of the saddles against 40 digits: the variants of (66), general b, all four branches; in narrow bars."""
+"""Branches of the saddles against 40 digits: the variants of (66), general b, all four branches; in
+narrow bars.
+"""
 
 import mpmath as mp
 import numpy as np
@@ -58,9 +60,17 @@ def test_trajectories_lie_within_narrow_bars(name):
     assert abs(heads[0, 2] - w) <= heads[0, 3] < 1e-15 * (1 + abs(w))
     for t, found, count in zip(TIMES[0], floats[0], turnings[0], strict=True):
         wanted = truth.at(case[0], begin, t)
-        assert all(abs(found[i] - wanted[i]) <= found[2 + i] + 1e-32 for i in (0, 1)), (t, found, wanted)
+        assert all(abs(found[i] - wanted[i]) <= found[2 + i] + 1e-32 for i in (0, 1)), (
+            t,
+            found,
+            wanted,
+        )
         assert (found[2:] <= 1e-12 * (1 + np.abs(found[:2]))).all(), t
-        assert count == ("loop" in name and t == 7.0 and not case[3]) or case[0][0] or (case[3] and t == -5.0)
+        assert (
+            count == ("loop" in name and t == 7.0 and not case[3])
+            or case[0][0]
+            or (case[3] and t == -5.0)
+        )
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -74,11 +84,16 @@ def test_times_and_velocities_at_angles(name):
     for j in np.flatnonzero(status[0] == OK):
         slack = 4e-15 + 20 * (floats[0, j, 2] + 1e-15) / abs(floats[0, j, 1])
         assert abs(found[0, j, 1] - times[0, j]) <= found[0, j, 3] + slack
-        assert abs(found[0, j, 0] - floats[0, j, 1]) <= found[0, j, 2] + floats[0, j, 3] + 20 * floats[0, j, 2]
+        assert (
+            abs(found[0, j, 0] - floats[0, j, 1])
+            <= found[0, j, 2] + floats[0, j, 3] + 20 * floats[0, j, 2]
+        )
         assert found[0, j, 2] < 1e-14 * (1 + abs(found[0, j, 0])) and found[0, j, 3] < 1e-13
     assert (status[0, :2] == OK).all() and np.isin(status[0, 2], (OK, TURNING))
     beyond = targets[0, 1] + (-20.0 if how["left"] else 20.0)
-    found, status, _heads = separatrix.abel(None, rows, np.array([[heads[0, 0], beyond]]), 1e-10, **how)
+    found, status, _heads = separatrix.abel(
+        None, rows, np.array([[heads[0, 0], beyond]]), 1e-10, **how
+    )
     assert np.isin(status, (EQUILIBRIUM, TURNING, OK, SEPARATRIX)).all()
 
 
@@ -86,18 +101,25 @@ def test_an_abel_solution_ends_where_its_branch_turns():
     """The pendulum with a second harmonic: w^2 = 2 (V(phi_s) - V(phi)), turning where that is 0 again."""
     six = (0, 0, 1.1, 0.3, 0.5, -0.2)
     rows = np.array([[*six, 1.5, 1]], float)
-    floats, status, _heads = separatrix.abel(None, rows, np.array([[1.0, 3.9, 0.5]]), 1e-10, stable=False, left=False)
+    floats, status, _heads = separatrix.abel(
+        None, rows, np.array([[1.0, 3.9, 0.5]]), 1e-10, stable=False, left=False
+    )
     assert status[0].tolist() == [OK, TURNING, EQUILIBRIUM]
     with mp.workdps(40):
         d, c23, s2, s3 = map(mp.mpf, six[2:])
 
         def V(x):
-            return d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+            return (
+                d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+            )
 
         angle = truth.saddles(six)[0]
         end = mp.findroot(lambda x: V(x) - V(angle), floats[0, 1, 0])
         middle = (mp.mpf(1.5) + end) / 2
-        t = mp.quad(lambda x: 1 / mp.sqrt(2 * (V(angle) - V(x))), [mp.mpf(1.5), middle, (middle + end) / 2, end])
+        t = mp.quad(
+            lambda x: 1 / mp.sqrt(2 * (V(angle) - V(x))),
+            [mp.mpf(1.5), middle, (middle + end) / 2, end],
+        )
     assert abs(floats[0, 1, 0] - end) <= floats[0, 1, 2] < 1e-14
     assert abs(floats[0, 1, 1] - t) <= floats[0, 1, 3] < 1e-13
 
@@ -112,14 +134,18 @@ DEGENERATE = {  # g has a double or a triple root at the "saddle"; six, phi0, le
 
 @pytest.mark.parametrize("name", DEGENERATE)
 def test_degenerate_saddles(name):
-    """w^2 ~ x^3 and x^4: z = 16 z0/(16 - ...), 1/z = 1/z0 - ... of `scenes/gyrostat.md`, against the energy."""
+    """w^2 ~ x^3 and x^4: z = 16 z0/(16 - ...), 1/z = 1/z0 - ... of `scenes/gyrostat.md`, against
+    the energy.
+    """
     six, phi0, left = DEGENERATE[name]
     found = []
     for side in (False, True) if left is None else (left,):
         for number in (1, 2):
             rows = np.array([[*six, phi0, number]], float)
             times = np.array([[-90.0, -2.0, 0.0, 0.1, 20.0]])
-            floats, turnings, status, heads = separatrix.trajectories(None, rows, times, 1e-10, False, side)
+            floats, turnings, status, heads = separatrix.trajectories(
+                None, rows, times, 1e-10, False, side
+            )
             if (status == OK).all() and abs(truth.slope(six, mp.mpf(heads[0, 0]))) < 1e-12:
                 found.append((rows, times, floats, turnings, heads))
     assert len(found) == 1
@@ -128,25 +154,40 @@ def test_degenerate_saddles(name):
         d, c23, s2, s3 = map(mp.mpf, six[2:])
 
         def V(x):
-            return d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+            return (
+                d / 2 * mp.sin(x) ** 2 + c23 / 2 * mp.sin(2 * x) - s2 * mp.sin(x) - s3 * mp.cos(x)
+            )
 
-        angle = mp.mpf(0) if "atan" not in name else mp.findroot(lambda x: mp.diff(V, x, 2), heads[0, 0])
+        angle = (
+            mp.mpf(0)
+            if "atan" not in name
+            else mp.findroot(lambda x: mp.diff(V, x, 2), heads[0, 0])
+        )
         w = mp.sign(heads[0, 2]) * mp.sqrt(2 * (V(angle) - V(mp.mpf(phi0))))
         assert abs(heads[0, 2] - w) <= heads[0, 3]
         for t, row in zip(times[0], floats[0], strict=True):
             wanted = exact(six, mp.mpf(phi0), w, t, 60, float_out=False)
-            assert all(abs(row[i] - wanted[i]) <= row[2 + i] + 1e-32 < 1e-12 for i in (0, 1)), (t, row, wanted)
+            assert all(abs(row[i] - wanted[i]) <= row[2 + i] + 1e-32 < 1e-12 for i in (0, 1)), (
+                t,
+                row,
+                wanted,
+            )
 
 
 def test_what_is_no_separatrix():
-    rows = np.array([[*GENERIC, 3.5, 3], [*GENERIC, 3.5, 1.5], [*GENERIC, 3.5, 1], [0.7, 0, 0, 0, 0, 0, 1, 1]], float)
+    rows = np.array(
+        [[*GENERIC, 3.5, 3], [*GENERIC, 3.5, 1.5], [*GENERIC, 3.5, 1], [0.7, 0, 0, 0, 0, 0, 1, 1]],
+        float,
+    )
     _f, _n, status, heads = separatrix.trajectories(None, rows, np.ones((4, 1)), 1e-10, True, True)
     assert (status == INVALID_PARAMETERS).all() and np.isnan(heads).all()
     fold = np.array([[0.7, -0.4, 1.1, 0.3, 0.3, -1.1, 0.5, 1]])  # g = g' = 0 at 0, and b is not 0
     status = separatrix.trajectories(None, fold, np.ones((1, 1)), 1e-10, False, False)[2]
     assert status[0, 0] == separatrix.DEGENERATE
     assert (
-        separatrix.trajectories(closed, rows[:1] * 0 + start(CASES["(61)"])[0], np.ones((1, 1)), 1e-10, False, False)[2]
+        separatrix.trajectories(
+            closed, rows[:1] * 0 + start(CASES["(61)"])[0], np.ones((1, 1)), 1e-10, False, False
+        )[2]
         == 19
     )
 
@@ -159,13 +200,19 @@ def test_other_methods_agree_within_both_bars(method, name):
     other, _n, fine, _heads = separatrix.trajectories(method, rows, TIMES, 1e-10, **how)
     good = fine == OK
     assert good.sum() > 3 and (good | (fine == NO_CONVERGENCE)).all()
-    assert (np.abs(mine - other)[good][:, :2] <= mine[good][:, 2:] + other[good][:, 2:] + 1e-15).all()
+    assert (
+        np.abs(mine - other)[good][:, :2] <= mine[good][:, 2:] + other[good][:, 2:] + 1e-15
+    ).all()
 
 
 def test_through_evaluate():
     ds = survey.evaluate("gyrostat", question="abel", saddle=2, separatrix="stable", side="left", phi0=3.5,
                          phi=np.array([2.0, 3.5, 4.0]), b12=0.7, b31=-0.4, d=1.1, c23=0.3, s2=0.5, s3=-0.2)  # fmt: skip
-    assert (ds.status == 0).all() and float(ds.w[1]) == float(ds.w_start[0]) and abs(float(ds.t[1])) < 1e-15
+    assert (
+        (ds.status == 0).all()
+        and float(ds.w[1]) == float(ds.w_start[0])
+        and abs(float(ds.t[1])) < 1e-15
+    )
     assert float(ds.phi_saddle[0]) == pytest.approx(4.65095, abs=1e-5) and "w0" not in ds
     with pytest.raises(survey.errors.BadInput, match="saddle"):
         survey.evaluate("gyrostat", question="trajectory", t=1.0, side="left")

@@ -1,4 +1,6 @@
-"""Fates of exact starts on separatrices, against long integration with SciPy and against the branches themselves."""
+"""Fates of exact starts on separatrices, against long integration with SciPy and against the
+branches themselves.
+"""
 
 import numpy as np
 import pytest
@@ -72,7 +74,9 @@ def test_a_stable_branch_ends_in_its_saddle(system):
 
 
 def test_without_friction_a_branch_comes_back_to_a_saddle():
-    """The pendulum g = -sin phi: from one saddle to its next copy; with a second well: back after one turning."""
+    """The pendulum g = -sin phi: from one saddle to its next copy; with a second well: back after
+    one turning.
+    """
     pendulum = {"b12": 0.0, "b31": 0.0, "d": 0.0, "c23": 0.0, "s2": 0.0, "s3": 1.0}
     for ds, _ in starts(pendulum, **UNSTABLE):
         assert (ds.status, ds.verdict, ds.turnings, ds.net_turns) == (0, 1, 0, 0)
@@ -88,6 +92,15 @@ def test_without_friction_a_branch_comes_back_to_a_saddle():
 
 def test_starts_beside_the_branch_are_refused():
     ds = survey.evaluate(
-        "gyrostat", question="fate", phi0=0.1, saddle=4, separatrix="stable", side="right", **SYSTEMS[0]
+        "gyrostat",
+        question="fate",
+        phi0=0.1,
+        saddle=4,
+        separatrix="stable",
+        side="right",
+        **SYSTEMS[0],
     )
-    assert ds.status.attrs["flag_meanings"].split()[int(ds.status)] == "invalid_parameters" or int(ds.verdict) == -1
+    assert (
+        ds.status.attrs["flag_meanings"].split()[int(ds.status)] == "invalid_parameters"
+        or int(ds.verdict) == -1
+    )

@@ -9,7 +9,14 @@ import numpy as np
 import pytest
 from flow_truth import exact, zeros_beside_a_focus
 
-from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, SEPARATRIX, TURNING, UNDETERMINED
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    SEPARATRIX,
+    TURNING,
+    UNDETERMINED,
+)
 from survey.measures.cylinder import auto, solution
 from survey.methods import closed, dop853, rk4, taylor
 
@@ -40,7 +47,10 @@ def in_phi(six, phi, w, places, solve=solution, rtol=1e-10):
 def solved_once(row, places):
     """floats and status by the Taylor series with steps of one tolerance."""
     P, starts = solution.split(row)
-    floats, status = np.full((1, places.size, 4), np.nan), np.zeros((1, places.size), dtype=np.int64)
+    floats, status = (
+        np.full((1, places.size, 4), np.nan),
+        np.zeros((1, places.size), dtype=np.int64),
+    )
     taylor.flow_abels(P, starts, places[None], 1e-13, solution.STEPS, floats, status)
     return floats, status
 
@@ -63,9 +73,13 @@ def cases(form):
 
 @pytest.mark.parametrize("case", cases("time"))
 def test_reference_in_time(case):
-    floats, _n, status = solution.trajectories(taylor, row_of(case), np.array([[float(case["t"])]]), 1e-10)
+    floats, _n, status = solution.trajectories(
+        taylor, row_of(case), np.array([[float(case["t"])]]), 1e-10
+    )
     assert status[0, 0] == OK
-    assert close(floats[0, 0, :2], floats[0, 0, 2:], np.array([float(case["phi"]), float(case["w"])]))
+    assert close(
+        floats[0, 0, :2], floats[0, 0, 2:], np.array([float(case["phi"]), float(case["w"])])
+    )
 
 
 @pytest.mark.parametrize("case", cases("abel"))
@@ -77,22 +91,32 @@ def test_reference_over_phi(case):
 
 @pytest.mark.parametrize("case", cases("turning"))
 def test_reference_turning_point(case):
-    """N2: the Abel solution ends at phi*; beyond it where and when it turned, before it w ~ sqrt(phi* - phi)."""
+    """N2: the Abel solution ends at phi*; beyond it where and when it turned, before it w ~
+    sqrt(phi* - phi).
+    """
     turning = float(case["phi_star"])
-    floats, status = solution.abel(taylor, row_of(case), np.array([[turning - 4e-11, turning + 1e-9, 6.0]]), 1e-10)
+    floats, status = solution.abel(
+        taylor, row_of(case), np.array([[turning - 4e-11, turning + 1e-9, 6.0]]), 1e-10
+    )
     assert status[0].tolist() == [OK, TURNING, TURNING]
     for row in floats[0, 1:]:
         assert close(row[:2], row[2:], np.array([turning, float(case["t_star"])]))
     wanted = math.sqrt(2 * 1.0374658223956445361 * 4e-11)
-    assert abs(floats[0, 0, 0] - wanted) < 1e-6 and abs(floats[0, 0, 0] - wanted) <= floats[0, 0, 2] + 2e-10
+    assert (
+        abs(floats[0, 0, 0] - wanted) < 1e-6
+        and abs(floats[0, 0, 0] - wanted) <= floats[0, 0, 2] + 2e-10
+    )
 
 
 def test_reference_separatrix():
-    """N1: just above the threshold the solution passes the saddle, just below it turns; at it nothing is claimed."""
+    """N1: just above the threshold the solution passes the saddle, just below it turns; at it
+    nothing is claimed.
+    """
     (case,) = (case for case in REFERENCE["abel_time"] if case["form"] == "separatrix")
     saddle, phi, w = (float(case[key]) for key in ("saddle", "phi", "w"))
     for gap in (1e-6, 1e-9, 1e-11, 1e-12):
-        solve = auto if gap < 1e-11 else solution  # nearer, only double-double arithmetic knows when it has passed
+        # nearer, only double-double arithmetic knows when it has passed
+        solve = auto if gap < 1e-11 else solution
         floats, status = in_phi(SIX, phi, w + gap, [saddle - 1e-3, saddle + 1.0], solve)
         assert status.tolist() == [OK, OK]
         floats, status = in_phi(SIX, phi, w - gap, [saddle - 1e-3, saddle + 1.0], solve)
@@ -105,8 +129,12 @@ def test_reference_separatrix():
 
 
 def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar():
-    """A pendulum from the bottom turns at pi/3: targets before and beyond, down to an ulp, together and alone."""
-    places = np.pi / 3 + np.concatenate([-(10.0 ** np.arange(-8, -16, -0.25)), 10.0 ** np.arange(-15.75, -8, 0.25)])
+    """A pendulum from the bottom turns at pi/3: targets before and beyond, down to an ulp, together
+    and alone.
+    """
+    places = np.pi / 3 + np.concatenate(
+        [-(10.0 ** np.arange(-8, -16, -0.25)), 10.0 ** np.arange(-15.75, -8, 0.25)]
+    )
     with mp.workdps(40):
         gaps = np.array([float(mp.mpf(x) - mp.pi / 3) for x in places])
         time = float(mp.ellipk(mp.mpf("0.25")))
@@ -114,7 +142,11 @@ def test_beside_a_turning_point_ok_is_certain_and_turning_holds_within_its_bar()
     for method in (taylor, dop853, rk4, closed):
         floats, status = (part[0] for part in solution.abel(method, row, places[None], 1e-10))
         reached, turned = status == OK, status == TURNING
-        assert reached.sum() > 10 and turned.sum() > 30 and np.isin(status, (OK, TURNING, NO_CONVERGENCE)).all()
+        assert (
+            reached.sum() > 10
+            and turned.sum() > 30
+            and np.isin(status, (OK, TURNING, NO_CONVERGENCE)).all()
+        )
         assert (gaps[reached] < 0).all() and turned[gaps > 1e-13].all()
         assert (np.abs(floats[turned, 0] - np.pi / 3) <= floats[turned, 2]).all()
         assert (np.abs(floats[turned, 1] - time) <= floats[turned, 3]).all()
@@ -143,7 +175,10 @@ def test_the_series_agree_with_mpmaths_own_integrator():
 
     def rates(_t, y):
         s, c = mp.sin(y[0]), mp.cos(y[0])
-        return [y[1], (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s]
+        return [
+            y[1],
+            (b12 * c - b31 * s) * y[1] - d * c * s - c23 * (c * c - s * s) + s2 * c - s3 * s,
+        ]
 
     assert mp.odefun(rates, 0, [phi, w])(0.5) == pytest.approx(exact(six, phi, w, 0.5), rel=1e-13)
 
@@ -164,7 +199,9 @@ def test_abel_and_time_agree():
     for _ in range(20):
         six, phi, w = random.normal(size=6), random.uniform(-3, 3), random.normal() * 3
         floats, status = in_phi(six, phi, w, phi + np.array([-2.0, -0.3, 0.4, 3.0]))
-        for place, row, code in zip(phi + np.array([-2.0, -0.3, 0.4, 3.0]), floats, status, strict=True):
+        for place, row, code in zip(
+            phi + np.array([-2.0, -0.3, 0.4, 3.0]), floats, status, strict=True
+        ):
             if code not in (OK, TURNING):
                 continue
             when = row[1]
@@ -172,7 +209,10 @@ def test_abel_and_time_agree():
             wanted = (place, row[0]) if code == OK else (row[0], 0.0)
             speed = np.array([abs(back[0, 0, 1]), 50.0])
             assert ok[0, 0] == OK
-            assert (np.abs(back[0, 0, :2] - wanted) <= 2 * (back[0, 0, 2:] + row[2] + speed * row[3]) + 1e-13).all()
+            assert (
+                np.abs(back[0, 0, :2] - wanted)
+                <= 2 * (back[0, 0, 2:] + row[2] + speed * row[3]) + 1e-13
+            ).all()
 
 
 def test_a_start_at_a_turning_point_goes_to_the_side_of_g():
@@ -204,12 +244,16 @@ def test_a_start_at_rest_beside_an_equilibrium_leaves_it():
     assert solution.abel(taylor, row, places, 1e-10)[1][0].tolist() == [SEPARATRIX, OK, SEPARATRIX]
     floats, status = auto.abel(taylor, row, places, 1e-10)
     assert status[0].tolist() == [OK, OK, TURNING]
-    with mp.workdps(90):  # a quarter of the libration, less what is left of it at phi = 1; 1 - k^2 is 4e-33
+    # a quarter of the libration, less what is left of it at phi = 1; 1 - k^2 is 4e-33
+    with mp.workdps(90):
         start = mp.mpf(math.pi)
         k = mp.sin(start / 2)
         time = mp.ellipk(k**2) - mp.ellipf(mp.asin(mp.sin(mp.mpf(1) / 2) / k), k**2)
         w = -mp.sqrt(2 * (mp.cos(1) - mp.cos(start)))
-    assert abs(floats[0, 0, 0] - w) <= floats[0, 0, 2] and abs(floats[0, 0, 1] - time) <= floats[0, 0, 3] < 1e-10
+    assert (
+        abs(floats[0, 0, 0] - w) <= floats[0, 0, 2]
+        and abs(floats[0, 0, 1] - time) <= floats[0, 0, 3] < 1e-10
+    )
 
 
 @pytest.mark.parametrize("method", [taylor, dop853])
@@ -224,33 +268,42 @@ def test_the_branch_before_is_where_the_motion_came_from(six, method):
         phi, speed = exact(six, 0.5, 0.0, t)
         assert abs(phi - place) <= speed * bar_t + 1e-15 and abs(speed - w) <= bar_w + 3 * bar_t
     plain = np.array([[*six, 0.5, 0.1]])
-    one, other = (solution.abel(method, plain, places, 1e-10, before=choice) for choice in (False, True))
+    one, other = (
+        solution.abel(method, plain, places, 1e-10, before=choice) for choice in (False, True)
+    )
     assert all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
 
 def test_closed_form_50():
-    """Case A is the reduced flow with F alone: phi' = (P sin + Q cos + n)/A11, so g = (n/A11) f with w = F + n/A11."""
+    """Case A is the reduced flow with F alone: phi' = (P sin + Q cos + n)/A11, so g = (n/A11) f
+    with w = F + n/A11.
+    """
     for case in REFERENCE["closed50"]:
         A11, theta, n = (float(case[key]) for key in ("A11", "theta0", "n"))
         P, Q = (float(case[key]) * math.sin(theta) / A11 for key in ("B12", "B31"))
         phi = float(case["phi0"])
         w = P * math.sin(phi) + Q * math.cos(phi) + n / A11
         floats, _n, _s = in_time((P, Q, 0, 0, 0, 0), phi, w, float(case["t"]))
-        assert close(floats[0, 0, :2], floats[0, 0, 2:], np.array([float(case["phi"]), float(case["w"])]))
+        assert close(
+            floats[0, 0, :2], floats[0, 0, 2:], np.array([float(case["phi"]), float(case["w"])])
+        )
 
 
 def test_closed_form_61():
     """(61) corrected: w = mu F + n."""
     for case in REFERENCE["trig61"]:
         mu, b12, b31, n, c23, d, s2, s3, phi0, phi1, t = (
-            float(case[key]) for key in ("mu", "b12", "b31", "n", "c23", "d", "s2", "s3", "phi0", "phi1", "t")
+            float(case[key])
+            for key in ("mu", "b12", "b31", "n", "c23", "d", "s2", "s3", "phi0", "phi1", "t")
         )
         w = mu * (b12 * math.sin(phi0) + b31 * math.cos(phi0)) + n
         six = (b12, b31, d, c23, s2, s3)
         floats, _n, _s = in_time(six, phi0, w, t)
         assert abs(floats[0, 0, 0] - float(case["phi_t"])) < 1e-10
         floats, _s = in_phi(six, phi0, w, phi1)
-        assert close(floats[0, :2], floats[0, 2:], np.array([float(case["w_phi1"]), float(case["t_phi1"])]))
+        assert close(
+            floats[0, :2], floats[0, 2:], np.array([float(case["w_phi1"]), float(case["t_phi1"])])
+        )
 
 
 def test_energy_balance():
@@ -270,7 +323,9 @@ def test_symmetries_S1_and_S2():
     times = np.tile([-3.0, 2.0], (10, 1))
     plain, _n, _s = solution.trajectories(taylor, row, times, 1e-10)
     back, _n, _s = solution.trajectories(taylor, solution.reverse(row), -times, 1e-10)
-    assert np.array_equal(plain[..., 0], back[..., 0]) and np.array_equal(plain[..., 1], -back[..., 1])
+    assert np.array_equal(plain[..., 0], back[..., 0]) and np.array_equal(
+        plain[..., 1], -back[..., 1]
+    )
     other, _n, _s = solution.trajectories(taylor, solution.mirror(row), times, 1e-10)
     assert np.array_equal(plain[..., :2], -other[..., :2])
 
@@ -285,7 +340,9 @@ def test_turnings_of_a_pendulum():
 
 @pytest.mark.parametrize("six", [SIX, (0.4, 0.3, -0.9, 0.7, 1.1, 0.6)])
 def test_turnings_far_into_a_focus_are_told(six):
-    """Where w is far below rounding, down to e^-400, they are counted about the focus in polar coordinates."""
+    """Where w is far below rounding, down to e^-400, they are counted about the focus in polar
+    coordinates.
+    """
     times = np.array([10.0, 100.0, 333.0, 1000.0])
     _f, turnings, _s = in_time(six, 2.5, 0.1, times)
     assert turnings[0].tolist() == zeros_beside_a_focus(six, 2.5, 0.1, times)
@@ -333,5 +390,7 @@ def test_rows_that_no_closed_form_serves_have_the_same_bits_among_those_that_one
     for measure, columns in ((auto.trajectories, times), (auto.abel, targets)):
         among = measure(taylor, rows, columns, 1e-10)
         for i in own:
-            for part, alone in zip(among, measure(taylor, rows[i : i + 1], columns[i : i + 1], 1e-10), strict=True):
+            for part, alone in zip(
+                among, measure(taylor, rows[i : i + 1], columns[i : i + 1], 1e-10), strict=True
+            ):
                 np.testing.assert_array_equal(part[i], alone[0])

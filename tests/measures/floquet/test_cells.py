@@ -16,7 +16,9 @@ WORKFLOWS = Path(survey.__file__).parents[1] / "workflows"
 
 
 def ran(scene, path, width, **axes):
-    table = {k: {"start": v[0], "stop": v[1], "num": 3} if np.ndim(v) else v for k, v in axes.items()}
+    table = {
+        k: {"start": v[0], "stop": v[1], "num": 3} if np.ndim(v) else v for k, v in axes.items()
+    }
     job = {"scene": scene, "axes": table, "refine": {"width": width}, "output": {"figures": []}}
     return survey.run(job, output=path / f"{len(list(path.iterdir()))}.nc").load()
 
@@ -45,7 +47,9 @@ def damping(t, p, out):
 
 def margin(a, q, c):
     """Where Mathieu's equation with the damping c is stable: |discriminant| < 2 cosh(c pi)."""
-    known = survey.evaluate("mathieu", a=xr.DataArray(a - c * c, dims="i"), q=xr.DataArray(q, dims="i"), rtol=1e-12)
+    known = survey.evaluate(
+        "mathieu", a=xr.DataArray(a - c * c, dims="i"), q=xr.DataArray(q, dims="i"), rtol=1e-12
+    )
     return 2 * math.cosh(c * math.pi) - abs(known.discriminant.values)
 
 
@@ -55,13 +59,17 @@ def inside(ds, random, *names):
     assert {0, 1} <= set(ds.cell_verdict.values[decided]) and (ds.area_fraction_error < 0.06).all()
     part = random.uniform(0.0, 1.0, (len(names), decided.sum()))
     ends = [[ds[f"cell_{name}_{end}"].values[decided] for end in ("low", "high")] for name in names]
-    return [low + (high - low) * p for (low, high), p in zip(ends, part, strict=True)], ds.cell_verdict.values[decided]
+    return [
+        low + (high - low) * p for (low, high), p in zip(ends, part, strict=True)
+    ], ds.cell_verdict.values[decided]
 
 
 def test_points_of_decided_cells_have_their_verdict(tmp_path):
     """By the closed form of the damped equation, at three random points of every cell."""
     ds = ran(mathieu(0.12), tmp_path, 0.01, a=(-1.0, 6.0), q=(0.0, 3.0))
-    coupled = survey.floquet(K=spring, C=damping, period=math.pi, parameters=("a", "q"), states=("x", "y"))
+    coupled = survey.floquet(
+        K=spring, C=damping, period=math.pi, parameters=("a", "q"), states=("x", "y")
+    )
     four = ran(coupled, tmp_path, 0.015, a=(0.2, 5.0), q=(0.0, 2.0))
     random = np.random.default_rng(4)
     for _ in range(3):
@@ -89,12 +97,16 @@ def test_two_oscillators(tmp_path):
     ds = ran(scene, tmp_path, 0.01, Omega=(0.8, 1.6), epsilon=(0.02, 0.4))
     (Omega, epsilon), verdict = inside(ds, np.random.default_rng(5), "Omega", "epsilon")
     points = {"Omega": xr.DataArray(Omega, dims="i"), "epsilon": xr.DataArray(epsilon, dims="i")}
-    np.testing.assert_array_equal(survey.evaluate(scene, method="dop853", **points).verdict.values, verdict)
+    np.testing.assert_array_equal(
+        survey.evaluate(scene, method="dop853", **points).verdict.values, verdict
+    )
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
 def test_signs_of_margins_without_structure(n):
-    """All are positive where the spectral radius is below 1, one is negative where it is above; bounds hold."""
+    """All are positive where the spectral radius is below 1, one is negative where it is above;
+    bounds hold.
+    """
     random = np.random.default_rng(n)
     M = random.standard_normal((2000, n, n))
     radius = abs(np.linalg.eigvals(M)).max(axis=1)
@@ -124,7 +136,11 @@ def test_signs_of_margins_of_symplectic_matrices(m):
     M = np.zeros((400, 2 * m, 2 * m))
     for k in range(400):
         A = random.standard_normal((2 * m, 2 * m))
-        c = np.poly(np.concatenate([values[k], values[k].conj() if m > 1 or not loses[k] else 1 / values[k]])).real
+        c = np.poly(
+            np.concatenate(
+                [values[k], values[k].conj() if m > 1 or not loses[k] else 1 / values[k]]
+            )
+        ).real
         companion = np.eye(2 * m, k=-1)
         companion[0] = -c[1:]
         M[k] = A @ companion @ np.linalg.inv(A)
@@ -146,13 +162,22 @@ def test_where_there_are_none():
     axes = {"a": {"start": 0.1, "stop": 1.0, "num": 3}, "b": {"start": 0.1, "stop": 1.0, "num": 3}}
     given = {"period": 2 * math.pi, "parameters": ("a", "b"), "states": ("x", "y")}
     cases = [
-        (survey.floquet(K=branching, **given | {"states": "x"}), "a branch of the code depends on one"),
+        (
+            survey.floquet(K=branching, **given | {"states": "x"}),
+            "a branch of the code depends on one",
+        ),
         (survey.floquet(A, **given, conserved=(0.0, 1.0)), "CONSERVED, where a multiplier is 1"),
-        (survey.floquet(A, **given | {"states": tuple(f"x{k}" for k in range(13))}), "up to 12 states, not of 13"),
+        (
+            survey.floquet(A, **given | {"states": tuple(f"x{k}" for k in range(13))}),
+            "up to 12 states, not of 13",
+        ),
     ]
     for scene, words in cases:
         with pytest.raises(BadInput, match=words):
             check({"scene": scene, "axes": axes, "refine": {"width": 0.1}})
-    duffing = {"omega": {"start": 1.0, "stop": 2.0, "num": 3}, "F": {"start": 0.1, "stop": 0.2, "num": 3}}
+    duffing = {
+        "omega": {"start": 1.0, "stop": 2.0, "num": 3},
+        "F": {"start": 0.1, "stop": 0.2, "num": 3},
+    }
     with pytest.raises(BadInput, match="not of periodic orbits"):
         check({"scene": str(WORKFLOWS / "duffing.py"), "axes": duffing, "refine": {"width": 0.1}})

@@ -77,7 +77,12 @@ def test_duffings_three_orbits_against_scipy():
 
 def test_cycles_round_their_fold_in_closed_form():
     system = survey.orbit(
-        cycles, states=("x", "y"), parameters="m", period=None, start=(1.1, 0.0, 4.2), continuation=("m", -0.5, 0.4)
+        cycles,
+        states=("x", "y"),
+        parameters="m",
+        period=None,
+        start=(1.1, 0.0, 4.2),
+        continuation=("m", -0.5, 0.4),
     )
     m = np.array([-0.4, -0.26, -0.2499, -0.2, -0.1, -0.03, 0.2])
     ds = survey.evaluate(system, m=m, branch=[1.0, 2.0])
@@ -107,7 +112,9 @@ def test_bits_depend_on_no_grid():
     for i, j, k in ((0, 0, 0), (1, 3, 2), (2, 8, 0), (1, 4, 1)):
         one = survey.evaluate(scene(), F=F[i], w=w[j], branch=k + 1.0)
         for name in whole.data_vars:
-            assert np.array_equal(whole[name].isel(F=i, w=j, branch=k).values, one[name].values, equal_nan=True), name
+            assert np.array_equal(
+                whole[name].isel(F=i, w=j, branch=k).values, one[name].values, equal_nan=True
+            ), name
 
 
 def test_branches_that_are_no_numbers():
@@ -116,7 +123,9 @@ def test_branches_that_are_no_numbers():
     assert np.array_equal(ds.orbits, [3, np.nan, 3], equal_nan=True)
 
 
-@pytest.mark.parametrize("given", [("k", 0.0, 1.0), ("w", 2.0, 1.0), ("w", 0.0), "w", ("w", 0.0, math.inf), 3.0])
+@pytest.mark.parametrize(
+    "given", [("k", 0.0, 1.0), ("w", 2.0, 1.0), ("w", 0.0), "w", ("w", 0.0, math.inf), 3.0]
+)
 def test_bad_ranges(given):
     with pytest.raises(survey.BadInput, match="continuation") as caught:
         scene(continuation=given)

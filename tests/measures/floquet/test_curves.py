@@ -21,7 +21,9 @@ from survey.sweep import boundaries
 
 def found(scene, **axes):
     """The dataset of the curves; of a pair of numbers the ends of an axis."""
-    table = {k: {"start": v[0], "stop": v[1], "num": 3} if np.ndim(v) else v for k, v in axes.items()}
+    table = {
+        k: {"start": v[0], "stop": v[1], "num": 3} if np.ndim(v) else v for k, v in axes.items()
+    }
     return boundaries.find(check({"scene": scene, "axes": table, "boundaries": {}}))
 
 
@@ -43,8 +45,12 @@ def all_of(parts):
 
 
 def assert_zero_within(function, x, errors):
-    """function((m, 2)) takes both signs within the errors of the points x (m, 2): along one axis or the other."""
-    values = np.array([[function(x + side * errors * axis) for side in (-1, 1)] for axis in ([1, 0], [0, 1])])
+    """function((m, 2)) takes both signs within the errors of the points x (m, 2): along one axis or
+    the other.
+    """
+    values = np.array(
+        [[function(x + side * errors * axis) for side in (-1, 1)] for axis in ([1, 0], [0, 1])]
+    )
     assert ((values[:, 0] * values[:, 1] <= 0).any(axis=0)).all()
 
 
@@ -55,7 +61,11 @@ def mathieu(structure):
     def C(t, p, out):
         out[0, 0] = 2 * p[2]
 
-    more = {"parameters": ("a", "q")} if structure == "symplectic" else {"parameters": ("a", "q", "c"), "C": C}
+    more = (
+        {"parameters": ("a", "q")}
+        if structure == "symplectic"
+        else {"parameters": ("a", "q", "c"), "C": C}
+    )
     return survey.floquet(K=K, period=math.pi, states="x", structure=structure, **more)
 
 
@@ -68,14 +78,17 @@ def test_mathieus_tongues():
     for kind, known in (("plus_one", (0, 2)), ("minus_one", (1,))):
         x, errors = all_of(curves(ds, kind, *square))
         a, q = x.T
-        values = np.array([f(n, q) for n in known for f in (mathieu_a, mathieu_b) if n or f is mathieu_a])
+        values = np.array(
+            [f(n, q) for n in known for f in (mathieu_a, mathieu_b) if n or f is mathieu_a]
+        )
         off = abs(values - a).min(axis=0)
-        # SciPy's values have 14 digits, near q = 0 12 (next test); near by the slope of a curve is that of its
-        # neighbours on the map
+        # SciPy's values have 14 digits, near q = 0 12 (next test); near by the slope of a curve is
+        # that of its neighbours on the map
         slope = abs(np.gradient(values, axis=1) / np.gradient(q)).max()
         assert np.median(off) < 1e-12
         assert (off <= errors[:, 0] + slope * errors[:, 1] + np.where(q < 0.01, 2e-12, 1e-13)).all()
-        # each curve is drawn over the map, into the tip of its tongue, which for n = 2 is 1e-7 wide there
+        # each curve is drawn over the map, into the tip of its tongue, which for n = 2 is 1e-7 wide
+        # there
         for row in values:
             near = abs(row - a) < 1e-9
             inside = q[near]
@@ -83,24 +96,34 @@ def test_mathieus_tongues():
 
 
 def test_both_edges_of_a_tip():
-    """Points of Mathieu's tongues at small q, by the series of DLMF 28.6.1 to q^4, whose rest is below 1e-15 here."""
+    """Points of Mathieu's tongues at small q, by the series of DLMF 28.6.1 to q^4, whose rest is
+    below 1e-15 here.
+    """
     ds = found(mathieu("symplectic"), a=(0.9, 4.1), q=(0.0, 0.3))
     square = [("a", 0.9, 4.1), ("q", 0.0, 0.3)]
     edges = {
-        "minus_one": [lambda q, s=s: 1 + s * q - q**2 / 8 - s * q**3 / 64 - q**4 / 1536 for s in (1, -1)],
-        "plus_one": [lambda q: 4 + 5 * q**2 / 12 - 763 * q**4 / 13824, lambda q: 4 - q**2 / 12 + 5 * q**4 / 13824],
+        "minus_one": [
+            lambda q, s=s: 1 + s * q - q**2 / 8 - s * q**3 / 64 - q**4 / 1536 for s in (1, -1)
+        ],
+        "plus_one": [
+            lambda q: 4 + 5 * q**2 / 12 - 763 * q**4 / 13824,
+            lambda q: 4 - q**2 / 12 + 5 * q**4 / 13824,
+        ],
     }
     for kind, known in edges.items():
         x, errors = all_of(curves(ds, kind, *square))
         (a, q), tip = x.T, x[:, 1] < 2e-3
         off = np.array([abs(edge(q) - a) for edge in known])[:, tip]
         assert (off.min(axis=0) <= errors[tip].sum(axis=1) + 2e-15).all()
-        assert (off.argmin(axis=0) == 0).sum() > 1 and (off.argmin(axis=0) == 1).sum() > 1  # either edge
+        # either edge
+        assert (off.argmin(axis=0) == 0).sum() > 1 and (off.argmin(axis=0) == 1).sum() > 1
         assert q.min() < 1e-3
 
 
 def test_damped_mathieus_tongues():
-    """Multipliers exp(-c pi) times Mathieu's at a - c^2 are 1 or -1 where its discriminant is 2 cosh(c pi)."""
+    """Multipliers exp(-c pi) times Mathieu's at a - c^2 are 1 or -1 where its discriminant is 2
+    cosh(c pi).
+    """
     axes, c = (("a", -0.5, 5.0), ("q", 0.0, 4.0)), 0.12
     ds = found(mathieu("none"), a=(-0.5, 5.0), q=(0.0, 4.0), c=c)
     assert set(ds.curve_class.values) == {CLASSES["plus_one"], CLASSES["minus_one"]}
@@ -123,14 +146,20 @@ def test_meissners_tongues():
     def K(t, p, out):
         out[0, 0] = p[0] + (p[1] if t < 1.0 else -p[1])
 
-    scene = survey.floquet(K=K, period=2.5, parameters=("a", "b"), states="x", breaks=1.0, structure="symplectic")
+    scene = survey.floquet(
+        K=K, period=2.5, parameters=("a", "b"), states="x", breaks=1.0, structure="symplectic"
+    )
     ds = found(scene, a=(1.0, 9.0), b=(0.0, 0.9))
     for kind, goal in (("plus_one", 2), ("minus_one", -2)):
         x, errors = all_of(curves(ds, kind, ("a", 1.0, 9.0), ("b", 0.0, 0.9)))
 
         def off(x, goal=goal):
             p, q = np.sqrt(x[:, 0] + x[:, 1]), np.sqrt(x[:, 0] - x[:, 1])
-            return 2 * np.cos(p) * np.cos(1.5 * q) - (p / q + q / p) * np.sin(p) * np.sin(1.5 * q) - goal
+            return (
+                2 * np.cos(p) * np.cos(1.5 * q)
+                - (p / q + q / p) * np.sin(p) * np.sin(1.5 * q)
+                - goal
+            )
 
         assert len(x) > 20 and np.median(errors) < 1e-11
         assert_zero_within(off, x, errors + 1e-14)
@@ -143,9 +172,12 @@ def test_mass_filter():
         out[0, 0] = p[0] - 2 * p[1] * math.cos(2 * t)
         out[1, 1] = -out[0, 0]
 
-    scene = survey.floquet(K=K, period=math.pi, parameters=("a", "q"), states=("x", "y"), structure="symplectic")
+    scene = survey.floquet(
+        K=K, period=math.pi, parameters=("a", "q"), states=("x", "y"), structure="symplectic"
+    )
     ds = found(scene, a=(-0.3, 0.31), q=(0.3, 1.0))
-    assert set(ds.curve_class.values) == {CLASSES["plus_one"], CLASSES["minus_one"]}  # the s meet, but never collide
+    # the s meet, but never collide
+    assert set(ds.curve_class.values) == {CLASSES["plus_one"], CLASSES["minus_one"]}
     x, errors = all_of(curves(ds, "minus_one", ("a", -0.3, 0.31), ("q", 0.3, 1.0)))
     known = mathieu_b(1, x[:, 1])
     off = np.minimum(abs(x[:, 0] - known), abs(x[:, 0] + known))
@@ -168,7 +200,9 @@ def danby():
         out[3, 1], out[3, 2] = 1.5 * (1 - s) * r - 1.0, -1.0
 
     states = ("xi", "eta", "X", "Y")
-    return survey.floquet(A, period=2 * math.pi, parameters=("mu", "e"), states=states, structure="symplectic")
+    return survey.floquet(
+        A, period=2 * math.pi, parameters=("mu", "e"), states=states, structure="symplectic"
+    )
 
 
 @pytest.mark.slow
@@ -196,13 +230,17 @@ def test_danbys_curves():
 
 
 def circle(t, p, out):
-    """A complex pair of growth x^2 + y^2 - 1/4, real multipliers with (x - 0.2) / 2 and -0.1, in turning axes."""
+    """A complex pair of growth x^2 + y^2 - 1/4, real multipliers with (x - 0.2) / 2 and -0.1, in
+    turning axes.
+    """
     x, y = p
     B = np.zeros((4, 4), dtype=object)
     B[0, 0] = B[1, 1] = x * x + y * y - 0.25
     B[0, 1], B[1, 0] = 0.3, -0.3
     B[2, 2], B[3, 3], B[2, 3] = 0.5 * (x - 0.2), -0.1, 0.7
-    mixed = np.array([[2.0, 1.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0], [1.0, 0.0, 2.0, 0.0], [0.0, 1.0, 0.0, 1.0]])
+    mixed = np.array(
+        [[2.0, 1.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0], [1.0, 0.0, 2.0, 0.0], [0.0, 1.0, 0.0, 1.0]]
+    )
     R = np.zeros((4, 4), dtype=object)
     for k in (0, 2):
         R[k, k] = R[k + 1, k + 1] = math.cos(t)
@@ -228,7 +266,8 @@ def test_neimark_sacker():
     assert (ds.curve_outside.values[points] == (x[:, 0] > 0.2)).all()
     off = abs(ds.curve_angle.values[points] - 0.3 * PERIOD)
     assert (off <= ds.curve_angle_error.values[points]).all()
-    # the line x = 0.2, where a real multiplier is 1; at x = 0.4 two are l and 1 / l, and nothing passes
+    # the line x = 0.2, where a real multiplier is 1; at x = 0.4 two are l and 1 / l, and nothing
+    # passes
     line, errors = all_of(curves(ds, "plus_one", *axes))
     assert (abs(line[:, 0] - 0.2) <= errors[:, 0]).all()
     assert line[:, 1].min() == -0.6 and line[:, 1].max() == 0.7
@@ -247,11 +286,15 @@ def test_gyroscopic_stabilisation():
         out[0, 1], out[1, 0] = -2 * p[0], 2 * p[0]
 
     parameters, states = ("g", "a"), ("x", "y", "z")
-    scene = survey.floquet(K=K, C=C, period=period, parameters=parameters, states=states, structure="symplectic")
+    scene = survey.floquet(
+        K=K, C=C, period=period, parameters=parameters, states=states, structure="symplectic"
+    )
     axes = (("g", 0.2, 1.2), ("a", -0.3, 0.9))
     ds = found(scene, g=axes[0][1:], a=axes[1][1:])
     [(x, errors)] = curves(ds, "collision", *axes)
-    assert_zero_within(lambda p: 2 * p[:, 0] - np.sqrt(abs(p[:, 1])) - math.sqrt(b), x, errors + 1e-16)
+    assert_zero_within(
+        lambda p: 2 * p[:, 0] - np.sqrt(abs(p[:, 1])) - math.sqrt(b), x, errors + 1e-16
+    )
     assert x[:, 1].min() < 0.03 and x[:, 1].max() == 0.9
     points = np.repeat(ds.curve_class.values == CLASSES["collision"], ds.curve_count.values)
     assert (ds.curve_outside.values[points] == 0).all()
@@ -274,7 +317,9 @@ def test_bounds_of_determinants(n, rank):
     value, bar = determinant(A, E)
     for k in range(200):
         with mp.workdps(60):
-            size = mp.sqrt(mp.det(mp.eye(n) + mp.matrix(A[k].T.tolist()) * mp.matrix(A[k].tolist())))
+            size = mp.sqrt(
+                mp.det(mp.eye(n) + mp.matrix(A[k].T.tolist()) * mp.matrix(A[k].tolist()))
+            )
             exact, other = (mp.det(mp.matrix(X[k].tolist())) / size for X in (A, near))
             assert max(abs(exact - value[k]), abs(other - value[k])) <= bar[k] * (1 + 1e-9)
     assert np.median(bar) < 1e-5
@@ -293,7 +338,8 @@ def test_conserved_quantities_and_three_axes():
     assert set(ds.curve_class.values) == {CLASSES["minus_one"]}
     tips = [float(ds.curve_q.values[ds.curve_c.values == c].min()) for c in (0.1, 0.2, 0.3)]
     assert tips == pytest.approx([0.4, 0.8, 1.2], rel=0.03)
-    assert np.isnan(ds.curve_outside.values).all()  # a multiplier at 1 is neither outside nor inside
+    # a multiplier at 1 is neither outside nor inside
+    assert np.isnan(ds.curve_outside.values).all()
 
 
 def test_on_one_axis_there_are_edges():

@@ -1,4 +1,6 @@
-"""Dense maps by series: the same answers as point by point, and exact ones within the bars, from few points solved."""
+"""Dense maps by series: the same answers as point by point, and exact ones within the bars, from
+few points solved.
+"""
 
 import math
 
@@ -34,7 +36,9 @@ def mathieu(kind):
         out[0, 0] = 0.1
 
     more = {"C": C} if kind == "none" else {}
-    return survey.floquet(K=K, **more, period=math.pi, parameters=("a", "q"), states="x", structure=kind)
+    return survey.floquet(
+        K=K, **more, period=math.pi, parameters=("a", "q"), states="x", structure=kind
+    )
 
 
 @pytest.fixture
@@ -62,7 +66,10 @@ MAPS = {
 @pytest.mark.parametrize("name", MAPS)
 def test_a_map_agrees_with_its_points(name, solved, monkeypatch):
     scene, ends = MAPS[name]
-    axes = {key: np.linspace(*pair, num) for (key, pair), num in zip(ends.items(), (90, 70), strict=True)}
+    axes = {
+        key: np.linspace(*pair, num)
+        for (key, pair), num in zip(ends.items(), (90, 70), strict=True)
+    }
     on_map = survey.evaluate(scene, **axes)
     assert solved[0] < 0.35 * 90 * 70
     monkeypatch.setattr(dense, "serves", lambda *given: False)
@@ -71,10 +78,16 @@ def test_a_map_agrees_with_its_points(name, solved, monkeypatch):
     on_map = on_map.sel(rows)
     for output in ("verdict", "crossing", "krein"):
         if output in on_map:
-            known = (on_map[output] >= 0) & (alone[output] >= 0) if output != "krein" else on_map[output] > -2
+            known = (
+                (on_map[output] >= 0) & (alone[output] >= 0)
+                if output != "krein"
+                else on_map[output] > -2
+            )
             assert (on_map[output] == alone[output]).where(known, True).all()
     assert (on_map.verdict >= 0).mean() > 0.98
-    found, other = (ds.multiplier_re.values + 1j * ds.multiplier_im.values for ds in (on_map, alone))
+    found, other = (
+        ds.multiplier_re.values + 1j * ds.multiplier_im.values for ds in (on_map, alone)
+    )
     bars = on_map.multiplier_re_error.values + alone.multiplier_re_error.values
     apart = abs(found[..., :, None] - other[..., None, :]) <= bars[..., :, None] * (1 + 1e-12)
     assert apart.any(axis=-1).all() and apart.any(axis=-2).all()
@@ -97,7 +110,10 @@ def test_exact_multipliers_of_a_map(n, rtol, solved):
         own[0, 0], own[0, 1] = axes["b0"][i], axes["b1"][j]
         exact, one = multipliers(own), ds.isel(b0=i, b1=j)
         for re, im, bar in zip(
-            one.multiplier_re.values, one.multiplier_im.values, one.multiplier_re_error.values, strict=True
+            one.multiplier_re.values,
+            one.multiplier_im.values,
+            one.multiplier_re_error.values,
+            strict=True,
         ):
             off = min(abs(mpmath.mpc(float(re), float(im)) - value) for value in exact)
             worst = max(worst, float(off) / float(bar))
@@ -129,7 +145,10 @@ def test_one_axis_and_third_axes(solved):
     known = survey.evaluate("mathieu", a=(a[:, None] - c * c).ravel(), q=q[17])
     exponent = known.exponent.values.reshape(70, 3) / math.pi - c
     off = abs(cube.exponent.values[:, 17] - exponent)
-    assert (off <= cube.exponent_error.values[:, 17] + known.exponent_error.values.reshape(70, 3) + 1e-13).all()
+    assert (
+        off
+        <= cube.exponent_error.values[:, 17] + known.exponent_error.values.reshape(70, 3) + 1e-13
+    ).all()
 
 
 def test_bits_do_not_depend_on_the_block():
@@ -140,7 +159,11 @@ def test_bits_do_not_depend_on_the_block():
     wanted = {"multiplier_re", "spectral_radius", "verdict", "crossing"}
     given = ("auto", 1e-10, wanted, lines)
     whole = stability.solve(scene._system, "none", points, *given)
-    for rows, columns in ((slice(0, 1), slice(0, 50)), (slice(11, 37), slice(5, 6)), (slice(60, 80), slice(3, 41))):
+    for rows, columns in (
+        (slice(0, 1), slice(0, 50)),
+        (slice(11, 37), slice(5, 6)),
+        (slice(60, 80), slice(3, 41)),
+    ):
         part = stability.solve(scene._system, "none", points[rows, columns], *given)
         for name, values in part.items():
             assert values.tobytes() == np.ascontiguousarray(whole[name][rows, columns]).tobytes()
@@ -150,7 +173,9 @@ def test_branches_on_parameters_are_solved_point_by_point(solved):
     def K(t, p, out):
         out[0, 0] = 1.0 + abs(p[0]) + p[1] * math.cos(2 * t)
 
-    scene = survey.floquet(K=K, period=math.pi, parameters=("a", "b"), states="x", structure="symplectic")
+    scene = survey.floquet(
+        K=K, period=math.pi, parameters=("a", "b"), states="x", structure="symplectic"
+    )
     survey.evaluate(scene, a=np.linspace(-1.0, 1.0, 41), b=np.linspace(0.0, 0.5, 40))
     assert solved[0] >= 41 * 40
 
@@ -159,7 +184,9 @@ def test_branches_on_parameters_are_solved_point_by_point(solved):
 def test_scattered_points_agree_with_points_on_their_own(name, solved, monkeypatch):
     scene, ends = MAPS[name]
     rng = np.random.default_rng(5)
-    values = {key: xr.DataArray(rng.uniform(*pair, 12_000), dims="point") for key, pair in ends.items()}
+    values = {
+        key: xr.DataArray(rng.uniform(*pair, 12_000), dims="point") for key, pair in ends.items()
+    }
     together = survey.evaluate(scene, **values)
     assert solved[0] < 0.5 * 12_000
     assert together.attrs["accuracy_missed"] == 0
@@ -171,7 +198,9 @@ def test_scattered_points_agree_with_points_on_their_own(name, solved, monkeypat
     for output in ("verdict", "crossing"):
         known = (together[output] >= 0) & (alone[output] >= 0)
         assert (together[output] == alone[output]).where(known, True).all()
-    found, other = (ds.multiplier_re.values + 1j * ds.multiplier_im.values for ds in (together, alone))
+    found, other = (
+        ds.multiplier_re.values + 1j * ds.multiplier_im.values for ds in (together, alone)
+    )
     bars = together.multiplier_re_error.values + alone.multiplier_re_error.values
     apart = abs(found[..., :, None] - other[..., None, :]) <= bars[..., :, None] * (1 + 1e-12)
     assert apart.any(axis=-1).all() and apart.any(axis=-2).all()

@@ -1,4 +1,6 @@
-"""Half or a quarter of a period: which symmetries in t are found, and what follows from them, against exact answers."""
+"""Half or a quarter of a period: which symmetries in t are found, and what follows from them,
+against exact answers.
+"""
 
 import math
 
@@ -28,7 +30,9 @@ def oscillators(modulation, damping=0.0, coupling=lambda t, p: 0.0):
 
 
 def points_of(A, period, p=(0.3, 0.1), n=4, breaks=()):
-    return monodromy.Points(System({"A": A}, n, period, breaks, False), np.atleast_2d(np.array(p, float)), halves=True)
+    return monodromy.Points(
+        System({"A": A}, n, period, breaks, False), np.atleast_2d(np.array(p, float)), halves=True
+    )
 
 
 def parts(points):
@@ -73,7 +77,9 @@ def test_what_follows_from_a_part_agrees_with_the_whole_period_and_has_no_wider_
     p = np.random.default_rng(1).uniform(0.2, 1.5, (30, 2))
     system, those, factor = System({"A": A}, 4, period, (), False), np.arange(30), np.full(30, 2.0)
     part, whole = (
-        monodromy.solve(monodromy.Points(system, p, halves=each), AUTO, 1e-13, factor, those, sharp=False)
+        monodromy.solve(
+            monodromy.Points(system, p, halves=each), AUTO, 1e-13, factor, those, sharp=False
+        )
         for each in (True, False)
     )
     assert (part.M != whole.M).any()
@@ -101,13 +107,18 @@ def test_points_without_damping_are_told_from_those_with_it():
     assert found == {(0, 2): [1], (1, 3): [2]}
     together = monodromy.solve(points, AUTO, 1e-10, np.ones(4), np.arange(4), sharp=True)
     for k in range(4):
-        alone = monodromy.solve(points_of(A, T, p[k]), AUTO, 1e-10, np.ones(1), np.zeros(1, int), sharp=True)
+        alone = monodromy.solve(
+            points_of(A, T, p[k]), AUTO, 1e-10, np.ones(1), np.zeros(1, int), sharp=True
+        )
         assert (alone.M[0] == together.M[k]).all() and (alone.E[0] == together.E[k]).all()
 
 
 def test_each_piece_between_breaks_has_a_symmetry_of_its_own():
     def A(t, p, out):
-        out[0, 1], out[1, 0] = 1.0, -1.0 - (p[0] * math.cos(4 * t) if t < math.pi else p[0] * math.cos(t + p[1]))
+        out[0, 1], out[1, 0] = (
+            1.0,
+            -1.0 - (p[0] * math.cos(4 * t) if t < math.pi else p[0] * math.cos(t + p[1])),
+        )
 
     points = points_of(A, T, n=2, breaks=(math.pi,))
     assert parts(points) == [4, 1]
@@ -128,14 +139,19 @@ def test_another_method_integrates_the_whole_period():
 
 
 def reversible(n, number, seed):
-    """Matrices B (number, n, n) with R B R = -B, R = (1, -1, 1, -1, ...): oscillating, growing, nearly defective."""
+    """Matrices B (number, n, n) with R B R = -B, R = (1, -1, 1, -1, ...): oscillating, growing,
+    nearly defective.
+    """
     rng = np.random.default_rng(seed)
     B = np.zeros((number, n, n))
     for k in range(number):
         size = 10.0 ** rng.uniform(-1.5, 0.5)
         one, two = size * rng.normal(size=(2, n // 2, n // 2))
         if k % 3 == 0:  # squares of frequencies that nearly meet
-            one, two = size * np.eye(n // 2), -size * (np.eye(n // 2) + np.triu(np.ones((n // 2, n // 2)), 1))
+            one, two = (
+                size * np.eye(n // 2),
+                -size * (np.eye(n // 2) + np.triu(np.ones((n // 2, n // 2)), 1)),
+            )
             two -= size * np.diag(10.0 ** rng.uniform(-12, -6, n // 2))
         B[k, ::2, 1::2], B[k, 1::2, ::2] = one, two
     return B
@@ -158,13 +174,19 @@ def check_reversible(n, number, seed):
     for k, exact in enumerate(map(multipliers, B)):
         B[k] /= max(1.0, math.log10(float(max(abs(x) for x in exact))) / 8)
     ds = evaluated(n, B)
-    found, bars = ds.multiplier_re.values + 1j * ds.multiplier_im.values, ds.multiplier_re_error.values
+    found, bars = (
+        ds.multiplier_re.values + 1j * ds.multiplier_im.values,
+        ds.multiplier_re_error.values,
+    )
     decided = 0
     for k, exact in enumerate(map(multipliers, B)):
         radius = max(abs(value) for value in exact)
-        assert int(ds.status[k]) == 0 and int(ds.verdict[k]) in (-1, 0)  # stable is never certain without a structure
+        # stable is never certain without a structure
+        assert int(ds.status[k]) == 0 and int(ds.verdict[k]) in (-1, 0)
         assert abs(radius - float(ds.spectral_radius[k])) <= float(ds.spectral_radius_error[k])
-        off = np.array([[float(abs(mpmath.mpmathify(complex(x)) - y)) for y in exact] for x in found[k]])
+        off = np.array(
+            [[float(abs(mpmath.mpmathify(complex(x)) - y)) for y in exact] for x in found[k]]
+        )
         beyond = ~(off <= bars[k][:, None])
         assert not beyond[linear_sum_assignment(beyond)].any()
         assert not (radius - 1 > 1e-3 and k % 3 and int(ds.verdict[k]) < 0)

@@ -13,7 +13,10 @@ from survey.measures.floquet.equation import Equation
 
 def contained(values, exact, bars, slack=0.0):
     """Are the exact values, perhaps of mpmath, within the bars?"""
-    off = [float(abs(mpmath.mpf(float(x)) - y)) for x, y in zip(np.ravel(values), np.ravel(exact), strict=True)]
+    off = [
+        float(abs(mpmath.mpf(float(x)) - y))
+        for x, y in zip(np.ravel(values), np.ravel(exact), strict=True)
+    ]
     return (np.array(off) <= np.ravel(bars) + slack).all()
 
 
@@ -26,7 +29,12 @@ def test_forced_linear_oscillator():
         out[0], out[1] = x[1], -p[0] * x[0] - 2 * p[1] * x[1] + math.cos(t)
 
     scene = survey.orbit(
-        f, states=("x", "v"), period=2 * math.pi, parameters=("k", "c"), start=lambda p: (0.1, p[0]), jacobian=jacobian
+        f,
+        states=("x", "v"),
+        period=2 * math.pi,
+        parameters=("k", "c"),
+        start=lambda p: (0.1, p[0]),
+        jacobian=jacobian,
     )
     k, c = [0.3, 2.0, 17.0], [-0.2, 0.05, 0.4]
     ds = survey.evaluate(scene, k=k, c=c)
@@ -36,7 +44,9 @@ def test_forced_linear_oscillator():
             at = ds.isel(k=i, c=j)
             z = 1 / mpmath.mpc(stiffness - 1, 2 * mpmath.mpf(damping))
             assert contained(at.x0, [z.real, -z.imag], at.x0_error)
-            radius = mpmath.exp(-2 * mpmath.pi * (damping - mpmath.sqrt(max(damping**2 - stiffness, 0))))
+            radius = mpmath.exp(
+                -2 * mpmath.pi * (damping - mpmath.sqrt(max(damping**2 - stiffness, 0)))
+            )
             assert contained(at.spectral_radius, [radius], at.spectral_radius_error)
             assert int(at.verdict) == (damping > 0)
     assert (ds.x0_error < 1e-12).all()
@@ -56,7 +66,11 @@ def test_forced_duffing_oscillator_with_a_known_orbit():
         out[1] = -c * x[1] + x[0] - x[0] ** 3 - 2 * known + known**3 - c * B * math.sin(t)
 
     scene = survey.orbit(
-        f, states=("x", "v"), period=2 * math.pi, parameters=("c", "B"), start=lambda p: (1.01 * p[1], 0.02)
+        f,
+        states=("x", "v"),
+        period=2 * math.pi,
+        parameters=("c", "B"),
+        start=lambda p: (1.01 * p[1], 0.02),
     )
     c, B = [0.1, 0.3], [0.2, 0.9, 1.7, 3.0]
     ds = survey.evaluate(scene, c=c, B=B)
@@ -65,10 +79,17 @@ def test_forced_duffing_oscillator_with_a_known_orbit():
         for j, amplitude in enumerate(B):
             at = ds.isel(c=i, B=j)
             assert contained(at.x0, [amplitude, 0.0], at.x0_error)
-            re, im, bar = at.multiplier_re.values, at.multiplier_im.values, at.multiplier_re_error.values
+            re, im, bar = (
+                at.multiplier_re.values,
+                at.multiplier_im.values,
+                at.multiplier_re_error.values,
+            )
             product = (re[0] + 1j * im[0]) * (re[1] + 1j * im[1])
             size = abs(re) + abs(im) + bar
-            assert abs(product - math.exp(-2 * math.pi * damping)) <= bar[0] * size[1] + bar[1] * size[0] + 1e-15
+            assert (
+                abs(product - math.exp(-2 * math.pi * damping))
+                <= bar[0] * size[1] + bar[1] * size[0] + 1e-15
+            )
     assert (ds.x0_error < 3e-12).all()
     assert set(np.unique(ds.verdict)) == {0, 1}
 
@@ -80,9 +101,15 @@ def test_forced_duffing_oscillator_against_scipy(F, w):
         out[1] = -0.25 * x[1] + x[0] - x[0] ** 3 + p[0] * np.cos(p[1] * t)
 
     scene = survey.orbit(
-        f, states=("x", "v"), period=lambda p: 2 * math.pi / p[1], parameters=("F", "w"), start=(1.0, 0.0)
+        f,
+        states=("x", "v"),
+        period=lambda p: 2 * math.pi / p[1],
+        parameters=("F", "w"),
+        start=(1.0, 0.0),
     )
-    ds = survey.evaluate(scene, F=F, w=w, variables=["x0", "monodromy", "verdict", "multiplier_re", "multiplier_im"])
+    ds = survey.evaluate(
+        scene, F=F, w=w, variables=["x0", "monodromy", "verdict", "multiplier_re", "multiplier_im"]
+    )
 
     def rhs(t, y):
         A = np.array([[0.0, 1.0], [1 - 3 * y[0] ** 2, -0.25]])
@@ -93,7 +120,9 @@ def test_forced_duffing_oscillator_against_scipy(F, w):
     x = ds.x0.values + 1e-4
     for _ in range(4):
         y = np.concatenate([x, np.eye(2).ravel()])
-        y = solve_ivp(rhs, (0.0, 2 * math.pi / w), y, method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+        y = solve_ivp(rhs, (0.0, 2 * math.pi / w), y, method="DOP853", rtol=1e-13, atol=1e-15).y[
+            :, -1
+        ]
         M = y[2:].reshape(2, 2)
         x = x - np.linalg.solve(M - np.eye(2), y[:2] - x)
     assert contained(ds.x0, x, ds.x0_error, slack=1e-11)
@@ -112,7 +141,9 @@ def van_der_pol(**more):
 
 
 def test_van_der_pols_limit_cycle():
-    """The period and the amplitude to 20 digits: C. M. Andersen, J. F. Geer, SIAM J. Appl. Math. 42 (1982) 678."""
+    """The period and the amplitude to 20 digits: C. M. Andersen, J. F. Geer, SIAM J. Appl. Math. 42
+    (1982) 678.
+    """
     ds = survey.evaluate(van_der_pol(), mu=1.0)
     assert contained(ds.period, [mpmath.mpf("6.66328685932313018969")], ds.period_error)
     assert contained(ds.x0, [mpmath.mpf("2.00861986087484313650"), 0], ds.x0_error)
@@ -121,9 +152,13 @@ def test_van_der_pols_limit_cycle():
     def rhs(t, y):
         return y[1], (1 - y[0] ** 2) * y[1] - y[0], 1 - y[0] ** 2
 
-    y = solve_ivp(rhs, (0.0, float(ds.period)), (*ds.x0.values, 0.0), method="DOP853", rtol=1e-13, atol=1e-15).y[:, -1]
+    y = solve_ivp(
+        rhs, (0.0, float(ds.period)), (*ds.x0.values, 0.0), method="DOP853", rtol=1e-13, atol=1e-15
+    ).y[:, -1]
     assert ds.sizes["multiplier"] == 1
-    assert abs(float(ds.multiplier_re[0]) - math.exp(y[2])) <= float(ds.multiplier_re_error[0]) + 1e-13
+    assert (
+        abs(float(ds.multiplier_re[0]) - math.exp(y[2])) <= float(ds.multiplier_re_error[0]) + 1e-13
+    )
     assert int(ds.verdict) == 1
 
 
@@ -159,13 +194,20 @@ def test_limit_cycle_in_closed_form():
             circle(0.0, start, (rate, speed), normal)
 
             def z(angle, v=speed):
-                return (1 + (mpmath.cos(2 * angle) + 2 * v * mpmath.sin(2 * angle)) / (1 + 4 * mpmath.mpf(v) ** 2)) / 2
+                return (
+                    1
+                    + (mpmath.cos(2 * angle) + 2 * v * mpmath.sin(2 * angle))
+                    / (1 + 4 * mpmath.mpf(v) ** 2)
+                ) / 2
 
             def state(angle, z=z):
                 return mpmath.cos(angle), mpmath.sin(angle), z(angle)
 
             def plane(angle, normal=normal, state=state):
-                return sum(c * (x - mpmath.mpf(s)) for c, x, s in zip(normal, state(angle), start, strict=True))
+                return sum(
+                    c * (x - mpmath.mpf(s))
+                    for c, x, s in zip(normal, state(angle), start, strict=True)
+                )
 
             angle = mpmath.findroot(plane, mpmath.atan2(float(at.x0[1]), float(at.x0[0])))
             # the normal's rounding moves the plane by less than the last digit
@@ -193,9 +235,12 @@ def test_the_zero_solution_of_a_linear_system():
 
     axes = {"a": np.linspace(0.3, 5, 12), "q": np.linspace(0.1, 3, 9)}
     names = ("a", "q")
-    linear = survey.evaluate(survey.floquet(K=K, C=C, period=math.pi, parameters=names, states="x"), **axes)
+    linear = survey.evaluate(
+        survey.floquet(K=K, C=C, period=math.pi, parameters=names, states="x"), **axes
+    )
     ours = survey.evaluate(
-        survey.orbit(f, states=("x", "v"), period=math.pi, parameters=names, start=(0.01, 0.02)), **axes
+        survey.orbit(f, states=("x", "v"), period=math.pi, parameters=names, start=(0.01, 0.02)),
+        **axes,
     )
     assert (ours.status == 0).all() and (ours.verdict == linear.verdict).all()
     off = abs(ours.multiplier_re - linear.multiplier_re)
@@ -214,7 +259,9 @@ def test_no_orbit():
 
     scenes = [
         survey.orbit(drifts, states="x", period=2 * math.pi, parameters="a", start=0.0),
-        survey.orbit(spirals, states=("x", "v"), period=None, parameters="a", start=(1.0, 0.0, 6.0)),
+        survey.orbit(
+            spirals, states=("x", "v"), period=None, parameters="a", start=(1.0, 0.0, 6.0)
+        ),
         survey.orbit(explodes, states="x", period=10.0, parameters="a", start=0.0),
     ]
     for scene in scenes:
@@ -243,7 +290,12 @@ def test_bits_do_not_depend_on_the_block():
 def test_the_jacobian_of_every_operation():
     def f(t, x, p, out):
         a, b = x
-        out[0] = math.sin(a * b) * math.exp(-a) + math.tan(0.2 * b) / (1 + a**2) + math.erf(a) * np.sqrt(2 + b) + b**-3
+        out[0] = (
+            math.sin(a * b) * math.exp(-a)
+            + math.tan(0.2 * b) / (1 + a**2)
+            + math.erf(a) * np.sqrt(2 + b)
+            + b**-3
+        )
         out[1] = (
             math.log(2 + a * a + b * b) + math.atan(a / b) * math.tanh(a - b) + (1.5 + a) ** p[0] + math.cosh(a) * t
             + math.asinh(a * b) + math.acos(0.1 * a) * np.arcsin(0.2 * b) + math.atanh(0.1 * b) + math.acosh(2 + a * a)
@@ -251,7 +303,9 @@ def test_the_jacobian_of_every_operation():
 
     p, x, t = np.array([[1.7]]), np.array([[0.6, 0.9]]), np.array([0.8])
     [(_own, programs)] = Equation(f, 2, 1.0, (0.6, 0.9)).traced(p, x)
-    A = programs.along(programs.A, programs.numbers(p), t[:, None], x[:, :, None], np.zeros((1, 2, 1)))[0][0, 0]
+    A = programs.along(
+        programs.A, programs.numbers(p), t[:, None], x[:, :, None], np.zeros((1, 2, 1))
+    )[0][0, 0]
 
     def value(point):
         out = np.zeros(2)
@@ -260,7 +314,9 @@ def test_the_jacobian_of_every_operation():
 
     for k in range(2):
         h = 1e-4 * np.eye(2)[k]
-        slope = (8 * (value(x[0] + h) - value(x[0] - h)) - (value(x[0] + 2 * h) - value(x[0] - 2 * h))) / 12e-4
+        slope = (
+            8 * (value(x[0] + h) - value(x[0] - h)) - (value(x[0] + 2 * h) - value(x[0] - 2 * h))
+        ) / 12e-4
         assert np.allclose(A[:, k], slope, rtol=0, atol=1e-10)
     f_of = programs.slopes(programs.numbers(p), t, x)
     assert (abs(f_of[0][0] - value(x[0])) <= f_of[1][0] + 4e-16).all()
@@ -307,7 +363,13 @@ def skewed(t, x, p, out):
     ],
 )
 def test_bad_input(changes, words):
-    given = {"f": good, "states": ("x", "v"), "period": 2 * math.pi, "parameters": "c", "start": (1.0, 0.0)} | changes
+    given = {
+        "f": good,
+        "states": ("x", "v"),
+        "period": 2 * math.pi,
+        "parameters": "c",
+        "start": (1.0, 0.0),
+    } | changes
     f = given.pop("f")
     with pytest.raises(survey.BadInput, match=words) as caught:
         survey.evaluate(survey.orbit(f, **given), **{given["parameters"]: 0.3})
@@ -324,7 +386,10 @@ def test_a_file_and_a_run(tmp_path):
     )
     workflow = {
         "scene": str(file),
-        "axes": {"F": {"start": 0.05, "stop": 0.2, "num": 4}, "w": {"start": 1.2, "stop": 1.4, "num": 3}},
+        "axes": {
+            "F": {"start": 0.05, "stop": 0.2, "num": 4},
+            "w": {"start": 1.2, "stop": 1.4, "num": 3},
+        },
         "output": {"path": str(tmp_path / "duffing.nc")},
     }
     ds = survey.run(workflow)
@@ -339,7 +404,9 @@ def test_the_orbit_of_a_point_against_scipy():
     assert motion.attrs["panels"] == "plane x v; lines t x v; multipliers"
     assert motion.t.values[-1] <= 10.0 < motion.t.values[-1] + 0.5 and (np.diff(motion.t) > 0).all()
     rhs = lambda t, y: (y[1], 1.3 * (1 - y[0] ** 2) * y[1] - y[0])  # noqa: E731
-    truth = solve_ivp(rhs, (0.0, 10.0), ds.x0.values, "DOP853", motion.t.values, rtol=1e-13, atol=1e-15).y
+    truth = solve_ivp(
+        rhs, (0.0, 10.0), ds.x0.values, "DOP853", motion.t.values, rtol=1e-13, atol=1e-15
+    ).y
     for name, values in zip("xv", truth, strict=True):
         assert (abs(motion[name] - values) <= motion[f"{name}_error"] + 2e-12).all()
         assert float(motion[f"{name}_error"].max()) < 1e-11
@@ -355,37 +422,63 @@ def test_a_second_method_agrees(period, start):
         force = 0 if period is None else 0.3 * math.cos(t)
         out[0], out[1], out[2] = x[1], p[0] * (1 - x[0] ** 2) * x[1] - x[0] + force, x[0] - x[2]
 
-    scene = survey.orbit(f, states=("x", "v", "z"), period=period, parameters="mu", start=(*start[:2], 0.1, *start[2:]))
+    scene = survey.orbit(
+        f,
+        states=("x", "v", "z"),
+        period=period,
+        parameters="mu",
+        start=(*start[:2], 0.1, *start[2:]),
+    )
     mu = np.linspace(-0.5, 2.5, 9)[[0, 3, 5, 7, 8]]
     one, two = (survey.evaluate(scene, mu=mu, method=name) for name in ("auto", "dop853"))
-    assert (one.status == two.status).all() and (one.verdict == two.verdict).all() and int((one.status == 0).sum()) >= 2
+    assert (
+        (one.status == two.status).all()
+        and (one.verdict == two.verdict).all()
+        and int((one.status == 0).sum()) >= 2
+    )
     for name in ("x0", "period", "multiplier_re", "multiplier_im", "spectral_radius", "exponent"):
         off = abs(one[name] - two[name]).where(one.status == 0, 0.0)
-        assert (off <= (one[f"{name}_error"] + two[f"{name}_error"]).where(one.status == 0, 0.0)).all(), name
+        assert (
+            off <= (one[f"{name}_error"] + two[f"{name}_error"]).where(one.status == 0, 0.0)
+        ).all(), name
         if name in ("x0", "spectral_radius"):
             assert float(two[f"{name}_error"].max()) < 1e-7 and float(off.max()) > 0
 
 
 def test_multipliers_to_25_digits():
-    """Liouville's formula along van der Pol's cycle, by mpmath (28 digits) from Andersen's and Geer's amplitude."""
+    """Liouville's formula along van der Pol's cycle, by mpmath (28 digits) from Andersen's and
+    Geer's amplitude.
+    """
     ds = survey.evaluate(van_der_pol(), mu=1.0)
-    off = abs(mpmath.mpf(float(ds.multiplier_re[0])) - mpmath.mpf("0.0008596950636038051861590281585"))
+    off = abs(
+        mpmath.mpf(float(ds.multiplier_re[0])) - mpmath.mpf("0.0008596950636038051861590281585")
+    )
     assert off <= float(ds.multiplier_re_error[0]) < 3e-12
 
 
 def test_an_orbit_begins_in_the_same_plane_whatever_is_asked():
-    """Roessler's: from this start many are found after a long time alone, in a plane through the state then."""
+    """Roessler's: from this start many are found after a long time alone, in a plane through the
+    state then.
+    """
 
     def f(t, x, p, out):
         out[0], out[1], out[2] = -x[1] - x[2], x[0] + p[1] * x[1], 0.2 + x[2] * (x[0] - p[0])
 
-    scene = survey.orbit(f, states=("x", "y", "z"), period=None, parameters=("c", "a"), start=(-3.0, 0.5, 0.05, 5.8))
+    scene = survey.orbit(
+        f, states=("x", "y", "z"), period=None, parameters=("c", "a"), start=(-3.0, 0.5, 0.05, 5.8)
+    )
     points = {"c": [2.0, 4.0, 6.0], "a": [0.1, 0.2]}
     one = survey.evaluate(scene, **points)
     assert (one.status == 0).sum() >= 5
-    for other in (survey.evaluate(scene, **points, rtol=1e-12), survey.evaluate(scene, **points, method="dop853")):
+    for other in (
+        survey.evaluate(scene, **points, rtol=1e-12),
+        survey.evaluate(scene, **points, method="dop853"),
+    ):
         good = (one.status == 0) & (other.status == 0)
-        assert (abs(one.x0 - other.x0).where(good, 0.0) <= (one.x0_error + other.x0_error).where(good, 1.0)).all()
+        assert (
+            abs(one.x0 - other.x0).where(good, 0.0)
+            <= (one.x0_error + other.x0_error).where(good, 1.0)
+        ).all()
 
 
 @pytest.mark.parametrize("start", [(1.0, 0.0), (1.0, 1e-6), (0.0, 0.0)])

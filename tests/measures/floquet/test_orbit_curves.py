@@ -19,7 +19,9 @@ WORKFLOWS = Path(survey.__file__).parents[1] / "workflows"
 
 def found(scene, **axes):
     """The dataset of the curves; of a pair of numbers the ends of an axis."""
-    table = {k: {"start": v[0], "stop": v[1], "num": 3} if np.ndim(v) else v for k, v in axes.items()}
+    table = {
+        k: {"start": v[0], "stop": v[1], "num": 3} if np.ndim(v) else v for k, v in axes.items()
+    }
     return boundaries.find(check({"scene": scene, "axes": table, "boundaries": {}}))
 
 
@@ -31,9 +33,15 @@ def curves(ds, kind):
 
 
 def assert_on(ds, part, distance, widths, gradient):
-    """Points of a curve are as near to the zeros of `distance` as their errors say, and few errors are large."""
+    """Points of a curve are as near to the zeros of `distance` as their errors say, and few errors
+    are large.
+    """
     errors = ds.curve_position_error.values[part]
-    names = [n for n in ds if n[:5] == "curve" and ds[n].attrs.get("ancillary_variables") == "curve_position_error"]
+    names = [
+        n
+        for n in ds
+        if n[:5] == "curve" and ds[n].attrs.get("ancillary_variables") == "curve_position_error"
+    ]
     a, b = (ds[name].values[part] for name in names)
     slope = np.hypot(*(np.array(gradient(a, b)) * np.array(widths)[:, None]))
     off = abs(distance(a, b)) / slope
@@ -61,14 +69,18 @@ def test_a_fold_of_limit_cycles_in_closed_form():
     ds = found(scene, m=(-0.6, 0.5), b=(0.3, 1.4), branch=1)
     [fold] = curves(ds, "plus_one")
     assert set(ds.curve_class.values) == {CLASSES["plus_one"]}
-    assert_on(ds, fold, lambda m, b: m + b * b / 4, (1.1, 1.1), lambda m, b: (np.ones_like(m), b / 2))
+    assert_on(
+        ds, fold, lambda m, b: m + b * b / 4, (1.1, 1.1), lambda m, b: (np.ones_like(m), b / 2)
+    )
     b = ds.curve_b.values[fold]
     assert {b.min(), b.max()} == {0.3, 1.4}  # from border to border
     assert (ds.curve_angle.values[fold] == 0).all() and (ds.curve_outside.values[fold] == 0).all()
 
 
 def test_period_doubling_in_closed_form():
-    """x' = R(t) diag(a, -1) R(-t) x, R turns by half a circle in a period: the multipliers are -e^a and -1 / e."""
+    """x' = R(t) diag(a, -1) R(-t) x, R turns by half a circle in a period: the multipliers are -e^a
+    and -1 / e.
+    """
 
     def f(t, x, p, out):
         c, s = math.cos(math.pi * t), math.sin(math.pi * t)
@@ -87,7 +99,9 @@ def test_period_doubling_in_closed_form():
 
 @pytest.mark.slow
 def test_complex_pairs_in_closed_form():
-    """A limit cycle of angular velocity w, and beside it z' = (a - b^2 + i v) z: multipliers exp((a - b^2 + i v) T)."""
+    """A limit cycle of angular velocity w, and beside it z' = (a - b^2 + i v) z: multipliers exp((a
+    - b^2 + i v) T).
+    """
     w, v = 2.0, 0.6
 
     def f(t, x, p, out):
@@ -96,10 +110,18 @@ def test_complex_pairs_in_closed_form():
         out[2] = grow * x[2] - v * x[3] + 0.1 * x[0] * x[2] ** 2
         out[3] = v * x[2] + grow * x[3] - x[3] * (x[2] ** 2 + x[3] ** 2)
 
-    scene = survey.orbit(f, states=("x", "y", "u", "v"), parameters=("a", "b"), period=None, start=(1.0, 0, 0, 0, 3.1))
+    scene = survey.orbit(
+        f,
+        states=("x", "y", "u", "v"),
+        parameters=("a", "b"),
+        period=None,
+        start=(1.0, 0, 0, 0, 3.1),
+    )
     ds = found(scene, a=(-0.2, 0.7), b=(0.05, 0.8))
     [curve] = curves(ds, "neimark_sacker")
-    assert_on(ds, curve, lambda a, b: a - b * b, (0.9, 0.75), lambda a, b: (np.ones_like(a), -2 * b))
+    assert_on(
+        ds, curve, lambda a, b: a - b * b, (0.9, 0.75), lambda a, b: (np.ones_like(a), -2 * b)
+    )
     angle, bar = ds.curve_angle.values[curve], ds.curve_angle_error.values[curve]
     assert (abs(angle - v * 2 * math.pi / w) <= bar).all() and (bar < 1e-10).all()
     assert (ds.curve_outside.values[curve] == 0).all()
@@ -154,7 +176,11 @@ def test_entrainment_against_scipy():
 
                 def equations(u, omega=omega, kind=kind):
                     off, M = shot(*van_der_pol(omega, u[2], 0.5), u[:2], 2 * math.pi / omega)
-                    det = np.linalg.det(M) - 1 if kind == "neimark_sacker" else np.linalg.det(M - np.eye(2))
+                    det = (
+                        np.linalg.det(M) - 1
+                        if kind == "neimark_sacker"
+                        else np.linalg.det(M - np.eye(2))
+                    )
                     return [*off, det]
 
                 near = {"F": F + np.array([-1e-3, 1e-3]), "branch": [1, 2, 3]}
@@ -177,7 +203,9 @@ def test_entrainment_against_scipy():
 
 @pytest.mark.slow
 def test_the_cusp_and_the_number_of_orbits():
-    """Between the folds of Duffing's oscillator there are three orbits, elsewhere one; the folds meet in a cusp."""
+    """Between the folds of Duffing's oscillator there are three orbits, elsewhere one; the folds
+    meet in a cusp.
+    """
     ds = found(str(WORKFLOWS / "duffing.py"), omega=(0.9, 3.0), F=(0.02, 1.5), branch=2)
     [fold] = curves(ds, "plus_one")
     omega, F = ds.curve_omega.values[fold], ds.curve_F.values[fold]
@@ -187,18 +215,28 @@ def test_the_cusp_and_the_number_of_orbits():
         edges = [np.interp(level, *sorted_pair(F[k : k + 2], omega[k : k + 2])) for k in at]
         tried = np.array([e + side * 0.004 for e in edges for side in (-1, 1)])
         inside = [sum(e < w for e in edges) % 2 == 1 for w in tried]
-        number = survey.evaluate(str(WORKFLOWS / "duffing.py"), omega=np.sort(tried), F=level, variables=["orbits"])
-        assert number.orbits.values.tolist() == [3 if yes else 1 for _w, yes in sorted(zip(tried, inside, strict=True))]
+        number = survey.evaluate(
+            str(WORKFLOWS / "duffing.py"), omega=np.sort(tried), F=level, variables=["orbits"]
+        )
+        assert number.orbits.values.tolist() == [
+            3 if yes else 1 for _w, yes in sorted(zip(tried, inside, strict=True))
+        ]
 
 
 def test_without_damping():
-    """A conservative oscillator: one curve of folds, though v = 0 on it; det M = 1 everywhere is no complex pair."""
+    """A conservative oscillator: one curve of folds, though v = 0 on it; det M = 1 everywhere is no
+    complex pair.
+    """
 
     def f(t, x, p, out):
         out[0], out[1] = x[1], -x[0] - x[0] ** 3 + p[0] * math.cos(p[1] * t)
 
     given = {"period": lambda p: 2 * math.pi / p[1], "start": (0.0, 0.0)}
-    ds = found(survey.orbit(f, states=("x", "v"), parameters=("F", "w"), **given), F=(0.1, 0.5), w=(1.2, 2.0))
+    ds = found(
+        survey.orbit(f, states=("x", "v"), parameters=("F", "w"), **given),
+        F=(0.1, 0.5),
+        w=(1.2, 2.0),
+    )
     assert ds.curve_class.values.tolist() == [CLASSES["plus_one"]]
 
 
@@ -212,7 +250,10 @@ def test_a_map_without_the_parameter_of_the_continuation():
     """From each point of the fold of Duffing's oscillator, that in the frequency is back."""
     scene = str(WORKFLOWS / "duffing.py")
     ds = found(scene, F=(0.05, 0.4), zeta=(0.01, 0.15), omega=1.5)
-    assert ds.curve_class.values.tolist() == [CLASSES["plus_one"]] and ds.curve_position_error.max() < 1e-12
+    assert (
+        ds.curve_class.values.tolist() == [CLASSES["plus_one"]]
+        and ds.curve_position_error.max() < 1e-12
+    )
     F, zeta = ds.curve_F.values, ds.curve_zeta.values
     assert {F.min(), F.max()} == {0.05, 0.4}
     for k in (0, F.size // 2, -1):

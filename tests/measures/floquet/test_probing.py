@@ -54,10 +54,15 @@ def random_points(seed, number):
 
 def unseen(A, points):
     scene = survey.floquet(A, period=1.0, parameters=NAMES, states=("y", "v"))
-    assert scene.NOTES["A_resolved_width"] == probing.WIDTH and "breaks" in scene.NOTES["A_resolution"]
+    assert (
+        scene.NOTES["A_resolved_width"] == probing.WIDTH and "breaks" in scene.NOTES["A_resolution"]
+    )
     request = Request({}, "auto", 1e-9, frozenset(["monodromy"]))
     out = scene.solve(dict(zip(NAMES, points.T, strict=True)), request)
-    found, bar = np.trace(out["monodromy"], axis1=1, axis2=2), np.trace(out["monodromy_error"], axis1=1, axis2=2)
+    found, bar = (
+        np.trace(out["monodromy"], axis1=1, axis2=2),
+        np.trace(out["monodromy_error"], axis1=1, axis2=2),
+    )
     assert (out["status"] == 0).all()
 
     def z(u, p):
@@ -85,20 +90,32 @@ def test_a_spike_that_a_run_would_miss_is_refused_with_its_place_and_resolved_wi
         out[0, 1], out[1, 0] = 1.0, -4.0 - math.exp(-x * x) / (math.sqrt(math.pi) * p[1])
 
     given = {"period": 1.0, "parameters": ("at", "width"), "states": ("y", "v")}
-    with pytest.raises(survey.BadInput, match=r"A has a spike near t = 0\.304.*name its position in breaks"):
+    with pytest.raises(
+        survey.BadInput, match=r"A has a spike near t = 0\.304.*name its position in breaks"
+    ):
         survey.evaluate(survey.floquet(narrow, **given), at=0.3045, width=5e-4)
     near = {"breaks": lambda p: [p[0] - 8 * p[1], p[0], p[0] + 8 * p[1]]}
-    named = survey.evaluate(survey.floquet(narrow, **given, **near), at=0.3045, width=5e-4, variables=["monodromy"])
+    named = survey.evaluate(
+        survey.floquet(narrow, **given, **near), at=0.3045, width=5e-4, variables=["monodromy"]
+    )
     # as narrow as this it makes y' jump by its area times y, to the order of its width
     trace = 2 * math.cos(2.0) - 0.5 * math.sin(2.0)
-    assert abs(float(np.trace(named.monodromy)) - trace) < 2e-2 and float(named.monodromy_error.max()) < 1e-7
+    assert (
+        abs(float(np.trace(named.monodromy)) - trace) < 2e-2
+        and float(named.monodromy_error.max()) < 1e-7
+    )
 
 
 def test_smooth_systems_cost_nothing_more():
-    """Sums and products of few sines and cosines are not probed; what a few samples resolve keeps its steps."""
+    """Sums and products of few sines and cosines are not probed; what a few samples resolve keeps
+    its steps.
+    """
 
     def coupled(t, p, out):
-        out[0, 1], out[1, 0] = 1.0, -1.0 - p[0] * math.cos(t) * math.sin(2 * t) - p[1] * math.cos(t) ** 3
+        out[0, 1], out[1, 0] = (
+            1.0,
+            -1.0 - p[0] * math.cos(t) * math.sin(2 * t) - p[1] * math.cos(t) ** 3,
+        )
 
     def smooth(t, p, out):
         out[0, 1], out[1, 0] = 1.0, -p[0] * math.exp(math.cos(t))
@@ -113,7 +130,9 @@ def test_smooth_systems_cost_nothing_more():
         ratio = points.scale[:, None, :] / points.scale[:, :, None]
         one = (values * ratio[:, None] * monodromy.WEIGHTS[:4].reshape(2, 2)).sum(axis=(2, 3))[0]
         c = abs(monodromy.TRANSFORM @ one)
-        few = 2.0 * max(k / (1.0 - math.log(c[k] / c.max())) for k in np.flatnonzero(c > 1e-12 * c.max()))
+        few = 2.0 * max(
+            k / (1.0 - math.log(c[k] / c.max())) for k in np.flatnonzero(c > 1e-12 * c.max())
+        )
         assert points.rate[0, 0] == pytest.approx(few / (2 * math.pi), rel=1e-9)
         many = probing.rates(program, program.numbers(point), low, low + 2 * math.pi, points.scale)
         assert (many <= probing.SEEN * few).all()

@@ -28,7 +28,9 @@ def damping(t, p, out):
     "make, ends",
     [
         (
-            lambda: survey.floquet(K=stiffness, C=damping, period=math.pi, parameters=("a", "q"), states="x"),
+            lambda: survey.floquet(
+                K=stiffness, C=damping, period=math.pi, parameters=("a", "q"), states="x"
+            ),
             {"a": (0.0, 6.0), "q": (0.0, 4.0)},
         ),
         (lambda: COUPLED, {"Omega": (0.55, 2.6), "epsilon": (0.0, 0.6)}),
@@ -61,14 +63,26 @@ def test_segments_by_hand():
     assert row_count.unexplained(counts, [(PLUS_ONE, line)]) == (0, 2 * 9 * 10)
     assert row_count.unexplained(counts, [])[0] == 9
     assert row_count.unexplained(counts, [(COLLISION, line)])[0] == 9  # it takes 2 outside
-    assert row_count.unexplained(counts, [(PLUS_ONE, line), (MINUS_ONE, line + np.array([0.02, 0.0]))])[0] == 9
+    assert (
+        row_count.unexplained(
+            counts, [(PLUS_ONE, line), (MINUS_ONE, line + np.array([0.02, 0.0]))]
+        )[0]
+        == 9
+    )
     counts[5:7] = -1  # what is not known is bridged
     assert row_count.unexplained(counts, [(PLUS_ONE, line)])[0] == 0
     assert row_count.unexplained(counts, [])[0] == 9
 
 
 def test_the_number_outside_is_certain_or_not_told():
-    M = np.array([np.diag([2.0, 0.5]), np.diag([0.9, 0.5]), np.diag([1.0 + 1e-12, 0.5]), [[0.6, -0.8], [0.8, 0.6]]])
+    M = np.array(
+        [
+            np.diag([2.0, 0.5]),
+            np.diag([0.9, 0.5]),
+            np.diag([1.0 + 1e-12, 0.5]),
+            [[0.6, -0.8], [0.8, 0.6]],
+        ]
+    )
     E = np.full_like(M, 1e-10)
     assert row_count.outside(M, E, "none").tolist() == [1, 0, -1, -1]
     assert row_count.outside(M, E, "symplectic").tolist()[0::3] == [1, 0]

@@ -34,7 +34,9 @@ def scene_of(case):
                 out[i, j] = A0[i, j] + A1[i, j] * math.cos(w * t) + B1[i, j] * np.sin(w * t)
 
     states = [f"x{i}" for i in range(n)]
-    return survey.floquet(A, period=2 * math.pi / w, parameters="unused", states=states, structure=case["structure"])
+    return survey.floquet(
+        A, period=2 * math.pi / w, parameters="unused", states=states, structure=case["structure"]
+    )
 
 
 def matched(found, exact, bars):
@@ -67,7 +69,9 @@ def test_random_systems_in_turning_coordinates(n, number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("n, number", [(1, 5_000), (2, 40_000), (3, 20_000), (4, 20_000), (6, 10_000), (12, 1_000)])
+@pytest.mark.parametrize(
+    "n, number", [(1, 5_000), (2, 40_000), (3, 20_000), (4, 20_000), (6, 10_000), (12, 1_000)]
+)
 def test_very_many_random_systems(n, number):
     check_random(n, number, seed=100 + n)
 
@@ -85,7 +89,8 @@ def check_random(n, number, seed):
         assert verdict in (-1, int(radius < 1))
         assert abs(radius - float(ds.spectral_radius[k])) <= float(ds.spectral_radius_error[k])
         assert matched(found[k], exact, ds.multiplier_re_error[k].values)
-        # next to the edge, and where multipliers are defective or very sensitive, float64 may leave it open
+        # next to the edge, and where multipliers are defective or very sensitive, float64 may leave
+        # it open
         undecided += verdict < 0 and k % 5 in (0, 1) and abs(radius - 1) > 1e-7
     assert undecided == 0
 
@@ -117,7 +122,13 @@ def mathieu(structure, **more):
 
     damped = {} if structure == "symplectic" else {"C": C}
     return survey.floquet(
-        K=K, **damped, period=math.pi, parameters=("a", "q", "c"), states="x", structure=structure, **more
+        K=K,
+        **damped,
+        period=math.pi,
+        parameters=("a", "q", "c"),
+        states="x",
+        structure=structure,
+        **more,
     )
 
 
@@ -128,7 +139,11 @@ def test_mathieus_map():
     known = survey.evaluate("mathieu", **axes)
     assert (ours.verdict == known.verdict).all()
     trace = ours.multiplier_re.sum("multiplier")
-    bar = ours.multiplier_re_error.sum("multiplier") + known.discriminant_error + 1e-12 * abs(known.discriminant)
+    bar = (
+        ours.multiplier_re_error.sum("multiplier")
+        + known.discriminant_error
+        + 1e-12 * abs(known.discriminant)
+    )
     assert (abs(trace - known.discriminant) <= bar).all()
     # l and 1 / conj(l), at every point
     product = ours.multiplier_re.prod("multiplier") - ours.multiplier_im.prod("multiplier")
@@ -170,21 +185,30 @@ def test_danbys_map():
         out[3, 1], out[3, 2] = 1.5 * (1 - s) * r - 1.0, -1.0
 
     scene = survey.floquet(
-        A, period=2 * math.pi, parameters=("mu", "e"), states=("xi", "eta", "X", "Y"), structure="symplectic"
+        A,
+        period=2 * math.pi,
+        parameters=("mu", "e"),
+        states=("xi", "eta", "X", "Y"),
+        structure="symplectic",
     )
     axes = {"mu": np.linspace(0.001, 0.0532, 41), "e": np.linspace(0.0, 0.7, 29)}
     ours, known = survey.evaluate(scene, **axes), survey.evaluate("libration_elliptic", **axes)
     decided = ours.verdict >= 0
     assert float(decided.mean()) > 0.99
     assert (ours.verdict == known.verdict).where(decided, True).all()
-    same = {1: 2, 2: 4}  # codes of minus_one and of collisions there, which asks for no others, and here
+    # codes of minus_one and of collisions there, which asks for no others, and here
+    same = {1: 2, 2: 4}
     stable = (known.verdict == 1).values & (ours.crossing > 1).values & (known.collision > 0).values
     assert stable.sum() > 50
-    assert (np.vectorize(same.get)(known.collision.values[stable]) == ours.crossing.values[stable]).all()
+    assert (
+        np.vectorize(same.get)(known.collision.values[stable]) == ours.crossing.values[stable]
+    ).all()
 
 
 def test_sum_and_difference_resonances():
-    """Yakubovich and Starzhinskii: symmetric coupling loses stability at w1 + w2, antisymmetric at w1 - w2."""
+    """Yakubovich and Starzhinskii: symmetric coupling loses stability at w1 + w2, antisymmetric at
+    w1 - w2.
+    """
     w1, w2, eps = 1.3, 0.7, 0.05
 
     def scene(sign, period):
@@ -195,7 +219,9 @@ def test_sum_and_difference_resonances():
             out[2, 1], out[3, 0] = coupling, sign * coupling
 
         structure = "symplectic" if sign > 0 else "reversible"
-        return survey.floquet(A, period=period, parameters="eps", states=("x", "y", "u", "v"), structure=structure)
+        return survey.floquet(
+            A, period=period, parameters="eps", states=("x", "y", "u", "v"), structure=structure
+        )
 
     sums, differences = 2 * math.pi / (w1 + w2), 2 * math.pi / (w1 - w2)
     verdicts = [
@@ -211,7 +237,9 @@ def test_meissner_with_breaks():
     def K(t, p, out):
         out[0, 0] = p[0] + (p[1] if t < 1.0 else -p[1])
 
-    scene = survey.floquet(K=K, period=2.5, parameters=("a", "b"), states="x", breaks=1.0, structure="symplectic")
+    scene = survey.floquet(
+        K=K, period=2.5, parameters=("a", "b"), states="x", breaks=1.0, structure="symplectic"
+    )
     a, b = np.linspace(1.0, 9.0, 23), np.linspace(0.0, 0.9, 11)
     ds = survey.evaluate(scene, a=a, b=b)
     p, q = np.sqrt(a[:, None] + b), np.sqrt(a[:, None] - b)
@@ -226,7 +254,9 @@ def test_constant_systems_and_one_state():
         out[0, 0] = p[0] + p[1] * math.sin(t)
 
     ds = survey.evaluate(
-        survey.floquet(A, period=2 * math.pi, parameters=("a", "b"), states="x"), a=[-0.2, 0.0, 0.1], b=[0.0, 3.0]
+        survey.floquet(A, period=2 * math.pi, parameters=("a", "b"), states="x"),
+        a=[-0.2, 0.0, 0.1],
+        b=[0.0, 3.0],
     )
     exact = np.exp(2 * math.pi * np.array([-0.2, 0.0, 0.1]))[:, None]
     assert (abs(ds.spectral_radius - exact) <= ds.spectral_radius_error + 1e-15 * exact).all()
@@ -240,17 +270,23 @@ def test_bits_do_not_depend_on_the_block():
     for i, k in ((0, 0), (36, 16), (17, 5)):
         one = survey.evaluate(scene, a=a[i], q=q[k], c=0.1)
         for name in whole.data_vars:
-            assert np.array_equal(whole[name].isel(a=i, q=k).values, one[name].values, equal_nan=True)
+            assert np.array_equal(
+                whole[name].isel(a=i, q=k).values, one[name].values, equal_nan=True
+            )
 
 
 def test_bars_next_to_the_largest_float_leave_the_verdict_open():
-    """Where a thousand times the bars overflows, the eigenvalues of a matrix with infinities were asked for."""
+    """Where a thousand times the bars overflows, the eigenvalues of a matrix with infinities were
+    asked for.
+    """
     M, E = np.array([[[1.0, 0.5], [0.25, 1.0]]]), np.full((1, 2, 2), 1e306)
     assert verdicts(Discs(monodromy.Matrices.plain(M, E)), M, E, False).tolist() == [-1]
 
 
 def test_even_and_odd_orders_of_a_series_may_differ():
-    """A is small where its parts cancel, so that steps are long: with three of them the last bounds once alternated."""
+    """A is small where its parts cancel, so that steps are long: with three of them the last bounds
+    once alternated.
+    """
     B = np.array([[[-4e-8, 1.00272], [-1.00272, -4e-8]]])
     ds = evaluated(2, B)
     assert int(ds.verdict[0]) == 1 and float(ds.spectral_radius_error[0]) < 1e-10
@@ -265,7 +301,9 @@ def test_satellites_map(body):
         c = 1 - k * k if body == "prolate" else -k * k
         speed = 1 - k * k * math.sin(t) ** 2
         out[0, 1] = 1.0
-        out[1, 0] = -(2 * k * k * math.cos(t) ** 2 + 2 * rho * k * math.cos(t) + rho * rho + c) / speed
+        out[1, 0] = (
+            -(2 * k * k * math.cos(t) ** 2 + 2 * rho * k * math.cos(t) + rho * rho + c) / speed
+        )
         out[1, 1] = 0.5 * k * k * math.sin(2 * t) / speed
 
     names = {"parameters": ("k", "rho"), "states": ("y", "dy"), "structure": "reversible"}
@@ -279,7 +317,9 @@ def test_satellites_map(body):
 
 
 def two_oscillators(second, tilt=0.7):
-    """Two Mathieu equations, the second's energy `second` (1, -1), in coordinates turned by a symplectic rotation."""
+    """Two Mathieu equations, the second's energy `second` (1, -1), in coordinates turned by a
+    symplectic rotation.
+    """
     c, s = math.cos(tilt), math.sin(tilt)
     turn = np.array([[c, s], [-s, c]])
 
@@ -291,7 +331,11 @@ def two_oscillators(second, tilt=0.7):
                 out[i, 2 + j] = sum(turn[m, i] * sign[m] * turn[m, j] for m in range(2))
                 out[2 + i, j] = -sum(turn[m, i] * sign[m] * k[m] * turn[m, j] for m in range(2))
 
-    names = {"parameters": ("a", "q", "off"), "states": ("x", "y", "u", "v"), "structure": "symplectic"}
+    names = {
+        "parameters": ("a", "q", "off"),
+        "states": ("x", "y", "u", "v"),
+        "structure": "symplectic",
+    }
     return survey.floquet(A, period=math.pi, **names)
 
 
@@ -306,7 +350,8 @@ def test_multipliers_that_meet_with_one_krein_sign_are_stable(off):
     assert (np.sort(same.krein.values[stable], axis=-1) == [-1, -1, 1, 1]).all()
     other = survey.evaluate(two_oscillators(-1), a=a, q=q, off=off)
     assert (known.where(other.verdict == 1, 1) == 1).all()
-    assert off > 1e-14 or not (other.verdict == 1).any()  # farther apart they are told from one another
+    # farther apart they are told from one another
+    assert off > 1e-14 or not (other.verdict == 1).any()
     assert (other.verdict == -1).any()
     assert (other.krein.values[(other.verdict == -1).values] == 0).all()
 
@@ -317,7 +362,9 @@ def test_the_reason_of_a_cluster_is_told():
 
 
 def test_small_multipliers_beside_huge_ones():
-    """Where Mathieu's solutions grow by 1e4 and more, M tells nothing of what decays; the determinant does."""
+    """Where Mathieu's solutions grow by 1e4 and more, M tells nothing of what decays; the
+    determinant does.
+    """
     a, q, c = np.linspace(-30.0, -4.0, 25), np.linspace(0.1, 8.0, 19), 0.3
     ours = survey.evaluate(mathieu("none"), a=a, q=q, c=c)
     known = survey.evaluate("mathieu", a=a - c * c, q=q)
@@ -349,7 +396,9 @@ def chained(known):
 def test_a_conserved_quantity_is_not_judged():
     axes = {"k": np.linspace(0.4, 2.5, 9), "e": np.linspace(0.0, 1.0, 7), "c": 0.02}
     plain = survey.evaluate(chained(None), **axes)
-    ours = survey.evaluate(chained((0, 0, 1, 1, 1)), **axes, variables=["multiplier_re", "verdict", "spectral_radius"])
+    ours = survey.evaluate(
+        chained((0, 0, 1, 1, 1)), **axes, variables=["multiplier_re", "verdict", "spectral_radius"]
+    )
     assert not (plain.verdict == 1).any()  # the momentum's multiplier is 1
     assert set(np.unique(ours.verdict)) == {0, 1}
     assert (ours.verdict == 0).where(plain.verdict == 0, True).all()
@@ -383,10 +432,13 @@ def test_a_root_in_a_denominator_has_its_series(power):
         out[0, 1] = 1.0
         out[1, 0] = -p[0] / (math.sqrt(x) if power == -0.5 else math.sqrt(x) * x)
 
-    own = survey.floquet(A, period=math.pi, parameters=("a",), states=("x", "v"), structure="symplectic")
+    own = survey.floquet(
+        A, period=math.pi, parameters=("a",), states=("x", "v"), structure="symplectic"
+    )
     a = np.linspace(0.5, 3.0, 5)
     one, other = (
-        survey.evaluate(own, a=a, method=method, variables=["monodromy"]) for method in ("taylor16", "dop853")
+        survey.evaluate(own, a=a, method=method, variables=["monodromy"])
+        for method in ("taylor16", "dop853")
     )
     bars = one.monodromy_error + other.monodromy_error
     assert (abs(one.monodromy - other.monodromy) <= bars).all() and bars.max() < 1e-8
@@ -394,13 +446,17 @@ def test_a_root_in_a_denominator_has_its_series(power):
 
 @pytest.mark.parametrize("structure", ["symplectic", "reversible"])
 def test_a_structure_that_fails_between_the_points_that_are_checked_proves_nothing(structure):
-    """Damping that vanishes at the ends and in the middle of the axis: there alone is A what it is said to be."""
+    """Damping that vanishes at the ends and in the middle of the axis: there alone is A what it is
+    said to be.
+    """
 
     def A(t, p, out):
         out[0, 1], out[1, 0] = 1.0, -1.0 - p[0] - 0.3 * np.cos(2 * t)
         out[1, 1] = -p[1] * p[0] * (2.0 - p[0]) * (1.0 - p[0])
 
-    scene = survey.floquet(A, period=np.pi, parameters=("a", "c"), states=("x", "v"), structure=structure)
+    scene = survey.floquet(
+        A, period=np.pi, parameters=("a", "c"), states=("x", "v"), structure=structure
+    )
     for number in (5, 101):  # points for themselves, and series
         ds = survey.evaluate(scene, a=np.linspace(0.0, 2.0, number), c=np.linspace(0.0, 0.2, 41))
         true = (ds.a * (2.0 - ds.a) * (1.0 - ds.a) * ds.c == 0.0).transpose(*ds.status.dims)
@@ -414,7 +470,9 @@ def test_a_hamiltonian_matrix_that_is_none_and_what_is_not_conserved_are_found_b
         out[2, 0], out[3, 1], out[3, 0] = -1.0 - 0.2 * np.cos(t), -2.3, 0.3
         out[2, 1] = 0.3 + 0.2 * p[0] * (2.0 - p[0]) * (1.0 - p[0])
 
-    own = survey.floquet(A, period=2 * np.pi, parameters="a", states=("x", "y", "u", "v"), structure="symplectic")
+    own = survey.floquet(
+        A, period=2 * np.pi, parameters="a", states=("x", "y", "u", "v"), structure="symplectic"
+    )
     for number in (7, 301):
         ds = survey.evaluate(own, a=np.linspace(0.0, 2.0, number))
         assert ds.a.values[ds.status.values == 0].tolist() == [0.0, 1.0, 2.0]
@@ -423,7 +481,9 @@ def test_a_hamiltonian_matrix_that_is_none_and_what_is_not_conserved_are_found_b
         out[0, 1], out[1, 0], out[1, 1] = 1.0, -1.0 - 0.5 * np.cos(t), -0.1
         out[2, 2] = 0.1 * p[0] * (2.0 - p[0]) * (1.0 - p[0])
 
-    own = survey.floquet(B, period=2 * np.pi, parameters="a", states=("x", "v", "w"), conserved=(0, 0, 1))
+    own = survey.floquet(
+        B, period=2 * np.pi, parameters="a", states=("x", "v", "w"), conserved=(0, 0, 1)
+    )
     ds = survey.evaluate(own, a=np.linspace(0.0, 2.0, 9))
     assert (
         ds.status.values.tolist() == [0, 1, 1, 1, 0, 1, 1, 1, 0]

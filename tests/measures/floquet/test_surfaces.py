@@ -1,4 +1,6 @@
-"""Surfaces of [boundaries] of Floquet systems in three parameters: true surfaces lie within the position errors."""
+"""Surfaces of [boundaries] of Floquet systems in three parameters: true surfaces lie within the
+position errors.
+"""
 
 import math
 
@@ -21,7 +23,9 @@ def coarse(monkeypatch):
 
 def found(scene, **axes):
     """The dataset of the surfaces; of a pair of numbers the ends of an axis."""
-    table = {k: {"start": v[0], "stop": v[1], "num": 2} if np.ndim(v) else v for k, v in axes.items()}
+    table = {
+        k: {"start": v[0], "stop": v[1], "num": 2} if np.ndim(v) else v for k, v in axes.items()
+    }
     return surfaces.find(check({"scene": scene, "axes": table, "boundaries": {"surfaces": True}}))
 
 
@@ -47,7 +51,9 @@ def damped():
 
 
 def test_damped_mathieus_surfaces():
-    """Multipliers exp(-c pi) times Mathieu's at a - c^2 are 1 or -1 where its discriminant is 2 cosh(c pi)."""
+    """Multipliers exp(-c pi) times Mathieu's at a - c^2 are 1 or -1 where its discriminant is 2
+    cosh(c pi).
+    """
     axes = {"a": (-0.5, 5.0), "q": (0.0, 4.0), "c": (0.0, 0.4)}
     ds = found(damped(), **axes)
     assert set(ds.surface_class.values) == {CLASSES["plus_one"], CLASSES["minus_one"]}
@@ -90,7 +96,9 @@ def hopf(t, p, out):
 
 
 def test_neimark_sackers_sphere_and_a_plane():
-    scene = survey.floquet(hopf, period=2 * math.pi, parameters=("x", "y", "z"), states=tuple("abc"))
+    scene = survey.floquet(
+        hopf, period=2 * math.pi, parameters=("x", "y", "z"), states=tuple("abc")
+    )
     axes = {"x": (-0.7, 0.8), "y": (-0.6, 0.7), "z": (-0.75, 0.65)}
     ds = found(scene, **axes)
     x, ends = vertices(ds, "neimark_sacker", **axes)
@@ -101,12 +109,16 @@ def test_neimark_sackers_sphere_and_a_plane():
     assert count - triangles // 2 == 2  # a whole sphere: V - E + F with E = 3 F / 2
     inside = np.repeat(own, ds.surface_vertices.values)
     known = np.isfinite(ds.surface_outside.values[inside])
-    assert (ds.surface_outside.values[inside] == (x[:, 2] > 0.1))[known].all() and known.mean() > 0.9
+    assert (ds.surface_outside.values[inside] == (x[:, 2] > 0.1))[
+        known
+    ].all() and known.mean() > 0.9
     angle = abs(math.remainder(0.7 * 2 * math.pi, 2 * math.pi))
     off = abs(ds.surface_angle.values[inside] - angle)
     assert (off <= ds.surface_angle_error.values[inside]).all()
     x, ends = vertices(ds, "plus_one", **axes)
-    assert (abs(x[:, 2] - 0.1) <= abs(ends[1] - x)[:, 2]).all() and ds.attrs["surfaces_left_out"] == 0
+    assert (abs(x[:, 2] - 0.1) <= abs(ends[1] - x)[:, 2]).all() and ds.attrs[
+        "surfaces_left_out"
+    ] == 0
 
 
 def test_krein_collisions():

@@ -40,8 +40,9 @@ def beams(**more):
 @pytest.mark.parametrize("method", ["auto", "dop853"])
 @pytest.mark.parametrize("A, w", [(0.3, 0.7), (1.5, 0.2), (2.5, 0.3), (0.8, -0.5)])
 def test_jacobis_and_lames_functions(method, A, w):
-    """x = A cn(s t, m), of the period 4 K(m) / s. With b = 1 two solutions z have the product P = x^2 + 2 (1 - w),
-    and are the square root of P times e^(+-i k int dt / P), k^2 = P P'' / 2 - P'^2 / 4 + (w + x^2) P^2, a constant.
+    """x = A cn(s t, m), of the period 4 K(m) / s. With b = 1 two solutions z have the product P =
+    x^2 + 2 (1 - w), and are the square root of P times e^(+-i k int dt / P), k^2 = P P'' / 2 - P'^2
+    / 4 + (w + x^2) P^2, a constant.
     """
     ds = survey.evaluate(beams(), A=A, w=w, b=1.0, method=method)
     with mpmath.workdps(25):
@@ -49,7 +50,9 @@ def test_jacobis_and_lames_functions(method, A, w):
         speed, m = mpmath.sqrt(1 + a**2), a**2 / (2 * (1 + a**2))
         T = 4 * mpmath.ellipk(m) / speed
         k = mpmath.sqrt(mpmath.mpc(c * (a**2 + a**4 / 2 + w * c)))
-        quarter = mpmath.quad(lambda t: 1 / ((a * mpmath.ellipfun("cn", speed * t, m=m)) ** 2 + c), [0, T / 8, T / 4])
+        quarter = mpmath.quad(
+            lambda t: 1 / ((a * mpmath.ellipfun("cn", speed * t, m=m)) ** 2 + c), [0, T / 8, T / 4]
+        )
         half = mpmath.cos(4 * k * quarter).real
         root = mpmath.sqrt(mpmath.mpc(half) ** 2 - 1)
         exact = sorted([half + root, half - root], key=lambda one: (-abs(one), mpmath.arg(one)))
@@ -84,7 +87,9 @@ def rhs(t, y):
 
 
 def crossing(x, speed):
-    """The half period, the state and D where the motion from (x, 0, 0, 0, speed, 0) crosses the axis again."""
+    """The half period, the state and D where the motion from (x, 0, 0, 0, speed, 0) crosses the
+    axis again.
+    """
 
     def axis(t, y):
         return y[1] if t > 0.1 else -1.0
@@ -120,7 +125,9 @@ def test_halo_orbits_branch_off_where_scipy_says():
     a = brentq(off, 0.115, 0.122, xtol=1e-12)
     scene = str(FOLDER / "lyapunov.py")
     edge = survey.edge(scene, along="a", mu=MU, a=(0.05, 0.4))
-    assert edge.edge_class.attrs["flag_meanings"].split()[0] == "plus_one" and edge.edge_class.values.tolist() == [1]
+    assert edge.edge_class.attrs["flag_meanings"].split()[
+        0
+    ] == "plus_one" and edge.edge_class.values.tolist() == [1]
     assert abs(float(edge.edge[0]) - a) < 1e-9 and float(edge.edge_error[0]) < 1e-9
     across = survey.edge(scene, along="mu", a=a, mu=(0.01, 0.015))
     assert abs(float(across.edge[0]) - MU) < 1e-9 and float(across.edge_error[0]) < 1e-9
@@ -140,7 +147,10 @@ def test_all_multipliers_and_the_monodromy_matrix():
         reversed=lyapunov.REVERSED, held="x",
     )  # fmt: skip
     ds = survey.evaluate(
-        scene, mu=MU, a=0.08, variables=["x0", "monodromy", "multiplier_re", "multiplier_im", "verdict"]
+        scene,
+        mu=MU,
+        a=0.08,
+        variables=["x0", "monodromy", "multiplier_re", "multiplier_im", "verdict"],
     )
     _half, _y, D, _speed = symmetric(float(ds.x0[0]), float(ds.x0[4]))
     R = np.diag([1, -1, 1, -1, 1, -1])
@@ -148,7 +158,10 @@ def test_all_multipliers_and_the_monodromy_matrix():
     assert (abs(ds.monodromy.values - M) <= ds.monodromy_error.values + 1e-8 * abs(M).max()).all()
     exact = np.linalg.eigvals(M)
     exact = exact[np.argsort(abs(exact - 1))]
-    planar, vertical = (exact[abs(exact) > 2].real, exact[(abs(abs(exact) - 1) < 1e-3) & (abs(exact.imag) > 1e-2)])
+    planar, vertical = (
+        exact[abs(exact) > 2].real,
+        exact[(abs(abs(exact) - 1) < 1e-3) & (abs(exact.imag) > 1e-2)],
+    )
     found = ds.multiplier_re.values + 1j * ds.multiplier_im.values
     assert int(ds.verdict) == 0 and ds.sizes["multiplier"] == 4
     assert abs(found[0] - planar[0]) <= float(ds.multiplier_re_error[0]) + 1e-6 * planar[0]
@@ -160,7 +173,9 @@ def test_the_trajectory_against_scipy():
     motion = ds.survey.trajectory()
     start = np.concatenate([ds.x0.values, np.eye(6).ravel()])
     t = motion.t.values
-    exact = solve_ivp(rhs, (0, t[-1]), start, "DOP853", t_eval=t[:: len(t) // 7], rtol=1e-12, atol=1e-13)
+    exact = solve_ivp(
+        rhs, (0, t[-1]), start, "DOP853", t_eval=t[:: len(t) // 7], rtol=1e-12, atol=1e-13
+    )
     for k, name in enumerate(lyapunov.STATES):
         off = abs(motion[name].values[:: len(t) // 7] - exact.y[k])
         # SciPy's own errors grow by the multiplier, some 1500
@@ -232,9 +247,15 @@ def test_an_orbit_on_a_curve_has_the_held_state_of_its_start(monkeypatch):
     ids=["start", "continuation"],
 )
 def test_curves_are_the_band_edges_of_lames_equation(monkeypatch, more):
-    """With b = 1, z is dn, cn or sn of x = A cn where w = -A^2 / 2, 1 or 1 + A^2 / 2, and there alone l = 1."""
+    """With b = 1, z is dn, cn or sn of x = A cn where w = -A^2 / 2, 1 or 1 + A^2 / 2, and there
+    alone l = 1.
+    """
     monkeypatch.setattr("survey.measures.floquet.curves.LINES_OF_ORBITS", 33)
-    axes = {"A": {"start": 0.3, "stop": 2.5, "num": 3}, "w": {"start": -2.0, "stop": 4.0, "num": 3}, "b": 1.0}
+    axes = {
+        "A": {"start": 0.3, "stop": 2.5, "num": 3},
+        "w": {"start": -2.0, "stop": 4.0, "num": 3},
+        "b": 1.0,
+    }
     ds = boundaries.find(check({"scene": beams(**more), "axes": axes, "boundaries": {}}))
     assert "curves_unexplained" not in ds.attrs and ds.curve_class.values.tolist() == [PLUS_ONE] * 3
     A, w, found = ds.curve_A.values, ds.curve_w.values, set()
@@ -242,7 +263,9 @@ def test_curves_are_the_band_edges_of_lames_equation(monkeypatch, more):
         a, error = A[last - count : last], ds.curve_position_error.values[last - count : last]
         exact = {"dn": (-(a**2) / 2, a), "cn": (1.0 + 0.0 * a, 0.0 * a), "sn": (1.0 + a**2 / 2, a)}
         size = {name: np.hypot(6.0, 2.2 * slope) for name, (_, slope) in exact.items()}
-        off = {name: abs(w[last - count : last] - at) / size[name] for name, (at, _) in exact.items()}
+        off = {
+            name: abs(w[last - count : last] - at) / size[name] for name, (at, _) in exact.items()
+        }
         name = min(off, key=lambda name: off[name].max())
         assert (off[name] <= error).all() and np.median(error) < 1e-11
         found.add(name)
@@ -252,8 +275,14 @@ def test_curves_are_the_band_edges_of_lames_equation(monkeypatch, more):
 
 
 def test_maps_without_the_amplitude_have_no_curves():
-    axes = {"w": {"start": 0.5, "stop": 1.5, "num": 3}, "b": {"start": 0.5, "stop": 1.5, "num": 3}, "A": 1.0}
-    with pytest.raises(survey.BadInput, match="on maps of A, that of CONTINUATION, and another one"):
+    axes = {
+        "w": {"start": 0.5, "stop": 1.5, "num": 3},
+        "b": {"start": 0.5, "stop": 1.5, "num": 3},
+        "A": 1.0,
+    }
+    with pytest.raises(
+        survey.BadInput, match="on maps of A, that of CONTINUATION, and another one"
+    ):
         check({"scene": beams(continuation=("A", 0.1, 3.0)), "axes": axes, "boundaries": {}})
 
 
@@ -279,5 +308,8 @@ def test_a_parameter_that_only_chooses_the_orbit_does_not_change_motions():
     points = np.tile([0.5, 0.7, 1.0], (3, 1))
     others = points + 0.1 * np.eye(3)
     assert continuation._flow_alike(equation, points, others, x).tolist() == [True, False, False]
-    end, other = (continuation.rough_flow(equation, p, x, np.full(3, 2.0), derived=False)[0] for p in (points, others))
+    end, other = (
+        continuation.rough_flow(equation, p, x, np.full(3, 2.0), derived=False)[0]
+        for p in (points, others)
+    )
     assert (end == other).all(axis=1).tolist() == [True, False, False]

@@ -14,16 +14,28 @@ from survey.scenes import mathieu
 
 def test_closed_forms_hold_within_their_bars():
     span = np.pi / 2
-    z = np.concatenate([[0.0, 1e-300, 1e-12, -1e-12, 1.0, 4.0, 9.0], np.random.default_rng(1).uniform(-50, 500, 60)])
+    z = np.concatenate(
+        [
+            [0.0, 1e-300, 1e-12, -1e-12, 1.0, 4.0, 9.0],
+            np.random.default_rng(1).uniform(-50, 500, 60),
+        ]
+    )
     results = auto.closed_form(z, np.full(z.size, span))
     with mp.workdps(40):
         for value, row in zip(z, results, strict=True):
             rate, length = mp.sqrt(mpf(value)), mpf(span)
-            exact = [mp.cos(rate * length), -rate * mp.sin(rate * length), length * mp.sinc(rate * length)]
+            exact = [
+                mp.cos(rate * length),
+                -rate * mp.sin(rate * length),
+                length * mp.sinc(rate * length),
+            ]
             for i, number in enumerate([*map(mp.re, exact), mp.re(exact[0])]):
                 assert abs(number - mpf(row[i])) <= row[4 + i], (value, i)
             phase = float(mp.re(rate * length) / mp.pi)
-            assert row[8:].tolist() == [np.floor(phase + 0.5), max(0, np.ceil(phase) - 1)] or value in (4.0, 9.0, 1.0)
+            assert row[8:].tolist() == [
+                np.floor(phase + 0.5),
+                max(0, np.ceil(phase) - 1),
+            ] or value in (4.0, 9.0, 1.0)
 
 
 def test_closed_forms_agree_with_integration():
@@ -38,11 +50,15 @@ def test_closed_forms_agree_with_integration():
 
 @pytest.mark.parametrize("exact", [False, True])
 def test_undecided_points_are_tried_again(monkeypatch, exact):
-    """With Taylor's bars made useless every verdict comes from double-double, or from DOP853, and is right."""
+    """With Taylor's bars made useless every verdict comes from double-double, or from DOP853, and
+    is right.
+    """
     tried = []
     problem_of = mathieu._problem
     if not exact:
-        monkeypatch.setattr(mathieu, "_problem", lambda *given: replace(problem_of(*given), exact=None))
+        monkeypatch.setattr(
+            mathieu, "_problem", lambda *given: replace(problem_of(*given), exact=None)
+        )
     good = auto.pointwise.solve
 
     def spoiled(problem, method, asked, answers, where=None):

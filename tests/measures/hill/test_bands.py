@@ -51,7 +51,8 @@ def test_samples_miss_no_more_than_the_bound(number):
     for p in [largest, *(random.uniform(-1, 1, (20, 2)) * largest)]:
         values = np.array([z(float(at), p) for at in x])
         off = abs(BarycentricInterpolator(x, values)(u) - [z(float(at), p) for at in u])
-        assert off.max() <= bound + 1e-13 * abs(values).max()  # what the interpolation itself rounds
+        # what the interpolation itself rounds
+        assert off.max() <= bound + 1e-13 * abs(values).max()
     assert (bound < 1e-10) == (number < 4)
 
 

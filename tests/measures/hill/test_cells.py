@@ -1,4 +1,6 @@
-"""Cells with a verdict of their own: areas by quadrature of the edges, no tongue missed, no aliasing believed."""
+"""Cells with a verdict of their own: areas by quadrature of the edges, no tongue missed, no
+aliasing believed.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 
@@ -38,7 +40,9 @@ def tongues(q):
 @pytest.mark.parametrize("log", [False, True])
 @pytest.mark.parametrize(("depth", "narrow"), [(5, 0.2), (9, 1e-3)])
 def test_mathieus_unstable_area_is_the_integral_of_the_characteristic_values(log, depth, narrow):
-    """No edge meets a = -7 or a = 6 for q <= 2, so the widths are smooth: Gauss's rule is exact to rounding."""
+    """No edge meets a = -7 or a = 6 for q <= 2, so the widths are smooth: Gauss's rule is exact to
+    rounding.
+    """
     low = 0.05 if log else 0.0
     x, weights = np.polynomial.legendre.leggauss(30)
     exact = (1 - low / 2) * (weights * tongues(low + (1 - low / 2) * (x + 1))).sum()
@@ -53,7 +57,9 @@ def _edges(k, low, high, rtol):
     """All edges of the prolate tongues in rows k."""
 
     def solve(row, rho, wanted):
-        return solver(satellite, "k", "rho", outputs=wanted, rtol=rtol, body="prolate")(k[row][:, None], rho)
+        return solver(satellite, "k", "rho", outputs=wanted, rtol=rtol, body="prolate")(
+            k[row][:, None], rho
+        )
 
     return hill_edges.find(solve, k.size, low, high)
 
@@ -65,7 +71,9 @@ def test_the_area_of_a_satellites_tongue_is_the_integral_of_its_edges():
     edges = _edges(k, 0.9, 1.3, 1e-11)
     assert edges.complete.all() and np.bincount(edges.row).tolist() == [2] * 12
     exact = 0.2 * (weights * np.diff(edges.position.reshape(12, 2))[:, 0]).sum()
-    cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Side(0.1, 0.5, 9), Side(0.9, 1.3, 9))
+    cells = hill_cells.find(
+        solver(satellite, "k", "rho", body="prolate"), Side(0.1, 0.5, 9), Side(0.9, 1.3, 9)
+    )
     bar = 0.5 * (cells.total - cells.stable - cells.unstable)
     assert abs(cells.unstable + bar - exact) <= bar < 1e-6
 
@@ -80,13 +88,20 @@ def test_the_unstable_shares_of_librations(start, share):
 
 
 def test_no_tongue_is_stable_however_narrow():
-    """Rows of prolate tongues n = 3 ... 7, down to 3e-13 wide: all that lies in them is unstable or undecided."""
+    """Rows of prolate tongues n = 3 ... 7, down to 3e-13 wide: all that lies in them is unstable or
+    undecided.
+    """
     k = np.array([0.0512, 0.1512, 0.3013])
     edges = _edges(k, 0.61, 3.41, 1e-13)
-    cells = hill_cells.find(solver(satellite, "k", "rho", body="prolate"), Side(0.0, 0.4, 7), Side(0.6, 3.42, 7))
+    cells = hill_cells.find(
+        solver(satellite, "k", "rho", body="prolate"), Side(0.0, 0.4, 7), Side(0.6, 3.42, 7)
+    )
     assert (holding(cells, k[edges.row], edges.position) == UNDECIDED).all()
     inside = edges.index[1:] == edges.index[:-1]
-    width, middle = np.diff(edges.position)[inside], (0.5 * (edges.position[1:] + edges.position[:-1]))[inside]
+    width, middle = (
+        np.diff(edges.position)[inside],
+        (0.5 * (edges.position[1:] + edges.position[:-1]))[inside],
+    )
     assert inside.sum() >= 14 and width.min() < 1e-11
     assert set(holding(cells, k[edges.row[1:]][inside], middle)) <= {UNDECIDED, UNSTABLE}
 
@@ -96,7 +111,9 @@ def test_no_tongue_is_stable_however_narrow():
        st.floats(-2.5, 1.0), st.floats(0.3, 5.0), st.integers(0, 2**32 - 1))  # fmt: skip
 def test_a_decided_cell_has_that_verdict_at_all_its_points(kind, low, size, seed):
     body, ends = kind
-    cells = hill_cells.find(solver(satellite, "k", "rho", body=body), Side(*ends, 6), Side(low, low + size, 6))
+    cells = hill_cells.find(
+        solver(satellite, "k", "rho", body=body), Side(*ends, 6), Side(low, low + size, 6)
+    )
     part = np.random.default_rng(seed).random((2, 2000))
     k, rho = ends[0] + np.ptp(ends) * part[0], low + size * part[1]
     own = holding(cells, k, rho)
@@ -136,7 +153,9 @@ def test_what_is_not_finite_stays_undecided():
 def test_threads_give_the_same_bits():
     solve, axes = solver(mathieu, "a", "q"), (Side(-2, 12, 7), Side(0, 5, 6))
     with ThreadPoolExecutor(3) as pool:
-        threaded = hill_cells.find(solve, *axes, each=lambda task, items, what: list(pool.map(task, items)))
+        threaded = hill_cells.find(
+            solve, *axes, each=lambda task, items, what: list(pool.map(task, items))
+        )
     alone = hill_cells.find(solve, *axes)
     np.testing.assert_array_equal(alone.box, threaded.box)
     np.testing.assert_array_equal(alone.verdict, threaded.verdict)

@@ -1,4 +1,6 @@
-"""Curves of edges: every row between is crossed where its edges are; folds, closed curves, borders, double points."""
+"""Curves of edges: every row between is crossed where its edges are; folds, closed curves, borders,
+double points.
+"""
 
 import numpy as np
 import pytest
@@ -25,7 +27,9 @@ def satellite_curves(body, k, rho):
     """The solver, the square and the curves from the rows k."""
 
     def solve(q, p, wanted):
-        return satellite.solve({"k": q, "rho": p}, Request({"body": body}, "auto", 1e-13, frozenset(wanted)))
+        return satellite.solve(
+            {"k": q, "rho": p}, Request({"body": body}, "auto", 1e-13, frozenset(wanted))
+        )
 
     edges = hill_edges.find(solver(satellite, "k", k, "rho", body=body), k.size, *rho)
     square = Square(np.array([k[0], rho[0]]), np.array([k[-1], rho[1]]), np.zeros(2, bool))
@@ -40,7 +44,10 @@ def synthetic(f):
         q, p = np.broadcast_arrays(q, p)
         out = {name: np.ones(q.shape) for name in hill_edges.FACTORS} | {"y1": f(q, p)}
         out |= {f"{name}_error": np.full(q.shape, 1e-15) for name in hill_edges.FACTORS}
-        return out | {"rotation_number": np.full(q.shape, 0.5), "verdict": np.zeros(q.shape, np.int8)}
+        return out | {
+            "rotation_number": np.full(q.shape, 0.5),
+            "verdict": np.zeros(q.shape, np.int8),
+        }
 
     return solve
 
@@ -70,7 +77,9 @@ def test_any_row_is_crossed_where_its_edges_are(body, k, rho):
         own = edges.row == row
         listed = sorted(zip(edges.kind[own], edges.index[own], edges.position[own], strict=True))
         assert [edge[:2] for edge in listed] == [cross[:2] for cross in sorted(crossed)]
-        np.testing.assert_allclose([e[2] for e in listed], [c[2] for c in sorted(crossed)], atol=2e-3 * np.ptp(rho))
+        np.testing.assert_allclose(
+            [e[2] for e in listed], [c[2] for c in sorted(crossed)], atol=2e-3 * np.ptp(rho)
+        )
 
 
 def test_the_error_bar_holds_the_curve():
@@ -91,10 +100,15 @@ def test_the_error_bar_holds_the_curve():
 
 
 def test_the_fold_of_the_rotations_is_where_eigenvalues_meet():
-    """Half the sum, and the square of the difference, of the two eigenvalues are analytic in k through the fold."""
+    """Half the sum, and the square of the difference, of the two eigenvalues are analytic in k
+    through the fold.
+    """
     solve, square, curves = satellite_curves("prolate", np.linspace(1.05, 1.4, 6), (-2.5, 0.5))
     folds = hill_folds.find(solve, square, curves)
-    (k, rho), (k_error, rho_error) = square.parameters(folds.x)[0], folds.error[0] * (square.high - square.low)
+    (k, rho), (k_error, rho_error) = (
+        square.parameters(folds.x)[0],
+        folds.error[0] * (square.high - square.low),
+    )
     kind = int(curves.kind[folds.curve[0]])
     assert len(folds.x) == 1 and k_error < 1e-12 and rho_error < 1e-9
 
@@ -130,7 +144,9 @@ def test_folds_lie_on_their_curves():
     a, q = square.parameters(folds.x).T
     error = folds.error * (square.high - square.low)
     still = abs(q) < 1
-    assert (abs(q) <= error[:, 1])[still].all() and (abs(a - np.rint(a)) <= error[:, 0])[still].all()
+    assert (abs(q) <= error[:, 1])[still].all() and (abs(a - np.rint(a)) <= error[:, 0])[
+        still
+    ].all()
     assert sorted(np.rint(a[still])) == [0, 4, 4, 9, 9, 16, 16]
     np.testing.assert_allclose(np.sort(q[~still]), np.sort(-q[~still]), atol=1e-11)
     assert (~still).sum() == 6 and (folds.error < 1e-11).all()
@@ -148,7 +164,9 @@ def test_a_closed_curve_closes_and_has_two_folds():
     assert abs(abs(turns[-1] - turns[0]) - 2 * np.pi) < 1e-9 and abs(np.diff(turns)).max() < 0.3
     folds = hill_folds.find(solve, UNIT, curves)
     order = np.argsort(folds.x[:, 0])
-    assert (abs(folds.x[order] - [[0.2, 0.4], [0.8, 0.4]]) <= folds.error[order]).all() and (folds.error < 1e-9).all()
+    assert (abs(folds.x[order] - [[0.2, 0.4], [0.8, 0.4]]) <= folds.error[order]).all() and (
+        folds.error < 1e-9
+    ).all()
 
 
 def test_neighbours_are_not_taken_for_each_other():

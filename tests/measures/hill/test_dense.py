@@ -1,4 +1,6 @@
-"""Dense rows and maps by their Chebyshev series: within the bars of points solved one by one, in any block."""
+"""Dense rows and maps by their Chebyshev series: within the bars of points solved one by one, in
+any block.
+"""
 
 import numpy as np
 import pytest
@@ -39,12 +41,18 @@ def served(monkeypatch):
 )
 def test_dense_rows_agree_with_their_points(served, body, k, rho, rtol):
     dense = survey.evaluate("satellite", k=k, rho=rho, body=body, rtol=rtol, variables=NAMES)
-    alone = survey.evaluate("satellite", k=k, rho=rho, body=body, rtol=min(rtol, 1e-12), method="taylor16")
+    alone = survey.evaluate(
+        "satellite", k=k, rho=rho, body=body, rtol=min(rtol, 1e-12), method="taylor16"
+    )
     assert len(served) == 1 and (rtol == 1e-12 or served[0][0] < 0.3 * served[0][1])
     for name in ("discriminant", "exponent"):
         off = abs(dense[name] - alone[name]).values
-        assert (off <= dense[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values).all(), name
-        assert (dense[f"{name}_error"].values <= rtol * 1.001 * (1 + abs(dense[name].values))).mean() > 0.99
+        assert (
+            off <= dense[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values
+        ).all(), name
+        assert (
+            dense[f"{name}_error"].values <= rtol * 1.001 * (1 + abs(dense[name].values))
+        ).mean() > 0.99
     both = (dense.verdict >= 0) & (alone.verdict >= 0)
     assert (dense.verdict == alone.verdict).where(both, True).all() and both.mean() > 0.999
 
@@ -87,13 +95,17 @@ def test_dense_maps_agree_with_their_points(surfaces, scene, ranges, options, fe
     dense = survey.evaluate(scene, **axes, **options, variables=NAMES)
     assert len(surfaces[0]) >= fewest
     random = np.random.default_rng(0)
-    places = {name: xr.DataArray(random.integers(0, axes[name].size, 1500), dims="point") for name in axes}
+    places = {
+        name: xr.DataArray(random.integers(0, axes[name].size, 1500), dims="point") for name in axes
+    }
     mine = dense.isel(places)
     points = {name: mine[name].drop_vars(list(axes)) for name in axes}
     alone = survey.evaluate(scene, **points, **options, rtol=1e-13, method="taylor16")
     for name in ("discriminant", "exponent"):
         off = abs(mine[name].values - alone[name].values)
-        assert (off <= mine[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values).all(), name
+        assert (
+            off <= mine[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values
+        ).all(), name
     both = (mine.verdict.values >= 0) & (alone.verdict.values >= 0)
     assert both.mean() > 0.99 and (mine.verdict.values == alone.verdict.values)[both].all()
 
@@ -104,7 +116,9 @@ def test_one_panel_serves_though_the_discriminant_falls_along_its_rows(surfaces)
     dense = survey.evaluate("mathieu", **axes, variables=["discriminant", "verdict"])
     assert len(surfaces[0]) == 1
     random = np.random.default_rng(5)
-    places = {name: xr.DataArray(random.integers(0, axes[name].size, 1500), dims="point") for name in axes}
+    places = {
+        name: xr.DataArray(random.integers(0, axes[name].size, 1500), dims="point") for name in axes
+    }
     mine = dense.isel(places)
     points = {name: mine[name].drop_vars(list(axes)) for name in axes}
     alone = survey.evaluate("mathieu", **points, rtol=1e-13, method="dop853")
@@ -125,7 +139,9 @@ def test_all_outputs_of_maps_agree_with_their_points(served, scene, ranges, opti
     left, points = map(sum, zip(*served, strict=True))
     assert left < 0.45 * points or not fewest
     random = np.random.default_rng(0)
-    places = {name: xr.DataArray(random.integers(0, axes[name].size, 3000), dims="point") for name in axes}
+    places = {
+        name: xr.DataArray(random.integers(0, axes[name].size, 3000), dims="point") for name in axes
+    }
     mine = dense.isel(places)
     points = {name: mine[name].drop_vars(list(axes)) for name in axes}
     alone = survey.evaluate(scene, **points, **options, rtol=1e-13, method="taylor16")
@@ -187,20 +203,31 @@ SCATTERED = [
 
 @pytest.mark.parametrize("variables", [None, ["discriminant", "verdict"]])
 @pytest.mark.parametrize(("scene", "ranges", "options"), SCATTERED)
-def test_scattered_points_agree_with_points_on_their_own(scene, ranges, options, variables, monkeypatch):
+def test_scattered_points_agree_with_points_on_their_own(
+    scene, ranges, options, variables, monkeypatch
+):
     from survey.sweep import cost
 
     random = np.random.default_rng(4)
-    given = {name: xr.DataArray(random.uniform(*ends, 6000), dims="point") for name, ends in ranges.items()}
+    given = {
+        name: xr.DataArray(random.uniform(*ends, 6000), dims="point")
+        for name, ends in ranges.items()
+    }
     for name in given:
-        given[name][[10, 20]] = 0.0 if name in ("rho", "q") else given[name][10]  # where exact rules decide
+        # where exact rules decide
+        given[name][[10, 20]] = 0.0 if name in ("rho", "q") else given[name][10]
     given["rho" if "rho" in given else "a"][30] = np.nan
     many = survey.evaluate(scene, **given, **options, variables=variables)
-    few = survey.evaluate(scene, **{name: v[:1500] for name, v in given.items()}, **options, rtol=1e-13)
+    few = survey.evaluate(
+        scene, **{name: v[:1500] for name, v in given.items()}, **options, rtol=1e-13
+    )
     one = many.isel(point=slice(0, 1500))
     assert (one.status.values == few.status.values).all() and int(one.status[30]) != 0
     for name in error_bars(one):
-        off, bars = abs(one[name].values - few[name].values), one[f"{name}_error"].values.astype(float)
+        off, bars = (
+            abs(one[name].values - few[name].values),
+            one[f"{name}_error"].values.astype(float),
+        )
         assert (off <= bars + few[f"{name}_error"].values)[np.isfinite(bars)].all(), name
         assert (bars <= 1.001e-10 * (1 + abs(one[name].values)))[np.isfinite(bars)].mean() > 0.99
     both = (one.verdict.values >= 0) & (few.verdict.values >= 0)
@@ -208,11 +235,15 @@ def test_scattered_points_agree_with_points_on_their_own(scene, ranges, options,
     assert int(one.verdict[10]) == int(few.verdict[10])
     with monkeypatch.context() as patch:
         patch.setattr(cost, "BLOCK_POINTS", 1700)
-        xr.testing.assert_identical(survey.evaluate(scene, **given, **options, variables=variables), many)
+        xr.testing.assert_identical(
+            survey.evaluate(scene, **given, **options, variables=variables), many
+        )
 
 
 def test_a_sparse_axis_is_solved_point_by_point(served):
-    survey.evaluate("satellite", k=[0.3, 0.4], rho=np.linspace(0.6, 4.0, 20), variables=["discriminant"])
+    survey.evaluate(
+        "satellite", k=[0.3, 0.4], rho=np.linspace(0.6, 4.0, 20), variables=["discriminant"]
+    )
     assert served == [(40, 40)]
 
 
@@ -224,7 +255,9 @@ def test_inside_a_narrow_tongue_the_factors_decide():
         ds = survey.evaluate("satellite", k=0.15, rho=rho)
         at = int(np.argmin(abs(ds.rotation_number.values - 3.5)))
         low, high = rho[max(at - 2, 0)], rho[min(at + 2, 2000)]
-    row = np.unique(np.concatenate([np.linspace(0.6, 4.0, 500), np.linspace(low - 1e-9, high + 1e-9, 301)]))
+    row = np.unique(
+        np.concatenate([np.linspace(0.6, 4.0, 500), np.linspace(low - 1e-9, high + 1e-9, 301)])
+    )
     dense = survey.evaluate("satellite", k=0.15, rho=row, variables=["discriminant", "verdict"])
     sure = survey.evaluate("satellite", k=0.15, rho=row)
     assert (dense.verdict == sure.verdict).all() and (sure.verdict < 0).sum() < 3

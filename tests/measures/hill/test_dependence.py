@@ -1,4 +1,6 @@
-"""How a function depends on its parameters: known cases, and that a polynomial of the found degree is what it is."""
+"""How a function depends on its parameters: known cases, and that a polynomial of the found degree
+is what it is.
+"""
 
 from math import cos, exp, pi, sqrt
 

@@ -1,4 +1,6 @@
-"""Edges of tongues: characteristic values to 30 digits, every row complete, closed gaps found twice, folds kept."""
+"""Edges of tongues: characteristic values to 30 digits, every row complete, closed gaps found
+twice, folds kept.
+"""
 
 import numpy as np
 import pytest
@@ -17,7 +19,10 @@ def solver(scene, name, values, lane, **options):
     values = np.asarray(values, dtype=float)
 
     def solve(row, x, wanted):
-        return scene.solve({name: values[row][:, None], lane: x}, Request(options, "auto", 1e-13, frozenset(wanted)))
+        return scene.solve(
+            {name: values[row][:, None], lane: x},
+            Request(options, "auto", 1e-13, frozenset(wanted)),
+        )
 
     return solve
 
@@ -31,7 +36,11 @@ def test_mathieus_characteristic_values(q):
         mine = (edges.kind == KINDS[row["kind"], row["n"] % 2]) & (edges.index == row["n"])
         assert mine.sum() == 1
         position = edges.position[mine][0]
-        assert abs(mpf(position) - mpf(row["value"])) <= edges.error[mine][0] < 1e-12 * (1 + abs(position))
+        assert (
+            abs(mpf(position) - mpf(row["value"]))
+            <= edges.error[mine][0]
+            < 1e-12 * (1 + abs(position))
+        )
 
 
 @pytest.mark.parametrize(("body", "low"), [("prolate", 0.0), ("oblate", 0.3)])
@@ -65,7 +74,9 @@ def test_width_of_a_tongue_is_its_power_of_k():
 
 
 def test_a_fold_of_rotations_keeps_both_edges():
-    """Prolate rotations: as 1/k grows the tongues near r = 0 and r = -2 meet (satellite.md: What is known)."""
+    """Prolate rotations: as 1/k grows the tongues near r = 0 and r = -2 meet (satellite.md: What is
+    known).
+    """
     k = 1 / np.array([0.6, 0.97])
     edges = hill_edges.find(solver(satellite, "k", k, "rho", body="prolate"), 2, -3.0, 0.5)
     assert edges.complete.all() and edges.row.size > 4

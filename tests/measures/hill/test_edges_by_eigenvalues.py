@@ -1,4 +1,6 @@
-"""Edges against the Fourier quadratic eigenproblem and Mathieu's characteristic values: number, class and place."""
+"""Edges against the Fourier quadratic eigenproblem and Mathieu's characteristic values: number,
+class and place.
+"""
 
 from itertools import pairwise
 
@@ -17,7 +19,9 @@ def agree(mine, row, theirs, doubt):
     own = mine.row == row
     assert mine.complete[row]
     order = np.lexsort((mine.position[own], mine.kind[own]))
-    position, kind, error = (values[own][order] for values in (mine.position, mine.kind, mine.error))
+    position, kind, error = (
+        values[own][order] for values in (mine.position, mine.kind, mine.error)
+    )
     theirs = np.array(sorted(theirs, key=lambda edge: (edge[1], edge[0])))
     np.testing.assert_array_equal(kind, theirs[:, 1])
     assert (abs(position - theirs[:, 0]) <= error + doubt).all()
@@ -37,7 +41,8 @@ def agree(mine, row, theirs, doubt):
 )
 def test_the_eigenproblem_has_the_same_edges(body, low, high, moduli):
     if body == "oblate" and low > 0:
-        low = 0.6  # below it edges come in pairs closer than 1e-9 as k grows, where eigenvalues are not sharp
+        # below it edges come in pairs closer than 1e-9 as k grows, where eigenvalues are not sharp
+        low = 0.6
     mine = hill_edges.find(solver(satellite, "k", moduli, "rho", body=body), len(moduli), low, high)
     for row, k in enumerate(moduli):
         coarse, fine = (eigenproblem(body, k, low, high, n) for n in (48, 64))
@@ -67,24 +72,31 @@ def test_mathieus_characteristic_values_by_scipy():
         (mathieu, "a", "q", (-20.0, 20.0), (-30.0, 60.0), {}),
     ],
 )
-def test_the_rotation_number_counts_the_edges_of_random_rows(scene, lane, name, bounds, span, options):
+def test_the_rotation_number_counts_the_edges_of_random_rows(
+    scene, lane, name, bounds, span, options
+):
     """On a fine scan: wherever it tells a band or a gap, so many edges of so many tongues lie between."""
     rows = np.random.default_rng(20).uniform(*bounds, 40)
     solve = solver(scene, name, rows, lane, **options)
     edges = hill_edges.find(solve, rows.size, *span)
     assert edges.complete.all()
     x = np.linspace(*span, 401)
-    band = hill_edges._band(solve(np.arange(rows.size), np.tile(x, (rows.size, 1)), hill_edges.COUNTS))
+    band = hill_edges._band(
+        solve(np.arange(rows.size), np.tile(x, (rows.size, 1)), hill_edges.COUNTS)
+    )
     for row in range(rows.size):
         known = np.flatnonzero(np.isfinite(band[row]))
         own = edges.row == row
         for a, b in pairwise(known):
             between = own & (edges.position > x[a]) & (edges.position < x[b])
-            # each edge is half a step of the staircase, up or down; between neighbours of the scan it is climbed once
+            # each edge is half a step of the staircase, up or down; between neighbours of the scan
+            # it is climbed once
             assert between.sum() == 2 * abs(band[row, b] - band[row, a])
             passed = np.sort(edges.index[between])
             low, high = sorted((band[row, a], band[row, b]))
-            np.testing.assert_array_equal(passed, np.rint(np.arange(low, high, 0.5) + 0.25 + 1e-9).astype(int))
+            np.testing.assert_array_equal(
+                passed, np.rint(np.arange(low, high, 0.5) + 0.25 + 1e-9).astype(int)
+            )
 
 
 def test_a_list_that_lacks_an_edge_is_not_complete():

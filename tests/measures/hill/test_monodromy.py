@@ -10,7 +10,8 @@ from survey.measures.hill import monodromy
 from survey.measures.hill.answers import Answers, Asked
 from survey.methods import taylor16
 
-# Per method, the relative bar of discriminants below which no rtol leads, the rounding of all steps; within a factor 2.
+# Per method, the relative bar of discriminants below which no rtol leads, the rounding of all
+# steps; within a factor 2.
 FLOORS = {"taylor16": 3e-13, "magnus6": 3e-12, "rk4": 6e-11}
 METHODS = list(FLOORS)
 STANDARD = REFERENCE["standard"]["mathieu"]["values"]
@@ -23,15 +24,23 @@ def solve(a, q, rtol=1e-10, method="taylor16"):
 
 @pytest.mark.parametrize("row", STANDARD, ids=lambda row: f"{row['kind']}{row['n']}-q{row['q']}")
 def test_characteristic_values_separate_stable_from_unstable(row):
-    """a_n and b_n to 30 digits: on the value the verdict may not be sure and wrong; beside it, it is right."""
+    """a_n and b_n to 30 digits: on the value the verdict may not be sure and wrong; beside it, it
+    is right.
+    """
     a = float(row["value"])
     step = 1e-9 * (1 + abs(a))
     out = solve([[a, a - step, a + step]], [row["q"]], rtol=1e-13)
     assert abs(abs(out["discriminant"][0, 0]) - 2) < out["discriminant_error"][0, 0] + 1e-12
-    assert abs(out["rotation_number"][0, 0] - row["n"] / 2) <= out["rotation_number_error"][0, 0] + 1e-6
-    # The unstable interval lies below a_n and above b_n; that of n = 10 at q <= 5 is narrower than the step.
+    assert (
+        abs(out["rotation_number"][0, 0] - row["n"] / 2)
+        <= out["rotation_number_error"][0, 0] + 1e-6
+    )
+    # The unstable interval lies below a_n and above b_n; that of n = 10 at q <= 5 is narrower than
+    # the step.
     narrow = row["n"] >= 10 and row["q"] < 25
-    assert list(out["verdict"][0, 1:]) == ([1, 1] if narrow else [0, 1] if row["kind"] == "a" else [1, 0])
+    assert list(out["verdict"][0, 1:]) == (
+        [1, 1] if narrow else [0, 1] if row["kind"] == "a" else [1, 0]
+    )
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -49,8 +58,15 @@ def test_discriminants_lie_within_the_bars(method, rtol):
 
 def test_no_modulation_is_marginal_at_squares_only():
     out = solve([[1.0, 4.0, 2.0, 9.000001]], [0.0])
-    assert list(out["verdict"][0]) == [monodromy.MARGINAL, monodromy.MARGINAL, monodromy.STABLE, monodromy.STABLE]
-    np.testing.assert_allclose(out["rotation_number"][0], np.sqrt([1, 4, 2, 9.000001]) / 2, rtol=1e-13)
+    assert list(out["verdict"][0]) == [
+        monodromy.MARGINAL,
+        monodromy.MARGINAL,
+        monodromy.STABLE,
+        monodromy.STABLE,
+    ]
+    np.testing.assert_allclose(
+        out["rotation_number"][0], np.sqrt([1, 4, 2, 9.000001]) / 2, rtol=1e-13
+    )
 
 
 def test_exponent_and_rotation_number_agree_with_the_discriminant():
@@ -58,16 +74,24 @@ def test_exponent_and_rotation_number_agree_with_the_discriminant():
     out = solve([a], [1.7])
     discriminant, exponent = out["discriminant"], out["exponent"]
     unstable = out["verdict"] == monodromy.UNSTABLE
-    np.testing.assert_allclose(np.cosh(exponent[unstable]), abs(discriminant[unstable]) / 2, rtol=1e-9)
     np.testing.assert_allclose(
-        2 * np.cos(2 * np.pi * out["rotation_number"][~unstable]), discriminant[~unstable], atol=1e-9
+        np.cosh(exponent[unstable]), abs(discriminant[unstable]) / 2, rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        2 * np.cos(2 * np.pi * out["rotation_number"][~unstable]),
+        discriminant[~unstable],
+        atol=1e-9,
     )
     assert np.all(np.diff(out["rotation_number"][0]) > -1e-12)
-    assert np.all(2 * out["rotation_number"][unstable] == np.rint(2 * out["rotation_number"][unstable]))
+    assert np.all(
+        2 * out["rotation_number"][unstable] == np.rint(2 * out["rotation_number"][unstable])
+    )
 
 
 def test_verdict_is_undecided_where_the_bar_holds_both_answers():
-    results = np.array([[1e-9, 1.0, 1e-9, 1.0, *[1e-8] * 4, 0, 0], [0.1, -9.9, 0.1, 0.1, *[1e-8] * 4, 1, 0]])
+    results = np.array(
+        [[1e-9, 1.0, 1e-9, 1.0, *[1e-8] * 4, 0, 0], [0.1, -9.9, 0.1, 0.1, *[1e-8] * 4, 1, 0]]
+    )
     answers = Answers(2, Asked(1e-10, np.ones(7, bool)))
     answers.assess(results, None)
     assert list(answers.verdict) == [monodromy.UNDECIDED, monodromy.STABLE] and answers.missed.all()
@@ -75,7 +99,12 @@ def test_verdict_is_undecided_where_the_bar_holds_both_answers():
 
 def test_failures_are_values():
     out = solve([[2.0, np.nan, -1e7, 1e13]], [1.0])
-    assert list(out["status"][0]) == [status.OK, status.INVALID_PARAMETERS, status.OVERFLOW, status.STEP_LIMIT]
+    assert list(out["status"][0]) == [
+        status.OK,
+        status.INVALID_PARAMETERS,
+        status.OVERFLOW,
+        status.STEP_LIMIT,
+    ]
     assert np.isnan(out["discriminant"][0, 1:]).all()
     assert list(out["verdict"][0, 1:]) == [-1, -1, -1]
 
@@ -85,7 +114,9 @@ def test_huge_growth_has_a_relative_bar():
     out = solve([[-400.0]], [0.0])
     with mp.workdps(40):
         wanted = 2 * mp.cosh(20 * mp.pi)
-    assert abs(out["discriminant"][0, 0] - wanted) <= out["discriminant_error"][0, 0] < 1e-10 * wanted
+    assert (
+        abs(out["discriminant"][0, 0] - wanted) <= out["discriminant_error"][0, 0] < 1e-10 * wanted
+    )
     assert out["verdict"][0, 0] == monodromy.UNSTABLE
     assert abs(out["exponent"][0, 0] - float(20 * mp.pi)) <= out["exponent_error"][0, 0] < 1e-10
 

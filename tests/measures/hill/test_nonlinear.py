@@ -1,4 +1,6 @@
-"""Twist of planar motions: the full rotation beside them, iterated; and 25 digits by another form of the integral."""
+"""Twist of planar motions: the full rotation beside them, iterated; and 25 digits by another form
+of the integral.
+"""
 
 import numpy as np
 import pytest
@@ -51,7 +53,9 @@ class Body:
 
         event.direction = 1 if self.k < 1 else 0
         end = (0.0, period * (number + 1))
-        done = solve_ivp(self.slopes, end, self.start(tilt), "DOP853", rtol=2e-13, atol=1e-15, events=event)
+        done = solve_ivp(
+            self.slopes, end, self.start(tilt), "DOP853", rtol=2e-13, atol=1e-15, events=event
+        )
         return done.y_events[0][1 : number + 1, 2:]
 
 
@@ -76,7 +80,9 @@ CASES = [
 
 @pytest.mark.parametrize(("body", "k", "rho"), CASES)
 def test_the_twist_is_that_of_the_full_rotation(body, k, rho):
-    """d(angle per return)/dJ at one energy, by tilts of 0.02 and 0.04 and the square of the tilt taken to 0."""
+    """d(angle per return)/dJ at one energy, by tilts of 0.02 and 0.04 and the square of the tilt
+    taken to 0.
+    """
     ds = survey.evaluate("satellite", k=k, rho=rho, body=body, variables=[*NAMES, *LINEAR])
     assert int(ds.verdict_nonlinear) == 1
     exact = Body(k, rho, body == "oblate")
@@ -90,7 +96,8 @@ def test_the_twist_is_that_of_the_full_rotation(body, k, rho):
 
 
 def multiprecision(k, rho, oblate):
-    """(twist, resonant) at constant angle of the planar motion: T_h/T under the integral, T_h in closed form.
+    """(twist, resonant) at constant angle of the planar motion: T_h/T under the integral, T_h in
+    closed form.
 
     The kernel has constant time, and T_h at the end.
     """
@@ -117,7 +124,8 @@ def multiprecision(k, rho, oblate):
 
         def part(pairs):
             return sum(
-                quartic * b[i] * b[j] - e[i] * b[j] * moved / 2 - slower / period * e[i] * e[j] / 2 for i, j in pairs
+                quartic * b[i] * b[j] - e[i] * b[j] * moved / 2 - slower / period * e[i] * e[j] / 2
+                for i, j in pairs
             )
 
         forms = [part([(0, 0)]), part([(0, 2), (1, 1), (2, 0)]), part([(2, 2)])]
@@ -149,10 +157,15 @@ def test_the_error_bars_hold(body, k, rho):
 
 
 def test_bars_cover_changes_of_an_ulp_in_a_crowd():
-    """Over both families and bodies: a modulus of one ulp more moves nothing by more than the bars, near k = 1 too."""
+    """Over both families and bodies: a modulus of one ulp more moves nothing by more than the bars,
+    near k = 1 too.
+    """
     random = np.random.default_rng(4)
     for body in ("prolate", "oblate"):
-        for k in (1 - 10.0 ** random.uniform(-5, -0.1, 40), 1 + 10.0 ** random.uniform(-5, 0.5, 40)):
+        for k in (
+            1 - 10.0 ** random.uniform(-5, -0.1, 40),
+            1 + 10.0 ** random.uniform(-5, 0.5, 40),
+        ):
             k, rho = np.sort(k), random.uniform(0.58, 4.0, 20)
             one, other = (
                 survey.evaluate("satellite", k=x, rho=rho, body=body, variables=[*NAMES, "verdict"])
@@ -168,8 +181,12 @@ def test_bars_cover_changes_of_an_ulp_in_a_crowd():
 
 
 def test_the_resonance_of_order_4():
-    """At D = 0 it is the resonant term that decides; there the twist outweighs it, so that nothing is lost."""
-    edge = survey.evaluate("satellite", k=0.4, rho=np.linspace(0.6, 3, 400), variables=["discriminant"])
+    """At D = 0 it is the resonant term that decides; there the twist outweighs it, so that nothing
+    is lost.
+    """
+    edge = survey.evaluate(
+        "satellite", k=0.4, rho=np.linspace(0.6, 3, 400), variables=["discriminant"]
+    )
     crossing = np.flatnonzero(np.diff(np.sign(edge.discriminant)))
     assert len(crossing) > 2
     low, high = edge.rho.values[crossing], edge.rho.values[crossing + 1]
@@ -180,7 +197,9 @@ def test_the_resonance_of_order_4():
         same = np.sign(here.discriminant.values) == before
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     assert (abs(here.discriminant) <= 10 * here.discriminant_error).all()
-    assert (abs(here.twist) > abs(here.twist_resonant)).all() and (here.verdict_nonlinear == 1).all()
+    assert (abs(here.twist) > abs(here.twist_resonant)).all() and (
+        here.verdict_nonlinear == 1
+    ).all()
 
 
 def resonant_rotation():
@@ -188,7 +207,9 @@ def resonant_rotation():
     low, high = -1.62, -1.60
     for _ in range(60):
         middle = 0.5 * (low + high)
-        here = survey.evaluate("satellite", k=2.92, rho=middle, variables=["discriminant", "period", *NAMES])
+        here = survey.evaluate(
+            "satellite", k=2.92, rho=middle, variables=["discriminant", "period", *NAMES]
+        )
         low, high = (middle, high) if float(here.discriminant) > 0 else (low, middle)
     return here
 
@@ -205,7 +226,9 @@ def test_a_rotation_in_resonance():
 def test_there_tilts_grow_and_beside_it_they_do_not():
     here = resonant_rotation()
     for away, least, most in ((0.0, 5.0, 10.0), (0.1, 1.0, 1.5), (-0.1, 1.0, 1.5)):
-        states = Body(2.92, float(here.rho) + away, oblate=False).returns(0.2, 600, float(here.period))
+        states = Body(2.92, float(here.rho) + away, oblate=False).returns(
+            0.2, 600, float(here.period)
+        )
         assert least < np.hypot(*states.T).max() / 0.2 < most
 
 
@@ -223,7 +246,9 @@ def test_small_librations(body):
 
 
 def test_verdicts_by_the_rule():
-    """On made-up numbers: far from resonance and in it, with enough twist; instability, and nothing decided."""
+    """On made-up numbers: far from resonance and in it, with enough twist; instability, and nothing
+    decided.
+    """
 
     class Row:
         oblate = False
@@ -240,7 +265,9 @@ def test_verdicts_by_the_rule():
 
 
 def test_where_it_does_not_apply():
-    ds = survey.evaluate("satellite", k=[0.0, 0.3], rho=[0.9, 5000.0], variables=[*NAMES, "verdict"])
+    ds = survey.evaluate(
+        "satellite", k=[0.0, 0.3], rho=[0.9, 5000.0], variables=[*NAMES, "verdict"]
+    )
     assert ds.twist.isel(k=0).isnull().all() and ds.twist.isel(rho=1).isnull().all()
     assert (ds.verdict_nonlinear.isel(rho=1).where(ds.verdict.isel(rho=1) == 1, -1) == -1).all()
     assert int(ds.verdict_nonlinear.isel(k=1, rho=0)) == 1

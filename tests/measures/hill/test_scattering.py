@@ -14,7 +14,9 @@ WAVES = NAMES[:5]
 
 
 def passage(rho, m):
-    """Re f f'* and |f f'| at 0 by the power series of y1, y2 about 0, joined to Jost's solution at u = 0.8."""
+    """Re f f'* and |f f'| at 0 by the power series of y1, y2 about 0, joined to Jost's solution at
+    u = 0.8.
+    """
     order, u = 160, mpf(0.8)
     s, th, square = [mpf(1)], [mpf(0)], []
     for n in range(order):
@@ -25,10 +27,15 @@ def passage(rho, m):
     for first in ((mpf(1), mpf(0)), (mpf(0), mpf(1))):
         y = [*first]
         for n in range(order - 2):
-            total = m * y[n] + mp.fsum(2 * (square[i] + rho * s[i]) * y[n - i] for i in range(n + 1))
+            total = m * y[n] + mp.fsum(
+                2 * (square[i] + rho * s[i]) * y[n - i] for i in range(n + 1)
+            )
             y.append(-total / ((n + 1) * (n + 2)))
         solutions.append(
-            (mp.fsum(c * u**n for n, c in enumerate(y)), mp.fsum(n * c * u ** (n - 1) for n, c in enumerate(y) if n))
+            (
+                mp.fsum(c * u**n for n, c in enumerate(y)),
+                mp.fsum(n * c * u ** (n - 1) for n, c in enumerate(y) if n),
+            )
         )
     nu = mpc(0, -mp.sqrt(m)) if m > 0 else mp.sqrt(-m)
     # sech u = 2 sum (-1)^j x^(2j+1), sech^2 u = its square, x = exp(-u)
@@ -48,7 +55,9 @@ def passage(rho, m):
     return product.real, abs(product)
 
 
-@pytest.mark.parametrize(("body", "rho"), [("prolate", 0.3), ("prolate", 2.5), ("oblate", 1.02), ("oblate", 0.7)])
+@pytest.mark.parametrize(
+    ("body", "rho"), [("prolate", 0.3), ("prolate", 2.5), ("oblate", 1.02), ("oblate", 0.7)]
+)
 def test_against_40_digits(body, rho):
     with mp.workdps(60):
         m = mpf(rho) ** 2 - (1 if body == "oblate" else 0)
@@ -57,7 +66,13 @@ def test_against_40_digits(body, rho):
         if m > 0:
             a, b = (mp.asinh(abs(x) / rate) for x in (along, back))
             share = 2 / mp.pi * mp.acos(min(1 / mp.cosh(a), 1 / mp.cosh(b)))
-            values = (1 / mp.cosh(a), 1 / mp.cosh(b), share, mp.log(mp.cosh(a) * mp.cosh(b)) / 2, (a + b) / 2)
+            values = (
+                1 / mp.cosh(a),
+                1 / mp.cosh(b),
+                share,
+                mp.log(mp.cosh(a) * mp.cosh(b)) / 2,
+                (a + b) / 2,
+            )
             known = dict(zip(WAVES, values, strict=True))
         else:
             known = dict(zip(NAMES[5:], (-along / rate, -back / rate), strict=True))
@@ -65,7 +80,12 @@ def test_against_40_digits(body, rho):
     for name in NAMES:
         value, bar = float(ds[name]), float(ds[f"{name}_error"])
         if name in known:
-            assert abs(value - known[name]) <= bar + mpf(10) ** -25 and bar < 3e-12, (name, value, known[name], bar)
+            assert abs(value - known[name]) <= bar + mpf(10) ** -25 and bar < 3e-12, (
+                name,
+                value,
+                known[name],
+                bar,
+            )
         else:
             assert np.isnan(value)
 
@@ -75,22 +95,38 @@ def test_the_values_of_the_mathematics_page():
     ds = survey.evaluate("satellite", k=0.5, rho=rho, variables=[*NAMES])
     assert float(ds.separatrix_transmission[0]) == pytest.approx(0.9941371190, abs=5e-11)
     assert float(ds.separatrix_transmission_back[0]) == pytest.approx(0.6736900155, abs=5e-11)
-    np.testing.assert_allclose(2 * np.cosh(2 * ds.separatrix_largest_growth), [3.224854, 2.144280], atol=6e-7)
+    np.testing.assert_allclose(
+        2 * np.cosh(2 * ds.separatrix_largest_growth), [3.224854, 2.144280], atol=6e-7
+    )
 
 
 def test_the_separatrix_itself():
-    """k = 1 has these outputs alone, those of the neighbours: librations' means, and each passage's own numbers."""
+    """k = 1 has these outputs alone, those of the neighbours: librations' means, and each passage's
+    own numbers.
+    """
     rho = np.linspace(-3.0, 3.0, 40)
     for body in ("prolate", "oblate"):
         for name, values in (("k", [0.99, 1.0, 1.01]), ("one_minus_k", [-0.01, 0.0, 0.01])):
-            ds = survey.evaluate("satellite", **{name: values}, rho=rho, body=body, variables=[*NAMES])
+            ds = survey.evaluate(
+                "satellite", **{name: values}, rho=rho, body=body, variables=[*NAMES]
+            )
             assert (ds.status == status.OK).all()
-            at, below, above = (ds.sel({name: v}, drop=True) for v in (values[1], *values[:: 2 if name == "k" else -2]))
+            at, below, above = (
+                ds.sel({name: v}, drop=True)
+                for v in (values[1], *values[:: 2 if name == "k" else -2])
+            )
             xr.testing.assert_identical(at, below)
             for output in (*NAMES[:2], *NAMES[5:]):
                 xr.testing.assert_identical(at[output].variable, above[output].variable)
-    bodies = survey.evaluate("satellite", k=1.0, inertia_ratio=[0.3, 1.0, 1.2, 1.9], variables=[*NAMES])
-    assert bodies.status.values.tolist() == [status.OK, status.INVALID_PARAMETERS, status.OK, status.OK]
+    bodies = survey.evaluate(
+        "satellite", k=1.0, inertia_ratio=[0.3, 1.0, 1.2, 1.9], variables=[*NAMES]
+    )
+    assert bodies.status.values.tolist() == [
+        status.OK,
+        status.INVALID_PARAMETERS,
+        status.OK,
+        status.OK,
+    ]
     rho = 1 / np.sqrt(3 * np.array([0.7, 0.2, 0.9]))
     for i, (body, place) in enumerate((("prolate", 0), ("oblate", 2), ("oblate", 3))):
         own = survey.evaluate("satellite", k=1.0, rho=rho[i], body=body, variables=[*NAMES])
@@ -100,9 +136,13 @@ def test_the_separatrix_itself():
 
 def test_no_verdict_on_the_separatrix():
     for variables in (None, ["verdict", "separatrix_growth"]):
-        with pytest.raises(survey.BadInput, match=r"k = 1 .* \(there request the variables separatrix_\*"):
+        with pytest.raises(
+            survey.BadInput, match=r"k = 1 .* \(there request the variables separatrix_\*"
+        ):
             survey.evaluate("satellite", k=1.0, rho=0.7, variables=variables)
-    ds = survey.evaluate("satellite", k=[0.9, 1.0], rho=0.7, variables=["verdict", "separatrix_growth"])
+    ds = survey.evaluate(
+        "satellite", k=[0.9, 1.0], rho=0.7, variables=["verdict", "separatrix_growth"]
+    )
     assert ds.status.values.tolist() == [status.OK, status.INVALID_PARAMETERS]
     assert np.isnan(ds.separatrix_growth[1])
     lone = survey.evaluate("satellite", k=1.0, rho=0.7, variables=["separatrix_growth"])
@@ -110,7 +150,9 @@ def test_no_verdict_on_the_separatrix():
         lone.survey.trajectory()
 
 
-@pytest.mark.parametrize(("body", "rho", "side"), [("prolate", 0.6, 1), ("prolate", -0.6, -1), ("oblate", 1.2, 1)])
+@pytest.mark.parametrize(
+    ("body", "rho", "side"), [("prolate", 0.6, 1), ("prolate", -0.6, -1), ("oblate", 1.2, 1)]
+)
 def test_satellites_as_k_approaches_1(body, rho, side):
     """Over whole turns of the phase 2 K q, 1 - k from 1e-9 to 1e-14 or so: share, mean and largest growth."""
     q = np.sqrt(rho**2 - (body == "oblate"))
@@ -122,7 +164,9 @@ def test_satellites_as_k_approaches_1(body, rho, side):
     ds = survey.evaluate("satellite", one_minus_k=short, rho=rho, body=body, variables=wanted)
     passages = 2 if side > 0 else 1
     growth = ds.exponent / passages
-    assert float((ds.verdict == 0).mean()) == pytest.approx(float(ds.separatrix_unstable_share[0]), abs=2e-3)
+    assert float((ds.verdict == 0).mean()) == pytest.approx(
+        float(ds.separatrix_unstable_share[0]), abs=2e-3
+    )
     assert float(growth.mean()) == pytest.approx(float(ds.separatrix_growth[0]), rel=3e-3)
     most = float(ds.separatrix_largest_growth[0])
     assert most * (1 - 1e-4) < float(growth.max()) < most * (1 + 1e-4)

@@ -48,7 +48,9 @@ def test_the_edges_of_an_equation_that_is_not_even():
         own = edge.edge_class == kind
         assert own.sum() == len(values)
         off = abs(edge.edge[own].values - np.sort(values[:, 0]))
-        assert (off <= edge.edge_error[own].values + 1e-13).all() and edge.edge_error[own].max() < 1e-9
+        assert (off <= edge.edge_error[own].values + 1e-13).all() and edge.edge_error[
+            own
+        ].max() < 1e-9
     margin = survey.evaluate(SHIFTED, a=1.0, q=1.5).survey.margin()
     assert set(margin.parameter.values) == {"a", "q"} and (margin.edge_error < 1e-9).all()
 
@@ -62,22 +64,33 @@ def test_the_curves_of_an_equation_that_is_not_even():
         for value in values:  # every curve on the map is drawn, nearly to its ends
             on = (abs(ds.curve_a.values - value) < 1e-6) & (kind == code)
             here = (value > -1.9) & (value < 5.9)
-            assert not here.any() or np.ptp(ds.curve_q.values[on]) > 0.9 * np.ptp(ds.curve_q.values[here])
+            assert not here.any() or np.ptp(ds.curve_q.values[on]) > 0.9 * np.ptp(
+                ds.curve_q.values[here]
+            )
 
 
 def test_narrow_tongues_and_bands_are_drawn_whole():
     """Tongues a millionth of the map wide at small q, and bands as narrow at the bottom right."""
-    axes = {"q": {"start": 0.0, "stop": 10.0, "num": 3}, "a": {"start": -12.0, "stop": 40.0, "num": 3}}
+    axes = {
+        "q": {"start": 0.0, "stop": 10.0, "num": 3},
+        "a": {"start": -12.0, "stop": 40.0, "num": 3},
+    }
     ds = boundaries.find(check({"scene": SHIFTED, "axes": axes, "boundaries": {}}))
     assert "curves_unexplained" not in ds.attrs and ds.curve_position_error.max() < 1e-12
-    assert np.bincount(ds.curve_class.values).tolist() == [0, 7, 6]  # a0 to a6 and b1 to b6, none in pieces
+    # a0 to a6 and b1 to b6, none in pieces
+    assert np.bincount(ds.curve_class.values).tolist() == [0, 7, 6]
     start = np.cumsum(ds.curve_count.values) - ds.curve_count.values
     ends = np.stack([start, start + ds.curve_count.values - 1])
-    on_border = (np.isin(ds.curve_q.values, [0.0, 10.0]) | np.isin(ds.curve_a.values, [-12.0, 40.0]))[ends]
+    on_border = (
+        np.isin(ds.curve_q.values, [0.0, 10.0]) | np.isin(ds.curve_a.values, [-12.0, 40.0])
+    )[ends]
     assert on_border.all()
     kind = np.repeat(ds.curve_class.values, ds.curve_count.values)
     q = ds.curve_q.values
-    plus = [*(special.mathieu_a(n, q) for n in (0, 2, 4, 6)), *(special.mathieu_b(n, q) for n in (2, 4, 6))]
+    plus = [
+        *(special.mathieu_a(n, q) for n in (0, 2, 4, 6)),
+        *(special.mathieu_b(n, q) for n in (2, 4, 6)),
+    ]
     minus = [f(n, q) for n in (1, 3, 5) for f in (special.mathieu_a, special.mathieu_b)]
     for code, values in ((CLASSES["plus_one"], plus), (CLASSES["minus_one"], minus)):
         off = abs(ds.curve_a.values - np.array(values)).min(axis=0) / 52.0
@@ -114,12 +127,17 @@ def test_damped_curves_lie_where_the_linear_system_has_them():
     goal = np.where(kind == CLASSES["plus_one"], 1.0, -1.0)
     off = abs(found.multiplier_re.values - goal[:, None]).min(axis=1)
     # multipliers change by less than 50 where a changes by 1
-    assert (off <= found.multiplier_re_error.values.max(axis=1) + 50 * 8 * ds.curve_position_error.values).all()
+    assert (
+        off
+        <= found.multiplier_re_error.values.max(axis=1) + 50 * 8 * ds.curve_position_error.values
+    ).all()
     assert ds.curve_class.values.tolist() == [1, 1, 2, 2]  # tongues are rounded off
 
 
 def test_the_damping_that_closes_a_tongue():
-    """With the damping c, |D| = 2 cosh(c T) of the undamped equation with a - c^2 is where stability is lost."""
+    """With the damping c, |D| = 2 cosh(c T) of the undamped equation with a - c^2 is where
+    stability is lost.
+    """
     edge = survey.edge(DAMPED, along="c", a=1.0, q=0.5, c=(0.01, 1.0))
     c = float(edge.edge[0])
     plain = survey.evaluate("mathieu", a=1.0 - c * c, q=0.5)
@@ -130,6 +148,10 @@ def test_the_damping_that_closes_a_tongue():
 
 
 def test_cells_of_damped_equations_are_refused():
-    axes = {"q": {"start": 0.5, "stop": 3.0, "num": 3}, "a": {"start": -2.0, "stop": 6.0, "num": 3}, "c": 0.1}
+    axes = {
+        "q": {"start": 0.5, "stop": 3.0, "num": 3},
+        "a": {"start": -2.0, "stop": 6.0, "num": 3},
+        "c": 0.1,
+    }
     with pytest.raises(BadInput, match="undamped equations alone"):
         check({"scene": DAMPED, "axes": axes, "refine": {"width": 0.1}})

@@ -1,4 +1,6 @@
-"""A user's z: closed forms, other scenes and other methods; true errors within the bars, with breaks and without."""
+"""A user's z: closed forms, other scenes and other methods; true errors within the bars, with
+breaks and without.
+"""
 
 import itertools
 from math import cos, pi, sin
@@ -43,7 +45,10 @@ def within(one, other, names):
 @pytest.mark.parametrize("method", METHODS)
 def test_mathieu_by_an_own_function_is_the_scene(method):
     rtol = 1e-6 if method in ("rk4", "magnus6") else 1e-10
-    own, scene = survey.evaluate(EVEN, a=A, q=Q, method=method, rtol=rtol), survey.evaluate("mathieu", a=A, q=Q)
+    own, scene = (
+        survey.evaluate(EVEN, a=A, q=Q, method=method, rtol=rtol),
+        survey.evaluate("mathieu", a=A, q=Q),
+    )
     assert within(own, scene, error_bars(scene)) <= 1
     decided = (own.verdict != -1) & (scene.verdict != 2)
     assert (own.verdict == scene.verdict).values[decided].all() and decided.sum() >= 34
@@ -52,7 +57,10 @@ def test_mathieu_by_an_own_function_is_the_scene(method):
 @pytest.mark.parametrize("method", METHODS)
 def test_a_shift_changes_neither_discriminant_nor_exponent_nor_rotation_number(method):
     rtol = 1e-6 if method in ("rk4", "magnus6") else 1e-10
-    own, scene = survey.evaluate(SHIFTED, a=A, q=Q, method=method, rtol=rtol), survey.evaluate("mathieu", a=A, q=Q)
+    own, scene = (
+        survey.evaluate(SHIFTED, a=A, q=Q, method=method, rtol=rtol),
+        survey.evaluate("mathieu", a=A, q=Q),
+    )
     assert within(own, scene, ["discriminant", "exponent", "rotation_number", "period"]) <= 1
     decided = (own.verdict != -1) & (scene.verdict != 2)
     assert (own.verdict == scene.verdict).values[decided].all() and decided.sum() >= 34
@@ -63,12 +71,23 @@ def test_the_period_may_depend_on_the_parameters():
     scene = survey.hill(scaled, period=lambda p: pi / p[2], parameters=("a", "q", "s"), even=True)
     own = survey.evaluate(scene, a=A, q=5.0, s=[0.01, 1.0, 300.0])
     for s in own.s:
-        assert within(own.sel(s=s), survey.evaluate("mathieu", a=A, q=5.0), ["discriminant", "rotation_number"]) <= 1
-    np.testing.assert_allclose(own.period.values, np.broadcast_to(pi / own.s.values, own.period.shape), rtol=1e-15)
+        assert (
+            within(
+                own.sel(s=s),
+                survey.evaluate("mathieu", a=A, q=5.0),
+                ["discriminant", "rotation_number"],
+            )
+            <= 1
+        )
+    np.testing.assert_allclose(
+        own.period.values, np.broadcast_to(pi / own.s.values, own.period.shape), rtol=1e-15
+    )
 
 
 def test_no_symmetry_at_all_against_another_integrator():
-    scene = survey.hill(lambda u, p: p[0] + cos(2 * u) + p[1] * sin(4 * u), period=pi, parameters=("a", "r"))
+    scene = survey.hill(
+        lambda u, p: p[0] + cos(2 * u) + p[1] * sin(4 * u), period=pi, parameters=("a", "r")
+    )
     own = survey.evaluate(scene, a=[0.3, 4.0, 9.1], r=[-1.0, 0.4, 3.0])
     for a in own.a.values:
         for r in own.r.values:
@@ -77,7 +96,9 @@ def test_no_symmetry_at_all_against_another_integrator():
                 z = a + np.cos(2 * u) + r * np.sin(4 * u)
                 return [y[1], -z * y[0], y[3], -z * y[2]]
 
-            ends = solve_ivp(slope, (0, pi), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+            ends = solve_ivp(
+                slope, (0, pi), [1, 0, 0, 1], method="DOP853", rtol=1e-12, atol=1e-12
+            ).y[:, -1]
             here = own.sel(a=a, r=r)
             for name, value in zip(("y1", "dy1", "y2", "dy2"), ends, strict=True):
                 assert abs(float(here[name]) - value) < 1e-9 + float(here[f"{name}_error"])
@@ -91,9 +112,13 @@ def bent(u, p):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("rtol", [1e-6, 1.5396245461649855e-10, 1e-13])
 def test_the_rounding_of_large_values_reaches_small_ones_beside_them(method, rtol):
-    """z = 10^4, then 4 pi^2 in so few steps that its rounding, relative to 10^4, acts within the last of them."""
+    """z = 10^4, then 4 pi^2 in so few steps that its rounding, relative to 10^4, acts within the
+    last of them.
+    """
     a, b, place = 1e4, 39.47841760435743, 0.5642194903320384
-    scene = survey.hill(bent, period=1.0, parameters=("a", "b", "place"), breaks=lambda p: [0.0, p[2]])
+    scene = survey.hill(
+        bent, period=1.0, parameters=("a", "b", "place"), breaks=lambda p: [0.0, p[2]]
+    )
     own = survey.evaluate(scene, a=a, b=b, place=place, method=method, rtol=rtol)
     with mp.workdps(40):
         flow = mp.eye(2)
@@ -127,7 +152,9 @@ def test_what_ten_nodes_take_for_lower_degrees_is_in_the_bars(rtol, width):
     for low, high in itertools.pairwise([0.0, *breaks, c + 40 * d, 1.0]):
         y = solve_ivp(slope, (low, high), y, method="DOP853", rtol=3e-14, atol=1e-14).y[:, -1]
     for name, true in zip(("y1", "dy1", "y2", "dy2"), y, strict=True):
-        assert abs(float(own[name]) - true) <= float(own[f"{name}_error"]) + 1e-12 * (1 + abs(true)), name
+        assert abs(float(own[name]) - true) <= float(own[f"{name}_error"]) + 1e-12 * (
+            1 + abs(true)
+        ), name
 
 
 def square(u, p):
@@ -157,11 +184,14 @@ def closed_form(a, q, duty):
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize(
-    ("z", "breaks", "even"), [(square, edges_of_square, True), (stair, lambda p: [0, p[2] * pi], False)]
+    ("z", "breaks", "even"),
+    [(square, edges_of_square, True), (stair, lambda p: [0, p[2] * pi], False)],
 )
 def test_meissner_by_its_closed_form(z, breaks, even, method):
     scene = survey.hill(z, period=pi, parameters=("a", "q", "duty"), even=even, breaks=breaks)
-    own = survey.evaluate(scene, a=[-3.0, 0.4, 7.3, 60.0], q=[0.0, 2.5, 11.0], duty=[0.01, 0.3, 0.5], method=method)
+    own = survey.evaluate(
+        scene, a=[-3.0, 0.4, 7.3, 60.0], q=[0.0, 2.5, 11.0], duty=[0.01, 0.3, 0.5], method=method
+    )
     flat = own.stack(point=("a", "q", "duty"))
     for a, q, duty, d, bar in zip(flat.a.values, flat.q.values, flat.duty.values, flat.discriminant.values,
                                   flat.discriminant_error.values, strict=True):  # fmt: skip
@@ -192,14 +222,23 @@ WHITTAKER_HILL = survey.hill(ince, period=pi, parameters=("a", "m", "alpha"), ev
     ("m", "closed", "exact"),
     [
         (1, (2, 4), {(2, 0): lambda x: -2 * x * x}),
-        (2, (3, 5), {(0, 1): lambda x: 1 - 4 * x - 2 * x * x, (1, 1): lambda x: 1 + 4 * x - 2 * x * x}),
+        (
+            2,
+            (3, 5),
+            {(0, 1): lambda x: 1 - 4 * x - 2 * x * x, (1, 1): lambda x: 1 + 4 * x - 2 * x * x},
+        ),
         (3, (4,), {}),
     ],
 )
 def test_gaps_of_whittaker_and_hill_coexist(m, closed, exact, tmp_path):
-    """Magnus and Winkler, chapter 7; the exact edges by substituting exp(alpha cos 2u) times 1, cos u, sin u."""
+    """Magnus and Winkler, chapter 7; the exact edges by substituting exp(alpha cos 2u) times 1, cos
+    u, sin u.
+    """
     axes = {"a": {"start": -12.0, "stop": 30.0, "num": 2}, "m": float(m), "alpha": 0.7}
-    ds = survey.run({"scene": WHITTAKER_HILL, "axes": axes, "boundaries": {"axis": "a"}}, output=tmp_path / "o.nc")
+    ds = survey.run(
+        {"scene": WHITTAKER_HILL, "axes": axes, "boundaries": {"axis": "a"}},
+        output=tmp_path / "o.nc",
+    )
     place, bar, n = ds.edge_position.values, ds.edge_position_error.values, ds.edge_index.values
     assert int(ds.edge_complete) == 1 and n.tolist() == [0, *np.repeat(np.arange(1, 6), 2)]
     for index in range(1, 6):
@@ -210,13 +249,19 @@ def test_gaps_of_whittaker_and_hill_coexist(m, closed, exact, tmp_path):
         assert abs(float(place[own][0]) - formula(0.7)) <= float(bar[own][0]) + 1e-15
     for a in place[n == closed[0]]:  # both factors vanish: |D| = 2 without a gap
         here = survey.evaluate(WHITTAKER_HILL, a=a, m=m, alpha=0.7, rtol=1e-13)
-        assert abs(abs(float(here.discriminant)) - 2) <= float(here.discriminant_error) and int(here.verdict) != 0
+        assert (
+            abs(abs(float(here.discriminant)) - 2) <= float(here.discriminant_error)
+            and int(here.verdict) != 0
+        )
 
 
 def test_what_rounding_leaves_of_z_is_in_the_bars():
     """z = (a + 1e7) - 1e7 - 2 q cos 2u has lost 7 digits: the bars say so, and hold the error."""
     rough = survey.hill(
-        lambda u, p: (1e7 + (p[0] - 2 * p[1] * cos(2 * u))) - 1e7, period=pi, parameters=("a", "q"), even=True
+        lambda u, p: (1e7 + (p[0] - 2 * p[1] * cos(2 * u))) - 1e7,
+        period=pi,
+        parameters=("a", "q"),
+        even=True,
     )
     own, scene = survey.evaluate(rough, a=A, q=Q[1:]), survey.evaluate("mathieu", a=A, q=Q[1:])
     assert within(own, scene, ["discriminant", "exponent"]) <= 1
@@ -225,12 +270,21 @@ def test_what_rounding_leaves_of_z_is_in_the_bars():
 
 def test_what_is_not_smooth_or_not_even_or_no_number_costs_one_point():
     def z(u, p):
-        return 2.0 + p[0] * abs(cos(2 * u)) + p[1] * cos(200 * u) + p[2] * sin(2 * u) + (p[3] - 1.0) ** 0.5
+        return (
+            2.0
+            + p[0] * abs(cos(2 * u))
+            + p[1] * cos(200 * u)
+            + p[2] * sin(2 * u)
+            + (p[3] - 1.0) ** 0.5
+        )
 
     scene = survey.hill(z, period=pi, parameters=("bend", "b", "odd", "root"), even=True)
     bend, odd, root = np.zeros(9), np.zeros(9), np.ones(9)
     bend[1], odd[3], root[5] = 1.0, 1e-7, 0.5
-    given = {name: xr.DataArray(v, dims="point") for name, v in (("bend", bend), ("odd", odd), ("root", root))}
+    given = {
+        name: xr.DataArray(v, dims="point")
+        for name, v in (("bend", bend), ("odd", odd), ("root", root))
+    }
     own = survey.evaluate(scene, b=5.0, **given)
     bad = status.INVALID_PARAMETERS
     assert own.status.values.tolist() == [0, status.NO_CONVERGENCE, 0, bad, 0, bad, 0, 0, 0]
@@ -239,7 +293,9 @@ def test_what_is_not_smooth_or_not_even_or_no_number_costs_one_point():
 
 
 def test_bits_do_not_depend_on_the_block(monkeypatch):
-    scene = survey.hill(square, period=pi, parameters=("a", "q", "duty"), even=True, breaks=edges_of_square)
+    scene = survey.hill(
+        square, period=pi, parameters=("a", "q", "duty"), even=True, breaks=edges_of_square
+    )
     point = {"a": A, "q": Q, "duty": [0.0, 0.2, 0.5, 1.0]}
     for one, given in ((scene, point), (SHIFTED, {"a": A, "q": Q})):
         whole = survey.evaluate(one, **given)
@@ -254,7 +310,9 @@ def spike(u, p):
 
 @pytest.mark.parametrize("seed", range(12))
 def test_a_spike_is_seen_or_refused(seed):
-    """Gaussian spikes of an area that matters, down to 1e-4 of the period; by solve_ivp in pieces about the spike."""
+    """Gaussian spikes of an area that matters, down to 1e-4 of the period; by solve_ivp in pieces
+    about the spike.
+    """
     random = np.random.default_rng(seed)
     a, area, at = random.uniform(1, 40), random.uniform(0.5, 3), random.uniform(0.02, 0.98)
     w = 10 ** random.uniform(-4, -2)
@@ -273,7 +331,9 @@ def test_a_spike_is_seen_or_refused(seed):
             return [y[1], -z * y[0], y[3], -z * y[2]]
 
         y = solve_ivp(slope, (low, high), y, method="DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
-    assert abs(y[0] + y[3] - float(own.discriminant)) < 1e-8 * (1 + abs(y).max()) + float(own.discriminant_error)
+    assert abs(y[0] + y[3] - float(own.discriminant)) < 1e-8 * (1 + abs(y).max()) + float(
+        own.discriminant_error
+    )
 
 
 SPIKE = survey.hill(spike, period=1.0, parameters=("a", "area", "at", "w"))
@@ -281,10 +341,14 @@ SPIKE = survey.hill(spike, period=1.0, parameters=("a", "area", "at", "w"))
 
 def test_a_spike_that_a_run_would_miss_is_refused_with_its_place_and_resolved_with_a_break_there():
     point = {"a": 4.0, "area": 2.0, "at": 0.3045, "w": 2e-4}
-    with pytest.raises(survey.BadInput, match=r"z has a spike near u = 0\.304.*T/128; name its position in breaks"):
+    with pytest.raises(
+        survey.BadInput, match=r"z has a spike near u = 0\.304.*T/128; name its position in breaks"
+    ):
         survey.evaluate(SPIKE, **point)
     breaks = {"breaks": lambda p: [p[2] - 8 * p[3], p[2], p[2] + 8 * p[3]]}
-    named = survey.evaluate(survey.hill(spike, period=1.0, parameters=SPIKE.PARAMETERS, **breaks), **point)
+    named = survey.evaluate(
+        survey.hill(spike, period=1.0, parameters=SPIKE.PARAMETERS, **breaks), **point
+    )
     # as narrow as this it makes y' jump by its area times y, to the order of w
     trace = 2 * cos(2.0) - 2.0 * np.sqrt(pi) / 2 * sin(2.0)
     assert abs(float(named.discriminant) - trace) < 5e-3 and float(named.discriminant_error) < 1e-8

@@ -16,7 +16,9 @@ WAVE = survey.hill(
     period=2 * pi, parameters=("a", "b", "duty"), breaks=lambda p: [p[2] * pi, (2 - p[2]) * pi], even=True,
 )  # fmt: skip
 HARMONICS = survey.hill(
-    lambda u, p: p[0] + p[1] * cos(2 * u) + p[2] * p[1] * sin(4 * u), period=pi, parameters=("a", "q", "r")
+    lambda u, p: p[0] + p[1] * cos(2 * u) + p[2] * p[1] * sin(4 * u),
+    period=pi,
+    parameters=("a", "q", "r"),
 )
 MAPS = [
     ("even", survey.hill(lambda u, p: p[0] - 2 * p[1] * cos(2 * u), period=pi, parameters=("a", "q"), even=True),
@@ -56,15 +58,20 @@ def test_maps_agree_with_their_points(rows, scene, ranges, variables):
     assert rows["rows"] > 0 and rows["points"] == 0
     long = [name for name, values in axes.items() if np.ndim(values)]
     random = np.random.default_rng(0)
-    mine = dense.isel({name: xr.DataArray(random.integers(0, axes[name].size, 60), dims="point") for name in long})
-    points = {name: mine[name].drop_vars(mine.coords) if name in long else axes[name] for name in axes}
+    mine = dense.isel(
+        {name: xr.DataArray(random.integers(0, axes[name].size, 60), dims="point") for name in long}
+    )
+    points = {
+        name: mine[name].drop_vars(mine.coords) if name in long else axes[name] for name in axes
+    }
     alone = survey.evaluate(scene, **points, method="dop853", rtol=1e-13)
     for name in error_bars(mine):
         bars = mine[f"{name}_error"].values.astype(float) + alone[f"{name}_error"].values
         assert (abs(mine[name].values - alone[name].values) <= bars).all(), name
     both = (mine.verdict.values >= 0) & (alone.verdict.values >= 0)
     assert both.mean() > 0.95 and (mine.verdict.values == alone.verdict.values)[both].all()
-    assert dense.attrs["accuracy_missed"] < 1e-3 * dense.status.size  # next to edges, where the exponent is steep
+    # next to edges, where the exponent is steep
+    assert dense.attrs["accuracy_missed"] < 1e-3 * dense.status.size
 
 
 def test_blocks_of_a_map_have_the_same_bits(monkeypatch):
@@ -80,7 +87,9 @@ def test_blocks_of_a_map_have_the_same_bits(monkeypatch):
 
 
 def test_a_bad_row_affects_only_itself():
-    scene = survey.hill(lambda u, p: p[0] + 1 / p[1] * cos(2 * u), period=pi, parameters=("a", "c"), even=True)
+    scene = survey.hill(
+        lambda u, p: p[0] + 1 / p[1] * cos(2 * u), period=pi, parameters=("a", "c"), even=True
+    )
     a, c = np.linspace(0, 9, 30), np.array([-1.0, 0.0, 2.0])
     ds = survey.evaluate(scene, a=a, c=c)
     assert (ds.status.sel(c=0) != 0).all() and (ds.status.sel(c=[-1.0, 2.0]) == 0).all()
@@ -91,7 +100,9 @@ def test_a_bad_row_affects_only_itself():
 
 def test_large_cancelling_terms_widen_the_bars():
     """z is the same function with 10^6 added and taken away: its rounding counts in rows, too."""
-    plain = survey.hill(lambda u, p: p[0] + p[1] * cos(2 * u), period=pi, parameters=("a", "q"), even=True)
+    plain = survey.hill(
+        lambda u, p: p[0] + p[1] * cos(2 * u), period=pi, parameters=("a", "q"), even=True
+    )
     noisy = survey.hill(
         lambda u, p: ((p[0] + p[1] * cos(2 * u)) + 1e6 * (1 + 0.1 * sin(u) ** 2)) - 1e6 * (1 + 0.1 * sin(u) ** 2),
         period=pi, parameters=("a", "q"), even=True,
@@ -108,7 +119,10 @@ def test_large_cancelling_terms_widen_the_bars():
 @pytest.mark.parametrize("even", [True, False])
 def test_scattered_points_are_served_by_series(rows, even, variables):
     scene = survey.hill(
-        lambda u, p: p[0] + 2 * p[1] * cos(2 * u - (0.0 if even else 0.3)), period=pi, parameters=("a", "q"), even=even
+        lambda u, p: p[0] + 2 * p[1] * cos(2 * u - (0.0 if even else 0.3)),
+        period=pi,
+        parameters=("a", "q"),
+        even=even,
     )
     random = np.random.default_rng(2)
     a, q = random.uniform(-5, 30, 6000), random.uniform(-3, 6, 6000)
@@ -118,16 +132,22 @@ def test_scattered_points_are_served_by_series(rows, even, variables):
     assert rows["rows"] > 0 and set(np.flatnonzero(own.status.values)) == {0, 9}
     scene = survey.evaluate("mathieu", a=given["a"][:800], q=-given["q"][:800], rtol=1e-12)
     first = own.isel(point=slice(0, 800))
-    for name in ("discriminant", "exponent", "rotation_number") if variables is None else ("discriminant",):
+    for name in (
+        ("discriminant", "exponent", "rotation_number") if variables is None else ("discriminant",)
+    ):
         bars = first[f"{name}_error"].astype(float) + scene[f"{name}_error"].astype(float)
         off = abs(first[name] - scene[name]).values
         assert (off <= bars.values)[np.isfinite(bars.values)].all(), name
     both = (first.verdict >= 0) & (scene.verdict >= 0)
-    assert float(both.mean()) > 0.99 and bool((first.verdict == scene.verdict).where(both, True).all())
+    assert float(both.mean()) > 0.99 and bool(
+        (first.verdict == scene.verdict).where(both, True).all()
+    )
 
 
 def test_a_row_that_is_rough_leaves_the_others():
-    """|cos u| counts in the second of five rows alone, where the check of the axes' ends and middles does not look."""
+    """|cos u| counts in the second of five rows alone, where the check of the axes' ends and
+    middles does not look.
+    """
     scene = survey.hill(
         lambda u, p: p[0] + exp(-1e4 * (p[1] - 0.25) ** 2) * abs(cos(u)),
         period=2 * pi,
@@ -138,4 +158,7 @@ def test_a_row_that_is_rough_leaves_the_others():
     assert set(ds.status.sel(c=0.25).values.tolist()) == {status.NO_CONVERGENCE}
     assert (ds.status.drop_sel(c=0.25) == 0).all()
     free = 2 * np.cos(2 * pi * np.sqrt(ds.a))
-    assert (abs(ds.discriminant - free).drop_sel(c=0.25) <= ds.discriminant_error.drop_sel(c=0.25) + 1e-14).all()
+    assert (
+        abs(ds.discriminant - free).drop_sel(c=0.25)
+        <= ds.discriminant_error.drop_sel(c=0.25) + 1e-14
+    ).all()

@@ -1,4 +1,6 @@
-"""Spikes of a user's z as wide as the file says are resolved: none goes unseen, against Runge-Kutta in fine steps."""
+"""Spikes of a user's z as wide as the file says are resolved: none goes unseen, against Runge-Kutta
+in fine steps.
+"""
 
 from math import cos, cosh, exp, pi
 
@@ -14,7 +16,9 @@ OUTPUTS = frozenset(["discriminant", "y1", "y2", "dy1", "dy2"])
 
 
 def z(u, p):
-    """A wave, and a spike, p[6] half as wide at half its height: a Gaussian, sech^2 or one of bounded support."""
+    """A wave, and a spike, p[6] half as wide at half its height: a Gaussian, sech^2 or one of
+    bounded support.
+    """
     x = (u - p[5]) / p[6]
     if p[7] == 0:
         spike = exp(-0.6931471805599453 * x * x) if abs(x) < 30 else 0.0
@@ -31,11 +35,15 @@ WIDTH = SCENE.NOTES["z_resolved_width"]
 
 
 def random_points(seed, number):
-    """Spikes of one to one and a half times the width, as high as 1e-6 to 1e3, on waves of amplitudes to 1e3."""
+    """Spikes of one to one and a half times the width, as high as 1e-6 to 1e3, on waves of
+    amplitudes to 1e3.
+    """
     random = np.random.default_rng(seed)
     swing = np.where(random.random(number) < 0.2, 0, 10 ** random.uniform(-1, 3, number))
     low = random.random(number) < 0.5  # below what differences of samples show beside such a wave
-    height = np.where(low, swing * 10 ** random.uniform(-6, -1, number), 10 ** random.uniform(-5, 3, number))
+    height = np.where(
+        low, swing * 10 ** random.uniform(-6, -1, number), 10 ** random.uniform(-5, 3, number)
+    )
     return np.stack(
         [
             random.uniform(-20, 60, number),
@@ -69,13 +77,17 @@ def values(u, p):
 def unseen(p):
     """How many of the points have an answer whose discriminant is off by more than its bar."""
     out = SCENE.solve(dict(zip(NAMES, p.T, strict=True)), Request({}, "auto", 1e-9, OUTPUTS))
-    found, bar, answered = (out[name].ravel() for name in ("discriminant", "discriminant_error", "status"))
+    found, bar, answered = (
+        out[name].ravel() for name in ("discriminant", "discriminant_error", "status")
+    )
     assert np.mean(answered == 0) > 0.7
     return int(beyond(values, p, PERIOD, found, bar)[answered == 0].sum())
 
 
 def test_spikes_that_differences_of_samples_hid_are_seen():
-    """Each beside a wave whose sixth differences are larger than its own; bars were up to 200 times too small."""
+    """Each beside a wave whose sixth differences are larger than its own; bars were up to 200 times
+    too small.
+    """
     assert unseen(np.array([
         [42.4, 4.64, 7, 0.0, 2.08e-5, 0.31973, 0.004291, 2], [58.4, 0.945, 6, 0.0, 2.07e-5, 0.48843, 0.004303, 2],
         [52.0, 2.55, 4, 0.0, 4.53e-6, 0.60683, 0.0040815, 2], [55.3, 1.92, 5, 0.0, 4.48e-6, 0.72488, 0.0044085, 2],

@@ -1,4 +1,6 @@
-"""Danby's map in cells: every point of a decided cell has its verdict; areas lie within their bounds, ever narrower."""
+"""Danby's map in cells: every point of a decided cell has its verdict; areas lie within their
+bounds, ever narrower.
+"""
 
 import numpy as np
 import pytest
@@ -11,13 +13,18 @@ from survey.truth import danby
 
 WORKFLOW = {
     "scene": "libration_elliptic",
-    "axes": {"mu": {"start": 0.0, "stop": 0.055, "num": 3}, "e": {"start": 0.0, "stop": 0.6, "num": 3}},
+    "axes": {
+        "mu": {"start": 0.0, "stop": 0.055, "num": 3},
+        "e": {"start": 0.0, "stop": 0.6, "num": 3},
+    },
 }
 
 
 def ran(tmp_path, width):
     path = tmp_path / f"{width}.nc"
-    return survey.run(WORKFLOW | {"refine": {"width": width}, "output": {"figures": []}}, output=path).load()
+    return survey.run(
+        WORKFLOW | {"refine": {"width": width}, "output": {"figures": []}}, output=path
+    ).load()
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +40,8 @@ def test_points_of_decided_cells_have_their_verdict(coarse):
     for _ in range(3):
         part = random.uniform(0.0, 1.0, (2, decided.sum()))
         mu, e = (
-            coarse[f"cell_{name}_low"].values[decided] * (1 - p) + coarse[f"cell_{name}_high"].values[decided] * p
+            coarse[f"cell_{name}_low"].values[decided] * (1 - p)
+            + coarse[f"cell_{name}_high"].values[decided] * p
             for name, p in zip(("mu", "e"), part, strict=True)
         )
         out = danby.solved(mu, e, 1e-28)
@@ -49,16 +57,25 @@ def test_the_area_has_a_bound_that_narrows(coarse, tmp_path):
         assert total == pytest.approx(0.055 * 0.6, abs=2 * float(ds.area_error.max()))
     assert (abs(fine.area - coarse.area) <= fine.area_error + coarse.area_error).all()
     assert (fine.area_error < 0.4 * coarse.area_error).all()
-    grid = survey.evaluate("libration_elliptic", mu=np.linspace(0, 0.055, 402)[1::2], e=np.linspace(0, 0.6, 402)[1::2])
+    grid = survey.evaluate(
+        "libration_elliptic", mu=np.linspace(0, 0.055, 402)[1::2], e=np.linspace(0, 0.6, 402)[1::2]
+    )
     share = float((grid.verdict == 1).mean())
-    assert share == pytest.approx(float(fine.area_fraction[1]), abs=float(fine.area_fraction_error.max()) + 0.005)
+    assert share == pytest.approx(
+        float(fine.area_fraction[1]), abs=float(fine.area_fraction_error.max()) + 0.005
+    )
 
 
 def test_where_the_functions_are_not_sure_nothing_is_decided():
-    """A series whose slack reaches across 0 decides nothing; where one function is negative, the cell is unstable."""
+    """A series whose slack reaches across 0 decides nothing; where one function is negative, the
+    cell is unstable.
+    """
     series = np.zeros((2, 5, 4, 4))
     series[:, :, 0, 0], series[1, 2, 0, 0] = 1.0, -1.0
-    assert sign_cells.decided(series, np.full((2, 5), 0.5)).tolist() == [sign_cells.STABLE, sign_cells.UNSTABLE]
+    assert sign_cells.decided(series, np.full((2, 5), 0.5)).tolist() == [
+        sign_cells.STABLE,
+        sign_cells.UNSTABLE,
+    ]
     assert sign_cells.decided(series, np.full((2, 5), 1.5)).tolist() == [cells.UNDECIDED] * 2
 
 

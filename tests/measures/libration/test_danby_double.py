@@ -15,15 +15,21 @@ from survey.measures.libration import danby, danby_double, panels
 from survey.measures.libration.answers import Answers
 from survey.sweep import cost
 
-REFERENCE = json.loads(resources.files("survey.reference").joinpath("libration_elliptic.json").read_text())
+REFERENCE = json.loads(
+    resources.files("survey.reference").joinpath("libration_elliptic.json").read_text()
+)
 POINTS, BOUNDARY, TIP = REFERENCE["points"], REFERENCE["boundary"], REFERENCE["tip"]
 NAMES = ("A", "B", "C", "D", "t")
-# e, and between which mu `collision` of a stable motion in the strip changes: both arcs are as long there.
+# e, and between which mu `collision` of a stable motion in the strip changes: both arcs are as long
+# there.
 TIES = ((0.0, 0.0350, 0.0358), (0.2, 0.0405, 0.0412))
 
 
 def results(mu, e):
-    mu, e = (np.array(np.broadcast_to(values, np.broadcast(mu, e).shape), dtype=float) for values in (mu, e))
+    mu, e = (
+        np.array(np.broadcast_to(values, np.broadcast(mu, e).shape), dtype=float)
+        for values in (mu, e)
+    )
     return danby_double._results(e.ravel(), mu.ravel())
 
 
@@ -34,7 +40,9 @@ def row(edge, number=401):
 
 def points(mu, e, **more):
     mu, e = np.broadcast_arrays(mu, e)
-    return survey.evaluate("libration_elliptic", mu=xr.DataArray(mu, dims="p"), e=xr.DataArray(e, dims="p"), **more)
+    return survey.evaluate(
+        "libration_elliptic", mu=xr.DataArray(mu, dims="p"), e=xr.DataArray(e, dims="p"), **more
+    )
 
 
 def test_references_lie_within_bars_of_many_digits():
@@ -48,7 +56,9 @@ def test_references_lie_within_bars_of_many_digits():
                 assert bar < (1e-24 if point["e"] < 0.9 else 1e-22) * (1 + abs(value))
 
 
-@pytest.mark.parametrize(("mu", "e"), [(0.5, 0.3), (np.nextafter(0.5, 0), 1e-300), (1e-30, 0.1), (0.02, 0.0)])
+@pytest.mark.parametrize(
+    ("mu", "e"), [(0.5, 0.3), (np.nextafter(0.5, 0), 1e-300), (1e-30, 0.1), (0.02, 0.0)]
+)
 def test_the_ends_of_the_parameters_lie_within_the_bars(mu, e):
     found = results([mu], [e])[0]
     with mp.workdps(exact.DIGITS):
@@ -110,14 +120,18 @@ def test_rows_and_points_are_as_accurate_as_asked():
     assert (dense.verdict.values.ravel() == alone.verdict.values).all()
     with mp.workdps(exact.DIGITS):
         wanted = exact.factors(mpf(mu[40]), mpf(e[1]), exact.STEPS, exact.ORDER)
-        assert abs(mpf(float(dense.a[40, 1])) - 4 * wanted["t"] + 4) <= mpf(float(dense.a_error[40, 1]))
+        assert abs(mpf(float(dense.a[40, 1])) - 4 * wanted["t"] + 4) <= mpf(
+            float(dense.a_error[40, 1])
+        )
 
 
 def test_a_row_in_double_double_has_the_same_bits_in_any_block(monkeypatch):
     given = {"mu": np.linspace(0.0, 0.05, 90), "e": np.array([0.2, 0.9]), "rtol": 1e-14}
     whole = survey.evaluate("libration_elliptic", **given)
     monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
-    xr.testing.assert_identical(whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs())
+    xr.testing.assert_identical(
+        whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs()
+    )
 
 
 def test_places_and_weights_of_the_series_are_exact_to_the_last_digit():
@@ -125,7 +139,9 @@ def test_places_and_weights_of_the_series_are_exact_to_the_last_digit():
     with mp.workdps(40):
         for k in range(len(both)):
             angle = mp.pi * (2 * k + 1) / (2 * len(both))
-            for pair, exactly in zip(both[k].reshape(2, 2), (7 + mp.cos(angle), 1 - mp.cos(angle)), strict=True):
+            for pair, exactly in zip(
+                both[k].reshape(2, 2), (7 + mp.cos(angle), 1 - mp.cos(angle)), strict=True
+            ):
                 assert abs(mpf(pair[0]) + mpf(pair[1]) - 3 * exactly / 8) < 1e-32 * exactly
             for n in (0, 1, 7, len(both) - 1):
                 exactly = mp.cos(n * angle) * (2 if n else 1) / len(both)
@@ -175,13 +191,31 @@ def lies(mu, e, method, rtol):
     return int(wrong.sum())
 
 
-@pytest.mark.parametrize(("method", "rtol"), [("auto", 1e-10), ("auto", 1e-13), ("taylor16", 1e-9), ("dop853", 1e-5)])
+@pytest.mark.parametrize(
+    ("method", "rtol"), [("auto", 1e-10), ("auto", 1e-13), ("taylor16", 1e-9), ("dop853", 1e-5)]
+)
 def test_bars_hold_at_the_ends_of_mu_and_e(method, rtol):
-    assert lies(*hard_points(np.random.default_rng(1), 1000 if method != "dop853" else 100), method, rtol) == 0
+    assert (
+        lies(
+            *hard_points(np.random.default_rng(1), 1000 if method != "dop853" else 100),
+            method,
+            rtol,
+        )
+        == 0
+    )
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9, 1e-13])
-@pytest.mark.parametrize(("method", "number"), [("auto", 25_000), ("taylor16", 25_000), ("dop853", 500), ("rk4", 500)])
+@pytest.mark.parametrize(
+    ("method", "number"), [("auto", 25_000), ("taylor16", 25_000), ("dop853", 500), ("rk4", 500)]
+)
 def test_bars_hold_at_very_many_ends(method, number, rtol):
-    assert lies(*hard_points(np.random.default_rng(2), number), method, max(rtol, 1e-9 if method == "rk4" else 0)) == 0
+    assert (
+        lies(
+            *hard_points(np.random.default_rng(2), number),
+            method,
+            max(rtol, 1e-9 if method == "rk4" else 0),
+        )
+        == 0
+    )

@@ -1,4 +1,6 @@
-"""The radius of effective stability: the bound against the full equations and plain brackets, times by quadrature."""
+"""The radius of effective stability: the bound against the full equations and plain brackets, times
+by quadrature.
+"""
 
 from math import factorial, log, pi, sqrt
 
@@ -16,7 +18,9 @@ MU_1, MU_2, MU_R = map(float, exact.CRITICAL)
 
 
 def test_the_first_remainder_bounds_the_full_equations():
-    """r = 2: along the exact force at random places on the polydisk, no action changes faster than the bound."""
+    """r = 2: along the exact force at random places on the polydisk, no action changes faster than
+    the bound.
+    """
     random, mu, rho = np.random.default_rng(2), 0.02, 1e-3
     norms = lie.remainders(np.array([mu]), 8)
     known = np.array([[norms[2, d][0].max() for d in range(3, 10)]])
@@ -34,14 +38,17 @@ def test_the_first_remainder_bounds_the_full_equations():
     s, e, k = x - (0.5 - mu), y - sqrt(0.75), 0.75 * sqrt(3.0) * (1.0 - 2.0 * mu)
     # what the force is beyond that of H2 and the constant: -d(H3 + H4 + ...)/dq
     force -= [-(0.5 - mu) - 0.25 * s + k * e, -sqrt(0.75) + k * s + 1.25 * e, -zeta]
-    # dz_j/dt = {z_j, R}, z_j = -i {q, zbar_j}-component: dr_j/dt = 2 Re(i zbar_j * conj(column) . dR/dq)
+    # dz_j/dt = {z_j, R}, z_j = -i {q, zbar_j}-component: dr_j/dt = 2 Re(i zbar_j * conj(column) .
+    # dR/dq)
     rates = 2.0 * (1j * z.conj() * (columns[:, :3].conj() @ -force).T).real
     fastest = abs(rates).max()
     assert 0.2 * bound < fastest < bound
 
 
 def test_norms_against_plain_brackets():
-    """After two transforms: sums of |k_j| |coefficient| of degrees 5 to 7, by dictionaries and in 30 digits."""
+    """After two transforms: sums of |k_j| |coefficient| of degrees 5 to 7, by dictionaries and in
+    30 digits.
+    """
     mu, top = 0.012, 7
     norms = lie.remainders(np.array([mu]), 6)
     with mp.workdps(30):
@@ -58,7 +65,9 @@ def test_norms_against_plain_brackets():
 def transformed(F, stage, omega, top):
     """exp(ad chi) of all terms, chi removing those of degree `stage` that are not diagonal."""
     off = {e: c for e, c in F[stage].items() if e[:3] != e[3:]}
-    chi = {e: -c / (1j * sum(omega[j] * (e[3 + j] - e[j]) for j in range(3))) for e, c in off.items()}
+    chi = {
+        e: -c / (1j * sum(omega[j] * (e[3 + j] - e[j]) for j in range(3))) for e, c in off.items()
+    }
     out = dict(F)
     for degree, f in F.items():
         n, term = 1, f
@@ -73,7 +82,9 @@ def test_the_time_of_a_geometric_remainder():
     """A_d = a q^d: the tail is exact, B = a (q rho)^(r + 1) / (1 - q rho)."""
     r, a, q, start = 4, 3.0, 20.0, 0.01
     norms = a * q ** np.arange(r + 1, r + 5)[None]
-    known = quad(lambda rho: 2 * rho * (1 - q * rho) / (a * (q * rho) ** (r + 1)), start, sqrt(2) * start)[0]
+    known = quad(
+        lambda rho: 2 * rho * (1 - q * rho) / (a * (q * rho) ** (r + 1)), start, sqrt(2) * start
+    )[0]
     assert effective.escape_time(r, norms, np.array([start]))[0] == pytest.approx(known, rel=1e-12)
     assert effective.escape_time(r, norms, np.array([0.036]))[0] == 0.0  # the tail diverges at 1/20
 
@@ -88,7 +99,8 @@ def test_the_radius_keeps_the_time_that_is_asked():
         for n in range(mu.size):
             known = np.array([[norms[r[n], d][0][:, n].max() for d in range(r[n] + 1, 10)]])
             inside, outside = (
-                effective.escape_time(r[n], known, radius[n : n + 1] * (1 + e))[0] for e in (-1e-9, 1e-9)
+                effective.escape_time(r[n], known, radius[n : n + 1] * (1 + e))[0]
+                for e in (-1e-9, 1e-9)
             )
             assert inside > time > outside
             assert time < 1e6 or inside == pytest.approx(time, rel=1e-6)
@@ -97,7 +109,9 @@ def test_the_radius_keeps_the_time_that_is_asked():
 
 
 def test_orders_end_before_a_resonance():
-    """Where a divisor is nothing the order is the resonance's less 1, and the radius that of this order alone."""
+    """Where a divisor is nothing the order is the resonance's less 1, and the radius that of this
+    order alone.
+    """
     fourth = 0.008270372663897213  # (1, 4, 0)
     mu = np.array([MU_1, MU_2, fourth, MU_R * 1.01, -1.0])
     radius, bar, r = effective.radius(lie.remainders(mu, 8), 2 * pi * 1e9)

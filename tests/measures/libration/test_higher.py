@@ -1,4 +1,6 @@
-"""Orders 8 and 10 as outputs of the scene: Deprit's triangle, and the radius of effective stability by its measure."""
+"""Orders 8 and 10 as outputs of the scene: Deprit's triangle, and the radius of effective stability
+by its measure.
+"""
 
 import json
 from importlib.resources import files
@@ -32,7 +34,9 @@ def test_the_radius_is_that_of_the_measure_and_falls_with_time():
         np.testing.assert_array_equal(ds.effective_order[:, j], r)
     assert (ds.effective_radius.diff("periods") < 0).all()
     lower = survey.evaluate("libration", mu=mu, periods=periods, order="8")
-    assert (ds.effective_radius >= 0.999 * lower.effective_radius).all() and ds.sizes["monomial10"] == 21
+    assert (ds.effective_radius >= 0.999 * lower.effective_radius).all() and ds.sizes[
+        "monomial10"
+    ] == 21
 
 
 def test_order_6_is_what_it_was():
@@ -41,7 +45,10 @@ def test_order_6_is_what_it_was():
     assert "c8" not in ds and "periods" not in ds.coords and more.attrs["options"] == "order=8"
     for name in ("c", "D6", "M_ray", "verdict", "status"):
         np.testing.assert_array_equal(ds[name], more[name])
-    assert np.isnan(more.effective_radius[mu > 0.0386]).all() and np.isnan(more.effective_order[mu > 0.0386]).all()
+    assert (
+        np.isnan(more.effective_radius[mu > 0.0386]).all()
+        and np.isnan(more.effective_order[mu > 0.0386]).all()
+    )
 
 
 def test_what_is_not_known_is_refused():

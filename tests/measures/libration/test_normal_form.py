@@ -1,4 +1,6 @@
-"""Formal stability by the normal form: combinations and the ray against mpmath, verdicts at the edges, lost points."""
+"""Formal stability by the normal form: combinations and the ray against mpmath, verdicts at the
+edges, lost points.
+"""
 
 from types import SimpleNamespace
 
@@ -34,8 +36,12 @@ def test_every_output_lies_within_its_bar(method):
     assert (answer["status"] == status.OK).all()
     for n, mu in enumerate(MASSES):
         known = exact.forms(mu)
-        found = dict(zip(exact.LABELS, zip(answer["c"][n], answer["c_error"][n], strict=True), strict=True))
-        found |= {name: (answer[name][n], answer[f"{name}_error"][n]) for name in normal_form.COMBINED}
+        found = dict(
+            zip(exact.LABELS, zip(answer["c"][n], answer["c_error"][n], strict=True), strict=True)
+        )
+        found |= {
+            name: (answer[name][n], answer[f"{name}_error"][n]) for name in normal_form.COMBINED
+        }
         for name, (value, bar) in found.items():
             assert abs(mpf(value) - known[name]) <= mpf(bar), (name, mu)
 
@@ -53,7 +59,13 @@ def test_sums_of_coefficients_keep_their_bars():
 @pytest.mark.parametrize("method", ["rational", "rational_double"])
 def test_the_form_on_the_ray(method):
     """Where the ray is in the octant, its bar is tight, to the very floats beside mu2."""
-    mu = np.concatenate([np.linspace(MU_C, MU_D, 40)[1:-1], neighbours(MU_2[0]), MU_2[0] + 10.0 ** -np.arange(4, 17)])
+    mu = np.concatenate(
+        [
+            np.linspace(MU_C, MU_D, 40)[1:-1],
+            neighbours(MU_2[0]),
+            MU_2[0] + 10.0 ** -np.arange(4, 17),
+        ]
+    )
     answer = solved(mu, method)
     for n, one in enumerate(mu):
         known, bar = exact.on_ray(one), answer["M_ray_error"][n]

@@ -1,4 +1,6 @@
-"""Series of Danby's factors in both parameters, against the same point by point and against multiprecision."""
+"""Series of Danby's factors in both parameters, against the same point by point and against
+multiprecision.
+"""
 
 import danby_exact as exact
 import numpy as np
@@ -23,12 +25,16 @@ def at(series, mu):
     return series.astype(np.longdouble) @ weights
 
 
-@pytest.mark.parametrize(("low", "high"), [(1e-300, 1e-3), (0.0, 0.76), (0.7615, 0.97), (0.964, 0.9999), (0.9999, 1.0)])
+@pytest.mark.parametrize(
+    ("low", "high"), [(1e-300, 1e-3), (0.0, 0.76), (0.7615, 0.97), (0.964, 0.9999), (0.9999, 1.0)]
+)
 def test_rows_lie_within_narrow_bars_of_their_points(low, high):
     random = np.random.default_rng(7)
     e = np.concatenate([random.uniform(low, high, 6), np.tanh(1.0) + 2.0**-53 * np.arange(-3, 4)])
     series, bars = panels.rows(e)
-    truth = danby_double._results(np.repeat(e, MU.size), np.tile(MU, e.size)).reshape(e.size, MU.size, 15)
+    truth = danby_double._results(np.repeat(e, MU.size), np.tile(MU, e.size)).reshape(
+        e.size, MU.size, 15
+    )
     values = truth[..., :5].astype(np.longdouble) + truth[..., 5:10]
     off = abs(at(series, MU) - np.swapaxes(values, 1, 2))
     assert (off <= bars[..., None]).all() and off.max() > 0
@@ -57,12 +63,18 @@ def test_a_series_is_that_of_multiprecision():
     with mp.workdps(exact.DIGITS):
         wanted = exact.factors(mpf(mu), mpf(e), exact.STEPS, exact.ORDER)
         for j, name in enumerate(NAMES):
-            assert abs(mpf(float(at(series[0, j], np.array([mu]))[0])) - wanted[name]) <= bars[0, j] < 1e-12
+            assert (
+                abs(mpf(float(at(series[0, j], np.array([mu]))[0])) - wanted[name])
+                <= bars[0, j]
+                < 1e-12
+            )
 
 
 def test_points_lie_within_their_bars():
     random = np.random.default_rng(3)
-    e = np.concatenate([random.uniform(0, 1, 300), 1 - 10 ** random.uniform(-15, -1, 200), [1e-300, 0.5]])
+    e = np.concatenate(
+        [random.uniform(0, 1, 300), 1 - 10 ** random.uniform(-15, -1, 200), [1e-300, 0.5]]
+    )
     mu = np.concatenate([random.uniform(0, 0.5, 400), 10 ** random.uniform(-20, -1, 102)])
     found, truth = panels.points(e, mu), danby_double._results(e, mu)
     off = abs((found[:, :5] - truth[:, :5]) - truth[:, 5:10])
@@ -81,8 +93,14 @@ def test_many_points_are_those_of_few_and_keep_their_bits_in_any_block(monkeypat
     monkeypatch.setattr(danby, "MANY", 400)
     many = survey.evaluate("libration_elliptic", **points)
     for name in "ab":
-        assert (abs(few[name] - many[name]) <= few[f"{name}_error"].astype(float) + many[f"{name}_error"]).all()
-        assert (many[f"{name}_error"][1:] < few[f"{name}_error"][1:]).mean() > 0.9  # they are from series
+        assert (
+            abs(few[name] - many[name])
+            <= few[f"{name}_error"].astype(float) + many[f"{name}_error"]
+        ).all()
+        # they are from series
+        assert (many[f"{name}_error"][1:] < few[f"{name}_error"][1:]).mean() > 0.9
     assert (few.verdict == many.verdict).all() and (few.collision == many.collision).all()
     monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
-    xr.testing.assert_identical(many.drop_attrs(), survey.evaluate("libration_elliptic", **points).drop_attrs())
+    xr.testing.assert_identical(
+        many.drop_attrs(), survey.evaluate("libration_elliptic", **points).drop_attrs()
+    )

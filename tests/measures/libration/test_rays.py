@@ -1,4 +1,6 @@
-"""Rays of L = N = 0, their discriminant and the determinants: against the printed values, and against 60 digits."""
+"""Rays of L = N = 0, their discriminant and the determinants: against the printed values, and
+against 60 digits.
+"""
 
 import libration_exact as exact
 import numpy as np
@@ -31,12 +33,18 @@ def test_printed_values():
     assert float(ds.alpha.sel(ray=2)) == pytest.approx(1.41288351286687482, rel=1e-13)
     assert float(ds.beta.sel(ray=2)) == pytest.approx(-1.26111828689478070, rel=1e-13)
     beside = survey.evaluate("libration", mu=DET_ZERO * np.array([1 - 1e-9, 1 + 1e-9]))
-    assert np.prod(np.sign(beside.det_N.values)) == -1 and (abs(beside.det_N) > beside.det_N_error).all()
+    assert (
+        np.prod(np.sign(beside.det_N.values)) == -1
+        and (abs(beside.det_N) > beside.det_N_error).all()
+    )
 
 
 def test_the_ray_of_a_pole_is_not_given_where_it_may_be_infinite():
     ds = survey.evaluate("libration", mu=[RAY_ZERO], method="rational")
-    assert np.isnan(ds.alpha.sel(ray=1)) == np.isnan(ds.alpha_error.sel(ray=1)) and int(ds.status[0]) == 0
+    assert (
+        np.isnan(ds.alpha.sel(ray=1)) == np.isnan(ds.alpha_error.sel(ray=1))
+        and int(ds.status[0]) == 0
+    )
 
 
 def test_the_discriminant_is_positive_and_arnolds_determinant():

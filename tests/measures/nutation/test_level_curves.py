@@ -1,4 +1,6 @@
-"""The bifurcation set on maps of initial states against the quartic and its discriminant in multiprecision."""
+"""The bifurcation set on maps of initial states against the quartic and its discriminant in
+multiprecision.
+"""
 
 import numpy as np
 import pytest
@@ -9,7 +11,15 @@ from survey.measures.nutation import curves as nc
 from survey.request.workflow import check
 from survey.sweep import boundaries
 
-BODY = {"A": 1.3, "C": 0.6, "epsilon": 2.0, "theta0": 1.2, "p_theta0": 0.4, "p_psi": 0.2, "p_phi": 0.3}
+BODY = {
+    "A": 1.3,
+    "C": 0.6,
+    "epsilon": 2.0,
+    "theta0": 1.2,
+    "p_theta0": 0.4,
+    "p_psi": 0.2,
+    "p_phi": 0.3,
+}
 MAPS = [
     ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {}),
     ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {"p_theta0": 0.0}),
@@ -47,7 +57,9 @@ def steepness(point):
 def meets(function, point, axes, error):
     """Does the function change its sign within `error` of the point, on either axis?"""
     for name, (low, high) in axes.items():
-        step = mpf(error) * (abs(high - low) if name != "epsilon" else point[name] * mp.log(high / low))
+        step = mpf(error) * (
+            abs(high - low) if name != "epsilon" else point[name] * mp.log(high / low)
+        )
         sides = [function(point | {name: point[name] + s * step}) for s in (1, -1)]
         if sides[0] * sides[1] <= 0:
             return True
@@ -57,7 +69,10 @@ def meets(function, point, axes, error):
 @each
 def test_each_point_lies_on_its_curve_within_its_error(axes, fixed):
     ds, rest = found(axes, fixed)
-    assert 0 < float(ds.curve_position_error.max()) < 1e-9 and np.median(ds.curve_position_error) < 1e-13
+    assert (
+        0 < float(ds.curve_position_error.max()) < 1e-9
+        and np.median(ds.curve_position_error) < 1e-13
+    )
     with mp.workdps(60):
         for kind, own in runs(ds, (nc.STABLE, nc.SADDLE, nc.PASSAGE)):
             for i in range(own.start, own.stop, 17):
@@ -65,25 +80,37 @@ def test_each_point_lies_on_its_curve_within_its_error(axes, fixed):
                 still = kind == nc.STABLE or (kind == nc.SADDLE and rest.get("p_theta0") == 0.0)
                 functions = {
                     nc.STABLE: [steepness],
-                    nc.SADDLE: [lambda p: discriminant(*scaled(p)[:4]), *([steepness] if still else [])],
+                    nc.SADDLE: [
+                        lambda p: discriminant(*scaled(p)[:4]),
+                        *([steepness] if still else []),
+                    ],
                     nc.PASSAGE: [lambda p: abs(p["p_psi"]) - abs(p["p_phi"])],
                 }[kind]
                 error = float(ds.curve_position_error[i])
                 assert any(meets(f, point, axes, error) for f in functions), (kind, i)
                 if kind == nc.STABLE:
-                    assert abs(scaled(point)[4] - float(ds.curve_u[i])) <= float(ds.curve_u_error[i])
+                    assert abs(scaled(point)[4] - float(ds.curve_u[i])) <= float(
+                        ds.curve_u_error[i]
+                    )
 
 
 @each
 def test_saddles_are_double_roots(axes, fixed):
-    """u, psi' and the reduced phi' give l, alpha and beta back by (S18), and the squared frequency is negative."""
+    """u, psi' and the reduced phi' give l, alpha and beta back by (S18), and the squared frequency
+    is negative.
+    """
     ds, rest = found(axes, fixed)
     for _, own in runs(ds, (nc.SADDLE,)):
         y, z, u, square = (ds[f"curve_{name}"].values[own] for name in ("precession_rate", "reduced_spin_rate", "u",
                                                                          "nutation_square"))  # fmt: skip
-        points = [rest | {name: float(ds[f"curve_{name}"][i]) for name in axes} for i in range(own.start, own.stop)]
+        points = [
+            rest | {name: float(ds[f"curve_{name}"][i]) for name in axes}
+            for i in range(own.start, own.stop)
+        ]
         exact = np.array([[float(value) for value in scaled(point)[1:4]] for point in points])
-        surface = np.stack([y * y + z * z - 3 * y * y * z * z, z * (1 - y * y), y * (1 - z * z)], axis=1)
+        surface = np.stack(
+            [y * y + z * z - 3 * y * y * z * z, z * (1 - y * y), y * (1 - z * z)], axis=1
+        )
         np.testing.assert_allclose(surface, exact, rtol=1e-7, atol=1e-7)
         np.testing.assert_allclose(u, -y * z, atol=1e-9)
         assert (square < 1e-9).all()
@@ -94,7 +121,9 @@ def at_saddle(point):
     s, *lab, _ = scaled(point)
     c = quartic(s, *lab)
     u = roots(c)
-    near = min(((x, y) for i, x in enumerate(u) for y in u[:i]), key=lambda pair: abs(pair[0] - pair[1]))
+    near = min(
+        ((x, y) for i, x in enumerate(u) for y in u[:i]), key=lambda pair: abs(pair[0] - pair[1])
+    )
     middle = ((near[0] + near[1]) / 2).real
     return abs(middle) < 1 and 12 * c[0] * middle**2 + 2 * c[2] > 0
 
@@ -106,7 +135,9 @@ def test_no_crossing_of_a_row_is_missed(axes, fixed):
     (across, of), (along, ends) = axes.items()
     for value in np.random.default_rng(7).uniform(*sorted(of), 4):
         x = np.linspace(*sorted(ends), 700)
-        signs = np.array([np.sign(float(discriminant(*scaled(rest | {across: value, along: t})[:4]))) for t in x])
+        signs = np.array(
+            [np.sign(float(discriminant(*scaled(rest | {across: value, along: t})[:4]))) for t in x]
+        )
         middle = 0.5 * (x[1:] + x[:-1])[signs[1:] != signs[:-1]]
         expected = [t for t in middle if at_saddle(rest | {across: value, along: t})]
         crossed = []

@@ -1,4 +1,6 @@
-"""Nutations that float64 leaves open: verdicts on lines of consecutive numbers, and values, against 100 digits."""
+"""Nutations that float64 leaves open: verdicts on lines of consecutive numbers, and values, against
+100 digits.
+"""
 
 from fractions import Fraction
 
@@ -13,7 +15,8 @@ from survey.status import NO_CONVERGENCE, OK, OVERFLOW
 from survey.truth.brun_digits import NAMES, OUTPUTS, draw, integrals, outputs, turning_points
 
 NO_MOTION = 16
-# Found by attack: beside saddles, cusps, upright rotations and regular precessions; advances that cancel.
+# Found by attack: beside saddles, cusps, upright rotations and regular precessions; advances that
+# cancel.
 STATES = [
     [0.5105908628011825, 0.5014138482093197, 5.947819473509641e-05, 1.7371774524674761, 0.0, 0.0004817598831429927,
      1.0511313730314697e-05],
@@ -33,13 +36,19 @@ STATES = [
 
 
 def of_states(points, **more):
-    arrays = {name: xr.DataArray(np.array(column), dims="point") for name, column in zip(NAMES, points, strict=True)}
+    arrays = {
+        name: xr.DataArray(np.array(column), dims="point")
+        for name, column in zip(NAMES, points, strict=True)
+    }
     return survey.evaluate("brun", **arrays, **more)
 
 
 def scaled(sign, l, alpha, beta):  # noqa: E741
     wide = np.broadcast_arrays(l, alpha, beta)
-    arrays = {key: xr.DataArray(x.copy(), dims="point") for key, x in zip(("l", "alpha", "beta"), wide, strict=True)}
+    arrays = {
+        key: xr.DataArray(x.copy(), dims="point")
+        for key, x in zip(("l", "alpha", "beta"), wide, strict=True)
+    }
     return survey.evaluate("brun", sign=str(sign), ratio=0.5, **arrays)
 
 
@@ -65,7 +74,9 @@ def surface(y, z, sign):
     return y * y + z * z - 3 * sign * y * y * z * z, z * (1 - sign * y * y), y * (1 - sign * z * z)
 
 
-@pytest.mark.parametrize(("y", "z"), [(0.3, 0.4), (-0.55, 0.31), (0.05, 0.6), (0.7, -0.2), (0.25, 0.0)])
+@pytest.mark.parametrize(
+    ("y", "z"), [(0.3, 0.4), (-0.55, 0.31), (0.05, 0.6), (0.7, -0.2), (0.25, 0.0)]
+)
 def test_separatrices(y, z):
     """Two wells below, one above; on it where the discriminant is exactly 0, and there only."""
     level, alpha, beta = surface(y, z, 1)
@@ -73,19 +84,28 @@ def test_separatrices(y, z):
     ds = scaled(1, line, alpha, beta)
     exact = [discriminant(1, x, alpha, beta) for x in line]
     wells = [np.nan if x == 0 else 2 if x > 0 else 1 for x in exact]
-    assert np.array_equal(ds.wells, wells, equal_nan=True) and len({np.sign(float(x)) for x in exact}) > 1
-    assert ds.verdict.values.tolist() == [0 if x == 0 else 1 for x in exact] and (ds.status == OK).all()
+    assert (
+        np.array_equal(ds.wells, wells, equal_nan=True)
+        and len({np.sign(float(x)) for x in exact}) > 1
+    )
+    assert (
+        ds.verdict.values.tolist() == [0 if x == 0 else 1 for x in exact]
+        and (ds.status == OK).all()
+    )
     assert (np.sign(ds.separatrix_distance) == [-np.sign(float(x)) for x in exact]).all()
     assert (ds.period_error < 1e-10 * ds.period).sum() == np.nansum(wells)
 
 
-@pytest.mark.parametrize(("y", "z", "sign"), [(1.1, 0.4, 1), (0.3, -0.7, -1), (1.5, 0.1, 1), (-2.0, 0.0, 1)])
+@pytest.mark.parametrize(
+    ("y", "z", "sign"), [(1.1, 0.4, 1), (0.3, -0.7, -1), (1.5, 0.1, 1), (-2.0, 0.0, 1)]
+)
 def test_regular_precessions(y, z, sign):
     """No motion below, a nutation above, however small; a regular precession exactly between."""
     level, alpha, beta = surface(y, z, sign)
     line = beside(level)
     ds = scaled(sign, line, alpha, beta)
-    # k < 0: a motion where the discriminant is positive; k > 0 with one well at most: where it is negative
+    # k < 0: a motion where the discriminant is positive; k > 0 with one well at most: where it is
+    # negative
     exact = [-sign * discriminant(sign, x, alpha, beta) for x in line]
     assert ds.status.values.tolist() == [NO_MOTION if x < 0 else OK for x in exact]
     assert ds.verdict.values.tolist() == [-1 if x < 0 else 2 if x == 0 else 1 for x in exact]
@@ -93,7 +113,9 @@ def test_regular_precessions(y, z, sign):
 
 
 def test_cusps():
-    """There is a separatrix where F = F' = 0 has been passed, decided at every one of the consecutive numbers."""
+    """There is a separatrix where F = F' = 0 has been passed, decided at every one of the
+    consecutive numbers.
+    """
     for u in (0.1, -0.25, 0.32):
         minus, plus = np.sqrt((1 - u) ** 3 * (1 + 3 * u)), np.sqrt((1 + u) ** 3 * (1 - 3 * u))
         alpha, line = 0.5 * (plus - minus), beside(0.5 * (plus + minus))
@@ -122,7 +144,9 @@ def saddles(a, b):
 
 @pytest.mark.parametrize(("sign", "p"), [(1, 1.3), (-1, 2.4), (-1, 1.1)])
 def test_upright_rotations_and_passages(sign, p):
-    """alpha = beta: above l = alpha^2 - k the pole is passed; below it nothing moves where W is least at the pole."""
+    """alpha = beta: above l = alpha^2 - k the pole is passed; below it nothing moves where W is
+    least at the pole.
+    """
     line = beside(p * p - sign)
     ds = scaled(sign, line, p, p)
     above = [Fraction(float(x)) + sign - Fraction(p) ** 2 for x in line]
@@ -136,7 +160,9 @@ def test_passages_of_poles():
     """Only where the momenta are equal to the last bit."""
     line = beside(0.5)
     assert scaled(1, 1.7, 0.5, line).verdict.values.tolist() == [3 if x == 0.5 else 1 for x in line]
-    assert scaled(1, 1.7, -0.5, line).verdict.values.tolist() == [3 if x == 0.5 else 1 for x in line]
+    assert scaled(1, 1.7, -0.5, line).verdict.values.tolist() == [
+        3 if x == 0.5 else 1 for x in line
+    ]
 
 
 def test_states_on_a_line_through_a_saddle():
@@ -147,7 +173,11 @@ def test_states_on_a_line_through_a_saddle():
     point = [np.full(line.size, x) for x in (2.0, 1.0, 0.6, 0.0, 0.0, b, a)]
     point[3] = line
     ds = of_states(point)
-    assert (ds.verdict == 1).all() and (ds.status == OK).all() and (ds.period_error < 1e-10 * ds.period).all()
+    assert (
+        (ds.verdict == 1).all()
+        and (ds.status == OK).all()
+        and (ds.period_error < 1e-10 * ds.period).all()
+    )
     with mp.workdps(100):
         for i in range(line.size):
             assert not lies(ds.isel(point=i), [float(column[i]) for column in point])
@@ -165,14 +195,18 @@ def lies(one, point):
 
 
 def test_ill_conditioned_states():
-    """Where double-double leaves a bar too wide or a verdict open, the answer is right and as accurate as asked."""
+    """Where double-double leaves a bar too wide or a verdict open, the answer is right and as
+    accurate as asked.
+    """
     columns = np.array(STATES).T
     ds = of_states(columns, rtol=1e-13)
     assert (ds.status == OK).all() and (ds.verdict == 1).all()
     for name in OUTPUTS:
         assert (ds[f"{name}_error"] <= 1.01e-13 * (1 + abs(ds[name]))).all(), name
     with mp.workdps(100):
-        assert [lies(ds.isel(point=i), point) for i, point in enumerate(STATES)] == [[]] * len(STATES)
+        assert [lies(ds.isel(point=i), point) for i, point in enumerate(STATES)] == [[]] * len(
+            STATES
+        )
         for method in ("agm", "carlson"):
             other = of_states(columns, method=method)
             for i in np.flatnonzero((other.status == OK) & (other.verdict > 0)):
@@ -188,7 +222,10 @@ def test_more_digits_say_what_is_known():
         _passes, _wells, (found,) = multiprecision.of_state(*points[i].tolist())
         for name in OUTPUTS:
             off = abs(found[name] - float(ds[name][i]))
-            assert off <= found[f"{name}_error"] + float(ds[f"{name}_error"][i]), (name, points[i].tolist())
+            assert off <= found[f"{name}_error"] + float(ds[f"{name}_error"][i]), (
+                name,
+                points[i].tolist(),
+            )
 
 
 def test_angles_beside_a_separatrix():
@@ -196,11 +233,15 @@ def test_angles_beside_a_separatrix():
     random = np.random.default_rng(3)
     drawn = [draw(random) for _ in range(400)]
     points = np.array([point for kind, point in drawn if kind == "near a saddle"]).T
-    one, other = (of_states(points, t=[-1.0, 0.0, 0.3, 30.0], method=method) for method in ("auto", "carlson"))
+    one, other = (
+        of_states(points, t=[-1.0, 0.0, 0.3, 30.0], method=method) for method in ("auto", "carlson")
+    )
     start, known = one.sel(t=0.0), one.status == OK
     assert known.mean() > 0.9
     for name in ("psi", "phi"):
-        assert (abs(start[name]) <= start[f"{name}_error"]).where(start.status == OK, True).all(), name
+        assert (abs(start[name]) <= start[f"{name}_error"]).where(start.status == OK, True).all(), (
+            name
+        )
         fits = abs(one[name] - other[name]) <= one[f"{name}_error"] + other[f"{name}_error"]
         assert fits.where(known & (other.status == OK), True).all(), name
 

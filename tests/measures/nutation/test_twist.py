@@ -11,7 +11,8 @@ from survey.measures.nutation import twist
 
 NAMES = tuple(twist.NAMES)
 STEP = mpf(10) ** -16
-HARD = [  # l, alpha, beta, sign, ratio: poles, next to separatrices, narrow wells, one momentum 0, fast
+# l, alpha, beta, sign, ratio: poles, next to separatrices, narrow wells, one momentum 0, fast
+HARD = [
     (0.9, 0.3, 0.5, 1, 0.5),
     (0.9, 0.3, 0.3001, 1, 0.5),
     (-0.2, 0.15, 0.1, 1, 1.7),
@@ -35,7 +36,9 @@ def turning_points(k, level, a, b, well):
 
 
 def frequencies(k, h, b, a, ratio, well):
-    """dH/d(J, p_psi, p_phi), and dJ/dh, for A = |k| = 1: one quadrature each, smooth in x, u = middle + half sin x."""
+    """dH/d(J, p_psi, p_phi), and dJ/dh, for A = |k| = 1: one quadrature each, smooth in x, u =
+    middle + half sin x.
+    """
     epsilon = k / (1 - ratio)
     level = 2 * h - a * a / ratio - epsilon + a * a
     low, high = turning_points(k, level, a, b, well)
@@ -74,7 +77,8 @@ def truth(level, alpha, beta, sign, ratio, well):
                 slopes[j, i] = (up[j] - down[j]) / (2 * STEP)
         actions = mp.matrix([[over, -omega[1] * over, -omega[2] * over], [0, 1, 0], [0, 0, 1]])
         second = slopes * actions**-1
-        assert mp.norm(second - second.T) < mpf(10) ** -9 * mp.norm(second)  # derivatives of one function
+        # derivatives of one function
+        assert mp.norm(second - second.T) < mpf(10) ** -9 * mp.norm(second)
 
         def bordered(keep):
             n = len(keep)
@@ -86,41 +90,67 @@ def truth(level, alpha, beta, sign, ratio, well):
             return mp.det(m)
 
         kept = mp.matrix([[second[i, j] for j in (0, 2)] for i in (0, 2)])
-        return dict(zip(NAMES, (mp.det(kept), bordered((0, 2)), mp.det(second), bordered((0, 1, 2))), strict=True))
+        return dict(
+            zip(
+                NAMES,
+                (mp.det(kept), bordered((0, 2)), mp.det(second), bordered((0, 1, 2))),
+                strict=True,
+            )
+        )
 
 
 @pytest.mark.parametrize(
-    "case", [pytest.param(case, marks=[pytest.mark.slow] * (i % 3 > 0)) for i, case in enumerate(HARD)]
+    "case",
+    [pytest.param(case, marks=[pytest.mark.slow] * (i % 3 > 0)) for i, case in enumerate(HARD)],
 )
 def test_determinants_are_those_of_the_frequency_map(case):
     level, alpha, beta, sign, ratio = case
-    ds = survey.evaluate("brun", l=level, alpha=alpha, beta=beta, ratio=ratio, sign=str(sign), variables=[*NAMES])
+    ds = survey.evaluate(
+        "brun", l=level, alpha=alpha, beta=beta, ratio=ratio, sign=str(sign), variables=[*NAMES]
+    )
     for well in range(2):
         if not np.isfinite(float(ds[NAMES[0]][well])):
             assert well == 1
             continue
         for name, known in truth(*case, well).items():
             value, bar = float(ds[name][well]), float(ds[f"{name}_error"][well])
-            assert abs(mpf(value) - known) <= bar + abs(known) * mpf(10) ** -17, (name, well, value, known, bar)
+            assert abs(mpf(value) - known) <= bar + abs(known) * mpf(10) ** -17, (
+                name,
+                well,
+                value,
+                known,
+                bar,
+            )
             assert bar < 1e-7 * (1 + abs(value)), name
 
 
 def test_a_state_has_the_determinants_of_its_scaled_integrals():
     """Units: H'' goes as 1/A, frequencies as sqrt|k|/A."""
     size_a, ratio, epsilon, theta, p_theta, b, a = 2.0, 0.5, 0.6, 1.1, 0.5, 1.3, 0.9
-    state = {"A": size_a, "C": ratio * size_a, "epsilon": epsilon, "theta0": theta, "p_theta0": p_theta, "p_psi": b}
+    state = {
+        "A": size_a,
+        "C": ratio * size_a,
+        "epsilon": epsilon,
+        "theta0": theta,
+        "p_theta0": p_theta,
+        "p_psi": b,
+    }
     ds = survey.evaluate("brun", **state, p_phi=a, variables=[*NAMES])
     k = epsilon * size_a * size_a * (1 - ratio)
     u = np.cos(theta)
     level = p_theta**2 + (b - a * u) ** 2 / (1 - u * u) - k * u * u + a * a
-    scaled = survey.evaluate("brun", l=level / k, alpha=a / np.sqrt(k), beta=b / np.sqrt(k), variables=[*NAMES])
+    scaled = survey.evaluate(
+        "brun", l=level / k, alpha=a / np.sqrt(k), beta=b / np.sqrt(k), variables=[*NAMES]
+    )
     units = (size_a**-2, k * size_a**-3, size_a**-3, k * size_a**-4)
     for name, unit in zip(NAMES, units, strict=True):
         assert float(ds[name]) == pytest.approx(unit * float(scaled[name][0]), rel=1e-12)
 
 
 def test_a_free_body():
-    """H = G^2/2A + p_phi^2 (1/C - 1/A)/2, G = J + max(|p_psi|, |p_phi|): (1/C - 1/A)/A, and degenerate in 3 degrees."""
+    """H = G^2/2A + p_phi^2 (1/C - 1/A)/2, G = J + max(|p_psi|, |p_phi|): (1/C - 1/A)/A, and
+    degenerate in 3 degrees.
+    """
     state = {"A": 2.0, "C": 1.3, "epsilon": 0.0, "theta0": 1.1, "p_theta0": 0.5}
     for b, a in ((1.3, 0.4), (0.4, 1.3), (-0.7, 0.2)):
         ds = survey.evaluate("brun", **state, p_psi=b, p_phi=a, variables=[*NAMES])
@@ -130,7 +160,9 @@ def test_a_free_body():
 
 
 def test_bars_hold_in_a_crowd():
-    """Against the same determinants of the point next to it by less than the bar can tell, of random wells."""
+    """Against the same determinants of the point next to it by less than the bar can tell, of
+    random wells.
+    """
     random = np.random.default_rng(8)
     n = 4000
     alpha, beta = random.normal(size=(2, n))
@@ -138,13 +170,17 @@ def test_bars_hold_in_a_crowd():
     given = {name: xr.DataArray(x, dims="point") for name, x in columns.items()}
     near = {name: xr.DataArray(x * (1 + 2.0**-52), dims="point") for name, x in columns.items()}
     for sign in ("1", "-1"):
-        ds, other = (survey.evaluate("brun", **x, sign=sign, variables=[*NAMES]) for x in (given, near))
+        ds, other = (
+            survey.evaluate("brun", **x, sign=sign, variables=[*NAMES]) for x in (given, near)
+        )
         good = ds[NAMES[0]].notnull() & other[NAMES[0]].notnull()
         assert int(good.sum()) > n // 3
         for name in NAMES:
             bar = ds[f"{name}_error"].where(good)
             assert float((bar / (1 + abs(ds[name]))).median()) < 1e-11, name
-            assert float((abs(ds[name] - other[name]) <= 1000 * bar).where(good, True).mean()) == 1.0, name
+            assert (
+                float((abs(ds[name] - other[name]) <= 1000 * bar).where(good, True).mean()) == 1.0
+            ), name
 
 
 def test_nothing_is_given_where_there_is_no_motion():
@@ -159,9 +195,16 @@ def test_running_bounds():
     random = np.random.default_rng(0)
     for x, y, z in random.uniform(0.1, 2.0, (200, 3)):
         px, py, pz = ((v, 2.0**-53 * v) for v in (x, y, z))
-        got = bounded.div(bounded.sub(bounded.mul(px, py), bounded.add(pz, pz)), bounded.scaled(py, 3.0))
+        got = bounded.div(
+            bounded.sub(bounded.mul(px, py), bounded.add(pz, pz)), bounded.scaled(py, 3.0)
+        )
         known = (Fraction(x) * Fraction(y) - 2 * Fraction(z)) / (3 * Fraction(y))
         assert abs(Fraction(got[0]) - known) <= Fraction(got[1]) < 1e-13
         root = bounded.root(px)
-        assert abs(Fraction(root[0]) ** 2 - Fraction(x)) <= Fraction(root[1]) * 3 * Fraction(root[0])
-    assert bounded.div((1.0, 0.0), (1e-20, 1e-10))[1] == np.inf and bounded.root((0.0, 1.0))[1] == np.inf
+        assert abs(Fraction(root[0]) ** 2 - Fraction(x)) <= Fraction(root[1]) * 3 * Fraction(
+            root[0]
+        )
+    assert (
+        bounded.div((1.0, 0.0), (1e-20, 1e-10))[1] == np.inf
+        and bounded.root((0.0, 1.0))[1] == np.inf
+    )

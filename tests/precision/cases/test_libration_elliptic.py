@@ -20,7 +20,9 @@ def test_a_peer_gives_the_references():
 def test_operations_are_those_of_the_steps():
     point = {"mu": np.full((40, 1), 0.01), "e": np.full((40, 1), 0.3)}
     counted = {
-        rtol: chart.operations_of(lambda rtol=rtol: libration_elliptic.solve(point, Request({}, "taylor16", rtol)))
+        rtol: chart.operations_of(
+            lambda rtol=rtol: libration_elliptic.solve(point, Request({}, "taylor16", rtol))
+        )
         for rtol in (1e-3, 1e-8)
     }
     assert 40 * 2000 < counted[1e-3] < counted[1e-8] < 40 * 100_000
