@@ -31,14 +31,23 @@ def segments(values, curves, weights_of, border=1, optional=()):
                 lines[number],
                 _met(curves, axis, ticks[number], weights_of, optional),
             )
-            for first, last in pairwise(np.flatnonzero(line != UNKNOWN)):
-                low, high = ticks[first], ticks[last]
-                inside = (places > low - NEAR) & (places < high + NEAR)
-                sure = (places > low + NEAR) & (places < high - NEAR) & ~free
-                change = line[last] - line[first]
-                found[axis, number, first, last] = _explained(
-                    change, weights[inside & sure], weights[inside & ~sure]
-                )
+            for (first, last), good in along(line, ticks, places, weights, free).items():
+                found[axis, number, first, last] = good
+    return found
+
+
+def along(values, ticks, places, weights, free):
+    """{(first, last point): do the curves explain the change of `values`?}, of integers at the
+    `ticks` of a line, or UNKNOWN, which meets curves at `places`; those that are `free` may count
+    or not.
+    """
+    found = {}
+    for first, last in pairwise(np.flatnonzero(values != UNKNOWN)):
+        low, high = ticks[first], ticks[last]
+        inside = (places > low - NEAR) & (places < high + NEAR)
+        sure = (places > low + NEAR) & (places < high - NEAR) & ~free
+        change = values[last] - values[first]
+        found[first, last] = _explained(change, weights[inside & sure], weights[inside & ~sure])
     return found
 
 

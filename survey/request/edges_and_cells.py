@@ -46,7 +46,7 @@ def _check_closed(measure, scene, name, table, axes, given, options):
     """The last of the axes {name: values}; raises BadInput where the measure knows no curves on these."""
     names = list(axes)
     refusal = None
-    if len(names) == 1 and not hasattr(measure, "searched"):
+    if len(names) == 1 and hasattr(measure, "closed"):
         fixed = {
             p.name: p.default if p.default is not None else np.nan for p in scene.PARAMETERS
         } | {key: float(value) for key, value in given.items() if not np.ndim(value)}

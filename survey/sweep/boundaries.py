@@ -43,7 +43,9 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     if hasattr(measure, "refusal"):
         about = {"boundaries": workflow.boundaries}
         if len(workflow.grid.sizes) < 2:
-            return xr.Dataset(_on_a_line(workflow, measure), attrs=about)
+            variables, complete = _on_a_line(workflow, measure)
+            lost = {"edge_incomplete_rows": 1} if complete is False else {}
+            return xr.Dataset(variables, attrs=about | lost)
         variables, unexplained = _closed(workflow, measure, each)
         return xr.Dataset(
             variables, attrs=about | ({"curves_unexplained": unexplained} if unexplained else {})
@@ -168,7 +170,7 @@ def fixed_of(workflow):
 
 
 def _on_a_line(workflow, measure):
-    """The variables of the points at which an axis alone meets the curves."""
+    """The variables of the points at which an axis alone meets the curves; are these all?"""
     (axis,) = workflow.grid.sizes
     values = np.asarray(workflow.grid.parameters[axis][1])
     ends = float(values.min()), float(values.max())
@@ -181,7 +183,7 @@ def _on_a_line(workflow, measure):
         "edge_position": ("edge", found.position, position | {"ancillary_variables": "edge_position_error"}),
         "edge_position_error": ("edge", found.error, named | {"long_name": "error bound of edge_position"}),
         "edge_class": ("edge", *flagged(measure.TITLE, measure.CLASSES, found.kind)),
-    }  # fmt: skip
+    }, found.complete  # fmt: skip
 
 
 def _of_curves(workflow, names, count, kind, values, error, where):

@@ -14,7 +14,7 @@ centre is a reversible one, and Hopf's theorem has no answer at any order. Secti
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -67,6 +67,11 @@ class Plane:
     def positions(self, xy):
         xy = np.clip(np.nan_to_num(xy, nan=1e200), -1e200, 1e200)
         return self.square.positions(np.where(self.square.log, np.maximum(xy, TINY), xy))
+
+    def part(self, low, high):
+        """The map between two positions on the first axis."""
+        ends = self.square.parameters(np.array([[low, 0.0], [high, 1.0]]))
+        return replace(self, square=replace(self.square, low=ends[0], high=ends[1]))
 
     def widths(self, xy):
         """What one unit of the map is, along each axis, at xy (m, 2)."""

@@ -80,14 +80,14 @@ def searched(scene, square, axes, fixed, options):
         found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, flow)]
         return joined(found, [output.name for output in ALONG])
     plane = own_bifurcations.Plane(square, tuple(axes), fixed, scene)
-    return _of_parameters(plane, own_bifurcations.found(plane))
+    return _of_parameters(plane, own_bifurcations.found)
 
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
     if set(axes) != set(STATE):
         plane = bifurcations.Plane(square, tuple(axes), fixed)
-        return _of_parameters(plane, bifurcations.found(plane))
+        return _of_parameters(plane, bifurcations.found)
     found = [
         (CLASSES[kind], *rest)
         for kind, *rest in separatrices.found(square, axes, [fixed[k] for k in SYSTEM])
@@ -95,20 +95,34 @@ def closed(square, axes, fixed, options):
     return joined(found, [output.name for output in ALONG])
 
 
-def _of_parameters(plane, found):
-    """The Curves on a map of parameters, with the numbers of cycles beside them and those that are
-    unexplained.
+def _of_parameters(plane, find):
+    """The Curves that `find` finds on a map of parameters, with the numbers of cycles beside them
+    and those that are unexplained.
     """
     with np.errstate(all="ignore"):
-        rows = [bifurcations.counted(plane, *row) for row in found]
-        missed = None
+        rows = [bifurcations.counted(plane, *row) for row in find(plane)]
         if plane.square.across is None:
             missed = cycle_counts.unexplained(plane, rows, cycle_counts.on_lattice(plane))
+        else:
+            rows, missed = _on_border(plane, find, rows)
     curves = joined(
         [(CLASSES[kind], *rest) for kind, *rest in rows], [output.name for output in ALONG]
     )
     curves.unexplained = missed
+    curves.complete = False if missed and plane.square.across is not None else None
     return curves
+
+
+def _on_border(plane, find, rows):
+    """The rows, and along how many parts of the border that is asked for alone they do not explain
+    the numbers of cycles; such parts are searched again, each as a map of its own.
+    """
+    counts = cycle_counts.on_border(plane)
+    for low, high in cycle_counts.lost_on_border(plane, rows, *counts):
+        part = plane.part(low, high)
+        again = (bifurcations.counted(part, *row) for row in find(part))
+        rows += [(kind, xy, error * (high - low), known) for kind, xy, error, known in again]
+    return rows, len(cycle_counts.lost_on_border(plane, rows, *counts))
 
 
 def seconds(axes):

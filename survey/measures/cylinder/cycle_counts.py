@@ -11,12 +11,13 @@ import numpy as np
 from survey.kernels.cylinder.program import COLUMNS
 from survey.measures import contours
 from survey.measures.cylinder.fate import KINDS, LIBRATIONS, MINUS, PLUS, G, remembered
-from survey.measures.segments import UNKNOWN, segments
+from survey.measures.segments import NEAR, UNKNOWN, along, segments
 from survey.methods import taylor
 
 LINES = 33
 HOPF = ("supercritical_hopf", "subcritical_hopf")
 OPTIONAL = ("homoclinic", "heteroclinic", "fold", "ends")
+WEIGHTS = {"cycle_fold": 2}
 
 
 def on_lattice(plane):
@@ -40,9 +41,46 @@ def unexplained(plane, rows, counts):
             for name, xy, _error, known in rows
             if _counts_for(kind, name, known)
         ]
-        explained = segments(values, own, {"cycle_fold": 2}, optional=OPTIONAL)
+        explained = segments(values, own, WEIGHTS, optional=OPTIONAL)
         missed |= {segment for segment, good in explained.items() if not good}
     return len(missed)
+
+
+def on_border(plane):
+    """The ticks of the border that is asked for alone (LINES), and the numbers of cycles of each kind
+    (3, LINES) there, or UNKNOWN.
+    """
+    ticks = np.linspace(0.0, 1.0, LINES)
+    x = np.column_stack([ticks, np.full(LINES, plane.square.across)])
+    return ticks, np.array([_count(row) for row in plane.flows(x)]).T
+
+
+def lost_on_border(plane, rows, ticks, counts):
+    """Parts (low, high) of the border that is asked for alone, along which points of the curves on
+    it do not explain the numbers of cycles, from `on_border`; `rows` are those of
+    `bifurcations.found`.
+    """
+    value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
+    met = [
+        (name, plane.positions(point[None])[0, 0], known)
+        for name, xy, _error, known in rows
+        for point in xy[xy[:, 1] == value]
+    ]
+    parts = set()
+    for kind, values in zip(KINDS, counts, strict=True):
+        own = [(name, place) for name, place, known in met if _counts_for(kind, name, known)]
+        places = np.array([place for _, place in own])
+        weights = np.array([WEIGHTS.get(name, 1) for name, _ in own], int)
+        twice = [
+            sum(n == name and abs(p - place) < NEAR for n, p in own) > 1 for name, place in own
+        ]
+        free = np.array([name in OPTIONAL for name, _ in own], bool) | np.array(twice, bool)
+        explained = along(values, ticks, places, weights, free)
+        parts |= {segment for segment, good in explained.items() if not good}
+    return [
+        (max(0.0, ticks[first] - NEAR), min(1.0, ticks[last] + NEAR))
+        for first, last in sorted(parts)
+    ]
 
 
 def _count(row):
