@@ -19,12 +19,13 @@ from survey.errors import BadInput
 @dataclass(frozen=True)
 class Value:
     """A public constant: its type (or types), what it means, and whether every module must have it,
-    or those modules for which `needed(module)` is true.
+    or those modules for which `needed(module)` is true; `each` is the type of its elements.
     """
 
     meaning: str
     kind: type | tuple[type, ...] = object
     needed: bool | Callable = False
+    each: type = object
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,13 @@ def check(module, table, where, elsewhere=lambda name: ""):
 
 
 def check_offered(module, table, where):
-    """As `check`, but the module may have other public names besides."""
+    """As `check`, but the module may have other public names besides, which are not nearly those of
+    entries that it lacks.
+    """
+    lacking = [name for name in table if not hasattr(module, name)]
+    for name in public(module.__file__):
+        if name not in table and (near := get_close_matches(name, lacking, n=1, cutoff=0.8)):
+            refuse(module, f"{name} is not in the table, but {near[0]!r} is", where)
     for name, entry in table.items():
         if not hasattr(module, name):
             if entry.needed(module) if callable(entry.needed) else entry.needed:
@@ -70,14 +77,25 @@ def check_offered(module, table, where):
                 f"{name} = {getattr(module, name)!r:.60} must be of type {_named(entry.kind)}",
                 where,
             )
+        elif entry.each is not object:
+            for one in getattr(module, name):
+                if not isinstance(one, entry.each):
+                    words = f"{name} has {one!r:.60}, which must be of type {entry.each.__name__}"
+                    refuse(module, words, where)
 
 
 @lru_cache(maxsize=256)
 def public(path):
     """The public names of the module in the file `path`, in their order."""
-    names = []
-    for node in ast.parse(Path(path).read_text(encoding="utf-8")).body:
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
+    names, nodes = [], ast.parse(Path(path).read_text(encoding="utf-8")).body
+    while nodes:
+        node, *nodes = nodes
+        if isinstance(node, (ast.If, ast.Try, ast.With)):
+            blocks = ("body", "handlers", "orelse", "finalbody")
+            nodes = [inner for block in blocks for inner in getattr(node, block, [])] + nodes
+        elif isinstance(node, ast.ExceptHandler):
+            nodes = node.body + nodes
+        elif isinstance(node, (ast.FunctionDef, ast.ClassDef)):
             names.append(node.name)
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]

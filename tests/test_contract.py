@@ -18,7 +18,7 @@ from survey.sweep import solve
 
 SCENE = Path(survey.scenes.__file__).with_name("mathieu.py")
 METHOD = Path(survey.methods.__file__).with_name("magnus6.py")
-FAMILIES = ("hill", "cylinder", "danby", "normal_form", "nutation")
+FAMILIES = [family for folder in measures._folders() for family in folder.METHODS]
 CELLS = Path(survey.measures.__file__).parent / "hill" / "cells.py"
 
 
@@ -51,7 +51,10 @@ def changed(path, tmp_path, old, new):
         ),
         ('FAMILY = "hill"', 'FAMILY = "hil"', "FAMILY names no family 'hil'"),
         ('"dop853"', '"dop85"', "AUDIT: unknown method 'dop85'; did you mean 'dop853'"),
+        ('"dop853"', '"agm"', "AUDIT names 'agm', which does not serve the family 'hill'"),
         ("OPTIONS = ()", "OPTIONS = []", r"OPTIONS = \[\] must be of type tuple"),
+        ("OPTIONS = ()", 'OPTIONS = ("body",)', "OPTIONS has 'body', which must be of type Option"),
+        ("OPTIONS = ()", "OPTIONS = ()\nif True:\n    MORE = 1", "MORE is not in the table"),
         (
             "def cost(options, sizes):",
             "cost = 1e-6\n\n\ndef _cost(options, sizes):",
@@ -90,6 +93,7 @@ def test_a_typo_in_a_scene_is_one_line(tmp_path, old, new, words):
             'SERVES = ("danby",)',
             "it is a name of the family 'hill', which SERVES must then name",
         ),
+        ('SERVES = ("hill",)', 'SERVES = ("hill", "floquet")', "floquet_reach is missing: how far"),
     ],
 )
 def test_a_typo_in_a_method_is_one_line(tmp_path, old, new, words):
@@ -104,13 +108,19 @@ def test_a_typo_in_a_method_is_one_line(tmp_path, old, new, words):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("def find(", "def fined(", "find is missing: the Cells of a rectangle"),
+        ("def find(", "def fined(", "fined is not in the table, but 'find' is"),
         (
             "def find(solve, x, y,",
             "def find(solve, y, x,",
             r"must be find\(solve, x, y, each, report\)",
         ),
+        ("def find(", "def _find(", "find is missing: the Cells of a rectangle"),
         ("MOST = 10_000_000", "MOST = 1e7", "MOST = 10000000.0 must be of type int"),
+        (
+            "MOST = 10_000_000",
+            "MOST = 10_000_000\nrefusl = None",
+            "refusl is not in the table, but 'refusal' is",
+        ),
     ],
 )
 def test_a_typo_in_what_is_asked_of_a_family_is_one_line(tmp_path, old, new, words):

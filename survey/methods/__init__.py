@@ -2,10 +2,11 @@
 
 A method offers what CONTRACT lists, and for each family in its SERVES what the measures of that
 family call. This is listed in METHODS of `survey/measures/FOLDER/__init__.py`: the families "body",
-"hill", "cylinder" and "nutation" have folders of these names, "danby" and "normal_form" are in
-`libration/`. Its functions are kernels (see `survey.kernels.jit`) that fill arrays which the
-measure brings. Both tables are checked when the method is loaded, and any other public name is
-refused. A new method is done when `tests/methods`, which finds it by its file, passes.
+"hill", "cylinder", "nutation" and "floquet" have folders of these names, "abel" is in `cylinder/`,
+"orbit" in `floquet/`, "danby" and "normal_form" are in `libration/`. Its functions are kernels (see
+`survey.kernels.jit`) that fill arrays which the measure brings. Both tables are checked when the
+method is loaded, and any other public name is refused. A new method is done when `tests/methods`,
+which finds it by its file, passes.
 """
 
 from survey.contract import Value

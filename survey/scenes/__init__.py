@@ -35,6 +35,7 @@ from types import ModuleType
 from survey import contract, measures, methods, modules
 from survey.contract import Function, Value
 from survey.errors import BadInput
+from survey.scene import Option, Output, Parameter
 from survey.wording import short
 
 GROUP = "survey.scenes"  # of entry points
@@ -42,11 +43,16 @@ GROUP = "survey.scenes"  # of entry points
 CONTRACT = {
     "TITLE": Value("one line", str, needed=True),
     "PARAMETERS": Value(
-        "survey.scene.Parameter, in the order in which they are listed", tuple, needed=True
+        "survey.scene.Parameter, in the order in which they are listed",
+        tuple,
+        needed=True,
+        each=Parameter,
     ),
-    "OPTIONS": Value("survey.scene.Option: switches with a few values each", tuple, needed=True),
+    "OPTIONS": Value(
+        "survey.scene.Option: switches with a few values each", tuple, needed=True, each=Option
+    ),
     "OUTPUTS": Value(
-        "survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True
+        "survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True, each=Output
     ),
     "FAMILY": Value(
         "the methods whose SERVES names this family can solve the scene", str, needed=True
@@ -140,16 +146,22 @@ def _title(name):
     """TITLE of a scene, from its source: importing all scenes would take seconds."""
     source = next((Path(folder) / f"{name}.py" for folder in sys.modules[__name__].__path__), None)
     if f"{__name__}.{name}" not in sys.modules and source and source.is_file():
-        for node in ast.parse(source.read_bytes()).body:
-            if isinstance(node, ast.Assign) and any(
-                getattr(to, "id", "") == "TITLE" for to in node.targets
-            ):
-                return (
-                    ast.literal_eval(node.value)
-                    if isinstance(node.value, ast.Constant)
-                    else load(name).TITLE
-                )
+        title = _constant(source, "TITLE")
+        return title if title is not None else load(name).TITLE
     return load(name).TITLE
+
+
+def _constant(source, name):
+    """The constant `name` in the file `source`, read without an import; None if it is computed."""
+    for node in ast.parse(source.read_bytes()).body:
+        if isinstance(node, ast.Assign) and any(
+            getattr(to, "id", "") == name for to in node.targets
+        ):
+            try:
+                return ast.literal_eval(node.value)
+            except ValueError:
+                return None
+    return None
 
 
 @cache
@@ -181,6 +193,10 @@ def _check(module):
             contract.refuse(
                 module, f"AUDIT: {modules.unknown('method', name, modules.names(methods))}", where
             )
+        serves = _constant(Path(methods.__path__[0]) / f"{name}.py", "SERVES")
+        if serves is not None and module.FAMILY not in serves:
+            words = f"AUDIT names {name!r}, which does not serve the family {module.FAMILY!r}"
+            contract.refuse(module, words, where)
 
 
 sys.modules[__name__].__class__ = _Folder

@@ -12,6 +12,7 @@ METHODS = {
         "floquet_reach": Function(
             "how far the maximum norm of A times half the length of a step may go at first, for accuracy rtol",
             ("rtol",),
+            needed=True,
         ),
         "floquet_factors": Function(
             "fill F (tasks, n, n), bounds `error` (tasks) of the sums of its errors in a row and `doubt` (tasks), how "
@@ -21,6 +22,7 @@ METHODS = {
             "method is also asked for those of the steps backwards, which follow: then F has room for twice as many",
             ("operations", "signs", "inside", "order", "used", "terms", "numbers", "scale", "noise", "n", "point",
              "middle", "half", "F", "error", "doubt"),
+            needed=True,
         ),
     }
 }  # fmt: skip
