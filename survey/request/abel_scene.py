@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from survey import methods
-from survey.measures.cylinder import basins, blocks, equation, orbit, solution
+from survey.measures.cylinder import basins, blocks, equation, motion, solution
 from survey.measures.cylinder.ahead import of_functions
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
 from survey.measures.hill.multiprecision import Unsupported
@@ -106,7 +106,7 @@ class AbelScene(FunctionScene):
 
     def trajectory(self, point, answer, options, time=None):
         """The motion from `phi0`, `w0`, and some of its neighbours (see `survey.scenes`)."""
-        panels = orbit.ON_PLANE if self.period is None else orbit.ON_CYLINDER
+        panels = motion.ON_PLANE if self.period is None else motion.ON_CYLINDER
         request = Request({"question": "trajectory"}, rtol=1e-9)
         names = [p.name for p in self.own]
         flow = (
@@ -114,7 +114,7 @@ class AbelScene(FunctionScene):
             if self.period is None
             else self.flows(np.array([[point[name] for name in names]]))[0]
         )
-        return orbit.solve(
+        return motion.solve(
             lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels, flow
         )
 

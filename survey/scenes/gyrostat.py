@@ -95,7 +95,7 @@ from survey.measures.cylinder import (
     blocks,
     destinations,
     fate,
-    orbit,
+    motion,
     portrait,
     separatrix,
     separatrix_fate,
@@ -341,7 +341,7 @@ def trajectory(point, answer, options, time=None):
 
     start = {"w0": answer["w_start"]} if "saddle" in point else {}
     flow = [point[name] for name in _SYSTEM]
-    return orbit.solve(motions, OUTPUTS, _SYSTEM, {**point, **start}, time, flow=flow)
+    return motion.solve(motions, OUTPUTS, _SYSTEM, {**point, **start}, time, flow=flow)
 
 
 def _separatrix(point, request, question):

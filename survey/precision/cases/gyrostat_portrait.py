@@ -11,7 +11,7 @@ from importlib import resources
 
 import numpy as np
 
-from survey.measures.cylinder import orbit
+from survey.measures.cylinder import motion
 from survey.measures.cylinder.fate import remembered
 from survey.methods import taylor
 from survey.precision.peers import System
@@ -57,7 +57,7 @@ def works():
 @cache
 def _first(six):
     """A point of the first cycle and its period."""
-    states, times, _kinds = orbit.cycles(remembered(taylor, six))
+    states, times, _kinds = motion.cycles(remembered(taylor, six))
     return (*states[0], times[0, -1]) if len(states) else None
 
 
