@@ -139,5 +139,5 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     """See `steps.trajectories`."""
     for i in range(len(P)):
         size = finite(times[i])
-        status[i] = _trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],
-                               turnings[i])  # fmt: skip
+        status[i] = _trajectory(P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], times[i, :size],
+                               tolerance, limit, floats[i], turnings[i])  # fmt: skip

@@ -41,6 +41,7 @@ import numpy as np
 
 from survey import methods
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import OF_G
 from survey.kernels.cylinder.steps import NO_CONVERGENCE, OK, TRUST, TURNING, UNDETERMINED
 from survey.measures.cylinder import auto, blocks, quartic, separatrix, solution
 from survey.modules import load
@@ -140,7 +141,7 @@ def solve(point, request):
         heads, flows, slack = _REDUCTIONS[case](given, request.options)
         real = (
             np.isfinite(flows).all(axis=1)
-            & (np.abs(flows[:, :6]) <= 1e12).all(axis=1)
+            & (np.abs(flows[:, : rc.SIX]) <= 1e12).all(axis=1)
             & good.any(axis=1)
         )
         flows, slack = np.where(real[:, None], flows, 0.0), np.where(real[:, None], slack, 0.0)
@@ -332,7 +333,7 @@ class _Motions:
             a = quartic.at_zero(*(x / exact["A11"] for x in potential), exact["w0"])
         if not quartic.is_degenerate(a):
             return None
-        if [Fraction(float(x)) for x in row[2:6]] == list(quartic.system(a)[:4]):
+        if [Fraction(float(x)) for x in row[OF_G]] == list(quartic.system(a)[:4]):
             self.slack[i] = 0.0  # no rounding at all
         return separatrix.branch_of(row)
 
