@@ -69,7 +69,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
     """As `steps.trajectory`, by the full equations."""
     free, G, squares, axis = (
         np.empty(8),
-        np.empty((14, 3)),
+        np.empty((gyrostat.ROWS, 3)),
         np.zeros((6, 6)),
         gyrostat.FRAME[:, 0].copy(),
     )

@@ -55,7 +55,7 @@ class System:
 
     @property
     def table(self):
-        """As `kernels.cylinder.gyrostat` takes it, (14, 3)."""
+        """As `kernels.cylinder.gyrostat` takes it, (ROWS, 3)."""
         return np.vstack([self.A, np.linalg.inv(self.A), self.B, self.C, self.moment, self.s])
 
     def torque(self):
