@@ -27,6 +27,7 @@ from survey.kernels.cylinder.steps import (
     TURNING,
     UNDETERMINED,
 )
+from survey.kernels.math.roundoff import EPS
 from survey.measures.cylinder import quartic, solution
 from survey.methods import closed
 from survey.status import INVALID_PARAMETERS
@@ -34,7 +35,6 @@ from survey.status import INVALID_PARAMETERS
 HEADS = 4  # of a row: the angle of the saddle, w at phi0, and their bars
 SADDLE, SADDLE_BAR, START, START_BAR = range(HEADS)
 NO_FORM, DEGENERATE = 19, 21  # as in the STATUS of scenes/gyrostat.py
-_ULP = 2.3e-16
 
 
 def trajectories(method, rows, times, rtol, stable, left):
@@ -103,14 +103,14 @@ class Starts:
                 continue
             angle, many = place[ANGLE] % (2 * np.pi), place[MULTIPLICITY]
             self.heads[i, SADDLE] = angle
-            self.heads[i, SADDLE_BAR] = _ULP * (1.0 + angle) + place[SLIP]
+            self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle) + place[SLIP]
             if left:
                 place[ANGLE], place[ANGLE_LOW] = -place[ANGLE], -place[ANGLE_LOW]
             free = not rows[i, OF_F].any()
             if many > separatrix.ONE and not (free and _multiple(rows[i], many)):
                 self.status[i] = DEGENERATE
             elif free:
-                self.heads[i, SADDLE_BAR] = _ULP * (1.0 + angle)
+                self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle)
                 self._elliptic(i, place, many > separatrix.ONE or symmetric(rows[i]))
             elif method is closed:
                 self.status[i] = NO_FORM
@@ -179,7 +179,7 @@ def _by_steps(starts, rows, solve):
     given[:, rc.W0] = np.where(good, starts.heads[:, START], 0.0)
     results, beside = solve(given), given.copy()
     beside[:, rc.W0] += np.where(
-        good, starts.heads[:, START_BAR] + _ULP * np.abs(given[:, rc.W0]), 0.0
+        good, starts.heads[:, START_BAR] + EPS * np.abs(given[:, rc.W0]), 0.0
     )
     others, bars = solve(beside), rc.STATE // 2
     floats = results[0]
