@@ -9,7 +9,19 @@ the series alone, all of one size together.
 import numpy as np
 
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
-from survey.kernels.hill.cells import ENOUGH, UNSOLVED
+from survey.kernels.hill.cells import (
+    AXIS,
+    BLOCK,
+    ENOUGH,
+    HALVED_X,
+    HALVED_Y,
+    LEAF,
+    PLACE_X,
+    STABLE_PART,
+    UNSOLVED,
+    UNSTABLE_PART,
+    VERDICT,
+)
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import cells
 
@@ -24,7 +36,7 @@ def find(solve, x, y, each, report, values):
 
 
 def _descend(series, doubts, blocks, depth, halves):
-    """As `kernels.hill.cells.descend`: leaves (M, 7) of blocks, cells of one size halved together."""
+    """As `kernels.hill.cells.descend`: leaves (M, LEAF) of blocks, cells of one size halved together."""
     leaves, slack = [], doubts.sum(axis=2)
     own, where, of = series, blocks.astype(np.int64), np.arange(len(blocks))
     while len(where):
@@ -33,13 +45,17 @@ def _descend(series, doubts, blocks, depth, halves):
         loose = (verdict == UNDECIDED) & (
             doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)
         ).any(axis=1)
-        whole = (where == blocks[of]).all(axis=1) & loose & (where[:, [0, 2]] < depth).any(axis=1)
-        left = np.maximum(depth[0] - where[:, 0], depth[1] - where[:, 2])
+        whole = (
+            (where == blocks[of]).all(axis=1)
+            & loose
+            & (where[:, [HALVED_X, HALVED_Y]] < depth).any(axis=1)
+        )
+        left = np.maximum(depth[0] - where[:, HALVED_X], depth[1] - where[:, HALVED_Y])
         done = ~whole & ((verdict != UNDECIDED) | (left == 0))
         leaves += [_leaves(where[done], verdict[done]), _split(where[whole], depth)]
         go = ~done & ~whole
         own, where, of = own[go], where[go], of[go]
-        along = np.where(depth[0] - where[:, 0] == left[go], 0, 1)
+        along = np.where(depth[0] - where[:, HALVED_X] == left[go], 0, 1)
         own, where, of = _halved(own, where, of, along, halves)
     return np.concatenate(leaves), sum(map(len, leaves))
 
@@ -58,20 +74,29 @@ def decided(series, slack):
 
 
 def _leaves(where, verdict):
-    """Rows of `descend`: the block, its verdict, and its parts that are stable and unstable at least."""
-    return np.column_stack([where, verdict, verdict == STABLE, verdict == UNSTABLE]).astype(float)
+    """Leaves of these blocks, wholly stable or unstable where they are not UNDECIDED or UNSOLVED."""
+    leaves = np.empty((len(where), LEAF))
+    leaves[:, :VERDICT], leaves[:, VERDICT] = where, verdict
+    leaves[:, STABLE_PART], leaves[:, UNSTABLE_PART] = verdict == STABLE, verdict == UNSTABLE
+    return leaves
 
 
 def _split(where, depth):
     """The halves, unsolved, of blocks along the side that can be halved more often."""
     rows = []
     for block in where:
-        at = 0 if depth[0] - block[0] >= depth[1] - block[2] else 2
-        for side in (0, 1):
-            child = block.copy()
-            child[at], child[at + 1] = block[at] + 1, 2 * block[at + 1] + side
-            rows.append([*child, UNSOLVED, 0, 0])
-    return np.array(rows, dtype=float).reshape(-1, 7)
+        axis = 0 if depth[0] - block[HALVED_X] >= depth[1] - block[HALVED_Y] else 1
+        rows += [_half(block, axis, side) for side in (0, 1)]
+    return _leaves(np.array(rows, dtype=float).reshape(-1, BLOCK), np.full(len(rows), UNSOLVED))
+
+
+def _half(blocks, axis, side):
+    """The lower (0) or the upper (1) half of a block, or of each of some."""
+    half = blocks.copy()
+    halved, place = AXIS * axis + HALVED_X, AXIS * axis + PLACE_X
+    half[..., halved] += 1
+    half[..., place] = 2 * half[..., place] + side
+    return half
 
 
 def _halved(own, where, of, along, halves):
@@ -80,12 +105,8 @@ def _halved(own, where, of, along, halves):
     for axis in (0, 1):
         here = along == axis
         for side in (0, 1):
-            level, place = where[here, 2 * axis], where[here].copy()
-            place[:, 2 * axis], place[:, 2 * axis + 1] = (
-                level + 1,
-                2 * place[:, 2 * axis + 1] + side,
-            )
+            level = where[here, AXIS * axis + HALVED_X]
             step = halves[axis, level, side][:, None]
             new = step @ own[here] if axis == 0 else own[here] @ step.swapaxes(2, 3)
-            parts.append((new, place, of[here]))
+            parts.append((new, _half(where[here], axis, side), of[here]))
     return tuple(np.concatenate(column) for column in zip(*parts, strict=True))

@@ -45,13 +45,15 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
 def _sort(P, starts, times, forms, curves, floats, turnings, status):
     """Fill `forms` (as times) with the closed form to evaluate there, curves with its mu and 1 - mu."""
     for i in range(len(P)):
-        kind, curves[i, 0], curves[i, 1] = closed.applies(P[i], starts[i, 0], starts[i, 1])
+        kind, curves[i, 0], curves[i, 1] = closed.applies(
+            P[i], starts[i, rc.START_PHI], starts[i, rc.START_W]
+        )
         status[i] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
         for j in range(finite(times[i]) if kind != closed.NONE else 0):
             if times[i, j] != 0.0:
                 forms[i, j] = kind
                 continue
-            _store(floats[i, j], starts[i, 0], 0.0, starts[i, 1], 0.0, 0.0)
+            _store(floats[i, j], starts[i, rc.START_PHI], 0.0, starts[i, rc.START_W], 0.0, 0.0)
             turnings[i, j] = 0
 
 
@@ -90,11 +92,15 @@ def _solve(enter, solve, T, indices, P, starts, curves, times, floats, turnings)
         some = indices[first : first + LANES]
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
-            enter(T, k, P[i], starts[i, 0], starts[i, 1], times[i, j], curves[i])
+            enter(
+                T, k, P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], times[i, j], curves[i]
+            )
         solve(T)
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
-            if _store(floats[i, j], starts[i, 0], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]):
+            if _store(
+                floats[i, j], starts[i, rc.START_PHI], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]
+            ):
                 turnings[i, j] = int(T[COUNT, k])
 
 
@@ -117,7 +123,7 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `steps.abels`; tolerance and limit have no meaning here."""
     data = closed.scratch()
     for i in range(len(P)):
-        phi0, w0 = starts[i, 0], starts[i, 1]
+        phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
         kind, side = closed.start(P[i], phi0, w0, data)
         for j in range(finite(targets[i])):
             out, x = floats[i, j], targets[i, j] - phi0

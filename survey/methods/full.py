@@ -69,7 +69,7 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
     """As `steps.trajectory`, by the full equations."""
     free, G, squares, axis = (
         np.empty(8),
-        np.empty((14, 3)),
+        np.empty((gyrostat.ROWS, 3)),
         np.zeros((6, 6)),
         gyrostat.FRAME[:, 0].copy(),
     )
@@ -139,5 +139,5 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     """See `steps.trajectories`."""
     for i in range(len(P)):
         size = finite(times[i])
-        status[i] = _trajectory(P[i], starts[i, 0], starts[i, 1], times[i, :size], tolerance, limit, floats[i],
-                               turnings[i])  # fmt: skip
+        status[i] = _trajectory(P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], times[i, :size],
+                               tolerance, limit, floats[i], turnings[i])  # fmt: skip

@@ -36,7 +36,7 @@ from survey.kernels.cylinder.flow import (
 )
 from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.cylinder.program import COLUMNS
-from survey.kernels.cylinder.records import STATE
+from survey.kernels.cylinder.records import EXACT_START, STATE
 from survey.kernels.jit import inline, kernel
 
 ORDER = 20
@@ -140,7 +140,7 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
 
 def flow_abels_ahead():
     """Compile what `flow_abels` waits for."""
-    P, none = np.empty((0, COLUMNS)), np.empty((0, 2))
+    P, none = np.empty((0, COLUMNS)), np.empty((0, EXACT_START))
     P.flags.writeable = False
     floats = np.empty((0, 2, STATE))
     _abels_in_angle(

@@ -21,6 +21,7 @@ import survey
 from survey.errors import BadInput
 from survey.file.disk import check_folder, write_atomically
 from survey.kernels.math import chebyshev
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.model import functions
 from survey.model.reader import FORMAT, SERIES, TABLE
 
@@ -160,7 +161,7 @@ def expanded(values, ulps):
     weights = (
         16.0 + 2.0 * (k[:, None] + k) + (0.5 + ulps[0]) * k[:, None] ** 2 + (0.5 + ulps[1]) * k**2
     )
-    return series, tails, 2.0**-53 * (sizes * weights).sum(axis=(1, 2))
+    return series, tails, ROUNDOFF * (sizes * weights).sum(axis=(1, 2))
 
 
 def _away(values, longer):

@@ -40,6 +40,7 @@ import numpy as np
 from survey import methods
 from survey.errors import BadInput
 from survey.kernels.nutation import brun, brun_lanes
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import wells as nu
 from survey.measures.nutation import (
     derived,
@@ -71,7 +72,6 @@ STATUS = {
     "overflow": "a value leaves the range of binary64: theta0 is too near to 0 or pi for these momenta",
 }
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
-_HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _LARGEST = 1e290
 # relative bars of actions of wells so narrow that turning points lose digits: see `brun.measure`
 _BLURRED = 4e-13
@@ -210,9 +210,9 @@ def compile_ahead(variables, options):
         brun_lanes.compile_others()
         yield
     if "sign" in options:
-        nutation.of_integrals(np.empty((0, 3)), 1)
+        nutation.of_integrals(np.empty((0, rc.INTEGRALS)), 1)
     else:
-        nutation.of_states(np.empty((0, 7)))
+        nutation.of_states(np.empty((0, rc.STATE)))
 
 
 def _ordered(given):
@@ -247,15 +247,16 @@ def _state_in_lanes(given, columns, valid, slowly, wanted):
 
 def _scaled_in_lanes(given, valid, sign, slowly, wanted):
     """Both wells, where there are two, one after the other."""
-    columns = np.zeros((7, valid.size))
-    columns[0], columns[1], columns[2], columns[3] = given["l"], sign, -1.0, given["ratio"]
-    columns[5], columns[6] = given["beta"], given["alpha"]
+    columns = np.zeros((rc.STATE, valid.size))
+    columns[rc.LEVEL], columns[rc.SIGN], columns[rc.WELL] = given["l"], sign, -1.0
+    columns[rc.RATIO] = given["ratio"]
+    columns[rc.P_PSI], columns[rc.P_PHI] = given["beta"], given["alpha"]
     values, wells, done = nutation.in_lanes(brun_lanes.of_integrals, columns, "action" in wanted)
     both = np.full((*values.shape, 2), np.nan)
     both[..., 0] = values
     two = np.flatnonzero(done & (wells == 2))
     upper = columns[:, two]
-    upper[2] = 1.0
+    upper[rc.WELL] = 1.0
     both[:, two, 1], _wells, done[two] = nutation.in_lanes(
         brun_lanes.of_integrals, upper, "action" in wanted
     )
@@ -279,11 +280,11 @@ def _completed(out, given, valid, done, slowly):
 
 def _state(given, valid, method, request, times):
     points = _ordered(given).T.copy()
-    points[~valid] = _HARMLESS
+    points[~valid] = nutation.HARMLESS
     nutation.compile_periods(method)
     rows, kinds, count, heights, starts = nutation.of_states(points)
-    a, c = points[:, 0], points[:, 1]
-    drift = points[:, 6] * ((a - c) / (a * c))
+    a, c = points[:, rc.SIZE_A], points[:, rc.SIZE_C]
+    drift = points[:, rc.P_PHI] * ((a - c) / (a * c))
     periods, kinds = nutation.periods(method, rows, kinds, request.rtol)
     out = nutation.outputs(rows, periods, a, drift)
     out["verdict"] = nutation.verdicts(rows, kinds)
@@ -303,7 +304,7 @@ def _state(given, valid, method, request, times):
 
 def _too_large(points):
     """Where the kinetic energy of the precession, next to a pole, leaves the range of double-double."""
-    theta, b, a = points[:, 3], points[:, 5], points[:, 6]
+    theta, b, a = points[:, rc.THETA], points[:, rc.P_PSI], points[:, rc.P_PHI]
     with np.errstate(all="ignore"):
         return ~((b - a * np.cos(theta)) ** 2 < _LARGEST * np.sin(theta) ** 2) & (theta > 0.0)
 
@@ -328,7 +329,7 @@ def _scaled(given, valid, sign, method, rtol):
     nutation.compile_periods(method)
     rows, kinds, count, heights = nutation.of_integrals(points, sign)
     ratio = np.where(valid, given["ratio"], 1.0)
-    drift = np.repeat(points[:, 1] * ((1.0 - ratio) / ratio), 2)
+    drift = np.repeat(points[:, rc.ALPHA] * ((1.0 - ratio) / ratio), 2)
     flat = np.ascontiguousarray(rows.reshape(-1, nu.SIZE))
     periods, known = nutation.periods(method, flat, kinds.ravel(), rtol)
     out = nutation.outputs(flat, periods, 1.0, drift)
@@ -377,7 +378,7 @@ def trajectory(point, answer, options, time=None):
         raise BadInput(
             "this motion has no period (a separatrix, or no motion at all): take a point beside it"
         )
-    state = {p.name: point[p.name] for p in PARAMETERS[:7] if p.name in point}
+    state = {p.name: point[p.name] for p in PARAMETERS[: rc.STATE] if p.name in point}
     if "l" in point:
         state = _state_of(point, float(np.ravel(answer["u_min"])[well]), int(options["sign"]))
     t = np.linspace(0.0, _MOTION_PERIODS * period if time is None else time, _MOTION_POINTS)

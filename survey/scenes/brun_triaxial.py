@@ -38,6 +38,8 @@ H, F2 and F3 are from their first values).
 import numpy as np
 
 from survey import methods
+from survey.kernels.body.motion import STATE
+from survey.kernels.cylinder import gyrostat
 from survey.measures import bounded
 from survey.measures.body import clebsch, motion
 from survey.measures.bounded import Bounded
@@ -191,13 +193,11 @@ def _trajectories(point, request):
     nu = np.where(good[:, None], nu / length[:, None], np.array([0.0, 0.0, 1.0]))
     epsilon = np.where(good, rows["epsilon"], 0.0)
     fine = good[:, None] & np.isfinite(times)
-    G = np.zeros((len(w), 14, 3))
+    G = np.zeros((len(w), gyrostat.ROWS, 3))
     for i in range(3):
-        G[:, i, i], G[:, 3 + i, i], G[:, 9 + i, i] = (
-            moments[:, i],
-            1.0 / moments[:, i],
-            epsilon * moments[:, i],
-        )
+        G[:, gyrostat.A + i, i] = moments[:, i]
+        G[:, gyrostat.INVERSE + i, i] = 1.0 / moments[:, i]
+        G[:, gyrostat.C + i, i] = epsilon * moments[:, i]
     floats, status = motion.trajectories(
         method, G, np.hstack([w, nu]), np.where(fine, times, 0.0), request.rtol
     )
@@ -205,7 +205,9 @@ def _trajectories(point, request):
     status = np.where(fine, np.where(lost, NO_CONVERGENCE, status), INVALID_PARAMETERS)
     floats[status != OK] = np.nan
     columns = {f"{kind}{i}": 3 * k + i - 1 for k, kind in enumerate(("w", "nu")) for i in (1, 2, 3)}
-    found = {name: Bounded(floats[..., at], floats[..., 6 + at]) for name, at in columns.items()}
+    found = {
+        name: Bounded(floats[..., at], floats[..., STATE + at]) for name, at in columns.items()
+    }
     inertia, field = (
         [bounded.of(moments[:, i, None]) for i in range(3)],
         bounded.of(epsilon[:, None]),

@@ -48,6 +48,7 @@ set or not), `trajectory` (w and nu of any body at t).
 import numpy as np
 
 from survey import methods
+from survey.kernels.body.motion import FLOATS, STATE
 from survey.measures.body import limits, motion, transversal
 from survey.measures.body import rests as of_rest
 from survey.measures.body.system import CONDITIONS, NAMES, OFF, place, read
@@ -371,7 +372,10 @@ def _trajectories(point, method, rtol):
     bodies = [read(row) if np.isfinite(row).all() else None for row in rows]
     fine = np.array([body is not None for body in bodies])
     good = fine[:, None] & np.isfinite(times)
-    floats, status = np.full((*times.shape, 12), np.nan), np.full(times.shape, INVALID_PARAMETERS)
+    floats, status = (
+        np.full((*times.shape, FLOATS), np.nan),
+        np.full(times.shape, INVALID_PARAMETERS),
+    )
     if fine.any():
         some = [body for body in bodies if body is not None]
         G, starts = (
@@ -386,7 +390,8 @@ def _trajectories(point, method, rtol):
     floats[status != OK] = np.nan
     out = {"status": block.back(status)}
     for k, name in enumerate(("w1", "w2", "w3", "nu1", "nu2", "nu3")):
-        out[name], out[f"{name}_error"] = block.back(floats[..., k]), block.back(floats[..., 6 + k])
+        out[name] = block.back(floats[..., k])
+        out[f"{name}_error"] = block.back(floats[..., STATE + k])
     return out
 
 

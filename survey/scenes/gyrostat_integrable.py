@@ -41,7 +41,9 @@ import numpy as np
 
 from survey import methods
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import OF_G
 from survey.kernels.cylinder.steps import NO_CONVERGENCE, OK, TRUST, TURNING, UNDETERMINED
+from survey.kernels.math.roundoff import EPS
 from survey.measures.cylinder import auto, blocks, quartic, separatrix, solution
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, named
@@ -119,7 +121,6 @@ OUTPUTS = (
     Output("g3", "invariant g3 of (67)", "g_3", when=_OF_ENERGY),
     Output("G", "G = g2^3 - 27 g3^2 of (68)", "G", when=_OF_ENERGY),
 )  # fmt: skip
-_ULP = 2.3e-16
 _SAME = 1e-14  # how far 1/4 - A11 C23 / (B12 B31) may be below 0: mu = 1/2 within its root
 _BESIDE = 8.0  # times what inputs may be off: how far beside them the motion is solved again
 
@@ -140,7 +141,7 @@ def solve(point, request):
         heads, flows, slack = _REDUCTIONS[case](given, request.options)
         real = (
             np.isfinite(flows).all(axis=1)
-            & (np.abs(flows[:, :6]) <= 1e12).all(axis=1)
+            & (np.abs(flows[:, : rc.SIX]) <= 1e12).all(axis=1)
             & good.any(axis=1)
         )
         flows, slack = np.where(real[:, None], flows, 0.0), np.where(real[:, None], slack, 0.0)
@@ -188,8 +189,8 @@ def _inclined(given, _options):
         size = 4.0 * np.abs(n + given["lambda1"]) + np.abs(given["lambda1"])
     sine = np.sin(theta0)
     b12, b31, free = given["B12"] * sine / A11, given["B31"] * sine / A11, n / A11
-    return _of_first_order(given["phi0"], b12, b31, free, 4 * _ULP * (np.abs(b12) + np.abs(b31)),
-                           _ULP * (2.0 * np.abs(free) + size / A11))  # fmt: skip
+    return _of_first_order(given["phi0"], b12, b31, free, 4 * EPS * (np.abs(b12) + np.abs(b31)),
+                           EPS * (2.0 * np.abs(free) + size / A11))  # fmt: skip
 
 
 def _trigonometric(given, options):
@@ -200,18 +201,18 @@ def _trigonometric(given, options):
     )
     upper = 0.5 + np.sqrt(np.where((inner < 0.0) & (inner >= -_SAME), 0.0, inner))
     mu = upper if options.get("root", "upper") == "upper" else product / upper
-    d_mu = 8 * _ULP * np.abs(mu) + np.sqrt(np.maximum(-inner, 0.0))
-    n_star, share = -mu * (S2 * B31 / (C23 * A11)), d_mu / np.abs(mu) + 5 * _ULP
+    d_mu = 8 * EPS * np.abs(mu) + np.sqrt(np.maximum(-inner, 0.0))
+    n_star, share = -mu * (S2 * B31 / (C23 * A11)), d_mu / np.abs(mu) + 5 * EPS
     b12, b31 = mu * B12 / A11, mu * B31 / A11
     heads, rows, slack = _of_first_order(
         given["phi0"], b12, b31, n_star, share * (np.abs(b12) + np.abs(b31)), share * np.abs(n_star)
     )
     difference, S3 = C23 * (B12 / B31 - B31 / B12), S2 * B31 / B12
-    d_difference = 5 * _ULP * np.abs(C23) * (np.abs(B12 / B31) + np.abs(B31 / B12))
+    d_difference = 5 * EPS * np.abs(C23) * (np.abs(B12 / B31) + np.abs(B31 / B12))
     heads |= {
         "mu": (mu, d_mu),
         "n_star": (n_star, share * np.abs(n_star)),
-        "S3": (S3, 3 * _ULP * np.abs(S3)),
+        "S3": (S3, 3 * EPS * np.abs(S3)),
     }
     heads["C22_minus_C33"] = difference, d_difference
     return heads, rows, slack
@@ -229,18 +230,18 @@ def _of_first_order(phi0, b12, b31, n, d_b, d_n):
     b = np.hypot(b12, b31)
     terms = b12 * np.sin(phi0), b31 * np.cos(phi0), n
     w0 = sum(terms)
-    d_w = d_n + d_b + 3 * _ULP * sum(np.abs(term) for term in terms)
+    d_w = d_n + d_b + 3 * EPS * sum(np.abs(term) for term in terms)
     delta2 = (n - b) * (n + b)
-    d_delta2 = 2 * (np.abs(n) * d_n + b * (d_b + 3 * _ULP * b)) + 4 * _ULP * np.abs(delta2)
+    d_delta2 = 2 * (np.abs(n) * d_n + b * (d_b + 3 * EPS * b)) + 4 * EPS * np.abs(delta2)
     half = np.arccos(np.clip(-n / b, -1.0, 1.0))
-    slip = (d_n + d_b + 4 * _ULP * (np.abs(n) + b)) / (b * np.sin(half)) + 4 * _ULP
+    slip = (d_n + d_b + 4 * EPS * (np.abs(n) + b)) / (b * np.sin(half)) + 4 * EPS
     zero = np.zeros_like(w0)
     rows = np.column_stack([b12, b31, zero, zero, zero, zero, phi0, w0])
     slack = np.column_stack([zero + d_b, zero + d_b, zero, zero, zero, zero, zero, d_w])
     stops = delta2 < -d_delta2
     limit = (np.arctan2(b12, b31) + half) % (2 * np.pi)
     turn = 2 * np.pi / np.sqrt(np.where(delta2 > d_delta2, delta2, np.nan))
-    heads = {"delta2": (delta2, d_delta2), "period": (turn, turn * (d_delta2 / delta2 + 4 * _ULP)),
+    heads = {"delta2": (delta2, d_delta2), "period": (turn, turn * (d_delta2 / delta2 + 4 * EPS)),
              "phi_limit": (np.where(stops, limit, np.nan), np.where(stops, slip, np.nan))}  # fmt: skip
     return heads, rows, slack
 
@@ -252,12 +253,12 @@ def _elliptic(given, _options):
         *(given[name] / A11 for name in ("C23", "S2", "S3")),
     ]
     moved, size = quartic.square_of_w(*potential, phi0)
-    n, d_n = w0 * w0 - moved, 6 * _ULP * (size + w0 * w0)
+    n, d_n = w0 * w0 - moved, 6 * EPS * (size + w0 * w0)
     a, bars = quartic.coefficients(*potential, n, d_n)
     zero = np.zeros_like(w0)
-    slack = np.column_stack([zero, zero, *(2 * _ULP * np.abs(x) for x in potential), zero, zero])
+    slack = np.column_stack([zero, zero, *(2 * EPS * np.abs(x) for x in potential), zero, zero])
     rows = np.column_stack([zero, zero, *potential, phi0, w0])
-    return _heads_of_quartic(n, d_n, a, bars + 2 * _ULP * np.abs(a)), rows, slack
+    return _heads_of_quartic(n, d_n, a, bars + 2 * EPS * np.abs(a)), rows, slack
 
 
 def _of_quartic(given, options):
@@ -266,20 +267,20 @@ def _of_quartic(given, options):
     *potential, n = quartic.system(a)
     moved, _size = quartic.square_of_w(*potential, phi0)
     outer, inner = sizes[:, 0] + sizes[:, 4] + 6 * sizes[:, 2], sizes[:, 1] + sizes[:, 3]
-    square, d_square = n + moved, 6 * _ULP * (2 * outer + 4 * inner)
+    square, d_square = n + moved, 6 * EPS * (2 * outer + 4 * inner)
     w0 = np.sqrt(np.where(square < -d_square, np.nan, np.maximum(square, 0.0)))
     w0 = np.where(np.abs(square) <= d_square, 0.0, w0) * float(options.get("direction", "1"))
     zero = np.zeros_like(w0)
     slack = [
-        _ULP * outer,
-        _ULP * inner,
-        _ULP * inner,
-        _ULP * outer,
+        EPS * outer,
+        EPS * inner,
+        EPS * inner,
+        EPS * outer,
         zero,
         d_square / np.maximum(np.abs(w0), 1e-300),
     ]
     slack[-1] = np.where(w0 == 0.0, 0.0, slack[-1])
-    heads = _heads_of_quartic(n, 2 * _ULP * outer, a, 0.0 * a)
+    heads = _heads_of_quartic(n, 2 * EPS * outer, a, 0.0 * a)
     return (
         heads,
         np.column_stack([zero, zero, *potential, phi0, w0]),
@@ -332,7 +333,7 @@ class _Motions:
             a = quartic.at_zero(*(x / exact["A11"] for x in potential), exact["w0"])
         if not quartic.is_degenerate(a):
             return None
-        if [Fraction(float(x)) for x in row[2:6]] == list(quartic.system(a)[:4]):
+        if [Fraction(float(x)) for x in row[OF_G]] == list(quartic.system(a)[:4]):
             self.slack[i] = 0.0  # no rounding at all
         return separatrix.branch_of(row)
 
@@ -374,8 +375,8 @@ class _Motions:
         back = rows[:, rc.W0] < 0.0
         turn, bar = (np.where(back, x[:, 1], x[:, 0]) for x in (t, bars))
         period = np.where(swings, 2 * np.abs(t[:, 0] - t[:, 1]), np.where(rotates, turn, np.nan))
-        bar = np.where(swings, 2 * bars.sum(axis=1), bar + np.abs(4 * _ULP / rows[:, rc.W0]))
-        both = np.stack([period, period, bar + 4 * _ULP * period, bar], axis=-1)[:, None]
+        bar = np.where(swings, 2 * bars.sum(axis=1), bar + np.abs(4 * EPS / rows[:, rc.W0]))
+        both = np.stack([period, period, bar + 4 * EPS * period, bar], axis=-1)[:, None]
         return both, np.where(swings, _MOTIONS["libration"], _MOTIONS["rotation"]), None
 
 

@@ -200,7 +200,7 @@ def _rotates(names, ends):
 def compile_ahead(variables, options):
     """Compile some of the kernels of a map of these variables (see `survey.scenes`)."""
     if not _separatrix_alone(variables):
-        yield from dense.compile_ahead(sample, np.empty((0, 6)), variables)
+        yield from dense.compile_ahead(sample, np.empty((0, motion.ROW)), variables)
 
 
 def trajectory(point, answer, options, time=None):
@@ -397,9 +397,10 @@ def _row_axis(oblate, rotates, ends):
 
 def _problem(row, rho, low=None, line=None, ends=None):
     half, half_low = row.half
-    rows = np.column_stack(
-        [row.k, row.kc, half, np.full(row.k.size, float(row.oblate)), row.given, row.which]
-    )
+    rows = np.empty((row.k.size, motion.ROW))
+    rows[:, motion.MODULUS], rows[:, motion.COMPLEMENT], rows[:, motion.HALF] = row.k, row.kc, half
+    rows[:, motion.OBLATE], rows[:, motion.GIVEN] = row.oblate, row.given
+    rows[:, motion.WHICH] = row.which
     rule, constant = _rules(row, rho, low)
     return monodromy.Problem(
         p=rho,
@@ -446,7 +447,7 @@ def _walk_points(rows, rho, tolerance, out, reached):
     for i in range(len(rho)):
         tabulate(rows[i], table)
         reached[i] = dop853.hill_walk(
-            potential, rho[i], rows[i], table, rows[i, 2], tolerance[i], out[i]
+            potential, rho[i], rows[i], table, rows[i, motion.HALF], tolerance[i], out[i]
         )
 
 
@@ -457,7 +458,7 @@ def _solve_points(rows, rho, low, steps, out):
     row = np.empty(motion.EXACTLY)
     for i in range(len(rho)):
         motion.exactly(rows[i], row)
-        before = steps[i] if rows[i, 0] > 1.0 else steps[i] // 2
+        before = steps[i] if rows[i, motion.MODULUS] > 1.0 else steps[i] // 2
         taylor_double.hill_walk(
             motion.slowest, motion.pendulum, motion.coefficient, motion.missed, row, (rho[i], low[i]),
             motion.half_period(row), before, steps[i] - before, work, chain, out[i],

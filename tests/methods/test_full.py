@@ -25,7 +25,7 @@ TIMES = np.linspace(0.0, 20.0, 81)
 
 def system(free, six=SIX, start=START):
     """(G, initial state) of a full gyrostat in the rotated frame that holds the reduced flow."""
-    G, state = np.empty((14, 3)), np.empty(6)
+    G, state = np.empty((gyrostat.ROWS, 3)), np.empty(6)
     gyrostat.embed(coefficients(*six), np.array(free), G)
     gyrostat.start(*start, state)
     return G, state

@@ -11,7 +11,19 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder.flow import LOW
-from survey.kernels.cylinder.gyrostat import FIRST_ORDER, LAST, carry, series, variation
+from survey.kernels.cylinder.gyrostat import (
+    FIRST_ORDER,
+    INVERSE,
+    LAMBDA,
+    LAST,
+    A,
+    B,
+    C,
+    S,
+    carry,
+    series,
+    variation,
+)
 from survey.kernels.cylinder.steps import (
     NO_CONVERGENCE,
     OK,
@@ -54,40 +66,34 @@ def expanded(G, state, T, V):
 
 
 @inline
+def _product(G, row, a, b, c):
+    """A row of G times (a, b, c)."""
+    return G[row, 0] * a + G[row, 1] * b + G[row, 2] * c
+
+
+@inline
+def _added(number, G, row, a, b, c):
+    """The number and that product, added from the left."""
+    return number + G[row, 0] * a + G[row, 1] * b + G[row, 2] * c
+
+
+@inline
 def slope(G, t, y):
     """(w', nu') at y = (w, nu), tuples of six."""
     p, q, r, x, u, v = y
-    k0 = G[12, 0] + G[0, 0] * p + G[0, 1] * q + G[0, 2] * r
-    k1 = G[12, 1] + G[1, 0] * p + G[1, 1] * q + G[1, 2] * r
-    k2 = G[12, 2] + G[2, 0] * p + G[2, 1] * q + G[2, 2] * r
-    f0 = (
-        G[13, 0]
-        + G[6, 0] * p
-        + G[6, 1] * q
-        + G[6, 2] * r
-        - (G[9, 0] * x + G[9, 1] * u + G[9, 2] * v)
-    )
-    f1 = (
-        G[13, 1]
-        + G[7, 0] * p
-        + G[7, 1] * q
-        + G[7, 2] * r
-        - (G[10, 0] * x + G[10, 1] * u + G[10, 2] * v)
-    )
-    f2 = (
-        G[13, 2]
-        + G[8, 0] * p
-        + G[8, 1] * q
-        + G[8, 2] * r
-        - (G[11, 0] * x + G[11, 1] * u + G[11, 2] * v)
-    )
+    k0 = _added(G[LAMBDA, 0], G, A, p, q, r)
+    k1 = _added(G[LAMBDA, 1], G, A + 1, p, q, r)
+    k2 = _added(G[LAMBDA, 2], G, A + 2, p, q, r)
+    f0 = _added(G[S, 0], G, B, p, q, r) - _product(G, C, x, u, v)
+    f1 = _added(G[S, 1], G, B + 1, p, q, r) - _product(G, C + 1, x, u, v)
+    f2 = _added(G[S, 2], G, B + 2, p, q, r) - _product(G, C + 2, x, u, v)
     a = k1 * r - k2 * q + f1 * v - f2 * u
     b = k2 * p - k0 * r + f2 * x - f0 * v
     c = k0 * q - k1 * p + f0 * u - f1 * x
     return (
-        G[3, 0] * a + G[3, 1] * b + G[3, 2] * c,
-        G[4, 0] * a + G[4, 1] * b + G[4, 2] * c,
-        G[5, 0] * a + G[5, 1] * b + G[5, 2] * c,
+        _product(G, INVERSE, a, b, c),
+        _product(G, INVERSE + 1, a, b, c),
+        _product(G, INVERSE + 2, a, b, c),
         u * r - v * q,
         v * p - x * r,
         x * q - u * p,
@@ -126,7 +132,7 @@ def _written(state, squares, n, row):
 @inline
 def trajectories(begin, at, G, starts, times, tolerance, limit, floats, status):
     """Fill floats (rows, n, FLOATS) and status (rows) at ascending times (rows, n) >= 0 of systems
-    G (rows, 14, 3).
+    G (rows, ROWS, 3).
     """
     for i in range(len(G)):
         size = finite(times[i])

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import ANGLE, DG, KIND, NODE, F, captured, offset, settled
 from survey.kernels.cylinder.flow import BOUND_G, TWO_PI, TWO_PI_LOW, table, values
 from survey.kernels.cylinder.steps import bar, carried, expand, to_target, until_turning
@@ -27,6 +28,9 @@ from survey.kernels.math.newton import bracketed
 # greater to the left; bars of Y and of u.
 CELL, SIDE, REFERENCE, OTHER, ENDING, OVER_U, X0, X1, Y0, Y1, D0, D1, FALLS, BAR, BAR_U = range(15)
 PIECE = 15
+# Where a curve starts: START_PHI to START_W_BAR of `records`, and of a BRANCH the angle and the bar
+# of its equilibrium and its slope dw/dphi there.
+REST, REST_BAR, SLOPE = range(4, 7)
 # into the next piece; cut off; at an equilibrium; into the first piece
 GOES_ON, CUT, ARRIVES, CLOSES = range(4)
 BRANCH, ROTATION, LIBRATION = range(3)  # what is followed
@@ -169,21 +173,22 @@ def pieces(
     """Fill `out` (rows, PIECE) with the pieces of a curve of the flow p, which S1 has made of the
     system; their number.
 
-    start: phi, w, their bars, and of a BRANCH the angle and the bar of its equilibrium and its
-    slope dw/dphi there; phi is in the cell number `cell` of those between the edges. falls: is g <
+    start: START_PHI to SLOPE; phi is in the cell number `cell` of those between the edges. falls: is g <
     0 in the cell? eqs: equilibria of p. A branch is cut off a turn after u has passed `top`, or
     where its windings come too near to one another.
     """
     T, samples, one, two = table(), np.zeros((SAMPLES, 2)), np.zeros(6), np.zeros(6)
-    how = setting(p, start[1], tolerance)
+    how = setting(p, start[rc.START_W], tolerance)
     cells = len(edges) - 1
-    phi, w, n, size, kept = start[0], start[1], 0, 0, 0
-    saa, sab, sbb = start[2] * start[2], 0.0, start[3] * start[3]
+    phi, w, n, size, kept = start[rc.START_PHI], start[rc.START_W], 0, 0, 0
+    off, wide = start[rc.START_PHI_BAR], start[rc.START_W_BAR]
+    saa, sab, sbb = off * off, 0.0, wide * wide
     sign = 1 if w > 0.0 or (w == 0.0 and values(p, phi)[1] > 0.0) else -1
     sampled, from_axis, turnings = 0, False, 0
     if kind == BRANCH:
-        one[0], one[1], one[2], one[3] = start[4], 0.0, sign * start[6], sign / start[6]
-        one[4], one[5] = start[5] * abs(start[6]), start[5]
+        slope = start[SLOPE]
+        one[0], one[1], one[2], one[3] = start[REST], 0.0, sign * slope, sign / slope
+        one[4], one[5] = start[REST_BAR] * abs(slope), start[REST_BAR]
         samples[0, 0], samples[0, 1], sampled = phi, abs(w), 1
     elif kind == ROTATION:
         _end_of(p, phi, w, sign, 1, saa, sab, sbb, one)
@@ -494,7 +499,7 @@ def located(p, starts, breaks, numbers_of, edges, found, first, limits, gaps, tu
     """
     base, most = edges[0], len(breaks) - 1
     for i in range(len(starts)):
-        phi, w = starts[i, 0], starts[i, 1]
+        phi, w = starts[i, rc.START_PHI], starts[i, rc.START_W]
         m = math.floor((phi - base) / TWO_PI)
         x = (phi - m * TWO_PI) - m * TWO_PI_LOW
         gaps[i], turned[i] = -1, m

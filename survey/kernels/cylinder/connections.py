@@ -12,7 +12,15 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.equilibria import ANGLE, BAR, KIND, MOST, SADDLE, equilibria_inside
+from survey.kernels.cylinder.equilibria import (
+    ANGLE,
+    BAR,
+    EQUILIBRIUM_SIZE,
+    KIND,
+    MOST,
+    SADDLE,
+    equilibria_inside,
+)
 from survey.kernels.cylinder.flow import (
     B12,
     B31,
@@ -123,7 +131,11 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
     Only branches that are `wanted` (4, 2) are followed. Rows are NaN where there are none, or an
     equilibrium is degenerate.
     """
-    eqs, turned, starts = np.zeros((MOST, 10)), np.zeros((MOST, 10)), np.zeros((2 * MOST, 4))
+    eqs, turned, starts = (
+        np.zeros((MOST, EQUILIBRIUM_SIZE)),
+        np.zeros((MOST, EQUILIBRIUM_SIZE)),
+        np.zeros((2 * MOST, rc.START)),
+    )
     q = np.zeros(P.shape[1])
     for i in range(len(P)):
         for system in range(4):
@@ -144,7 +156,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
             mirrored = system == MIRRORED or system == BOTH
             changed(P[i], system, q)
             for k in range(count):
-                for j in range(10):
+                for j in range(EQUILIBRIUM_SIZE):
                     turned[k, j] = eqs[k, j]
                 if mirrored:
                     turned[k, ANGLE] = TWO_PI - eqs[k, ANGLE]

@@ -27,6 +27,7 @@ MOST_PIECES = 20_000  # of the circle: more are needed next to a triple root onl
 HIDDEN, LONG = -1, -2
 NARROW = 1e-6  # rad: two complex roots in so small a disc leave |g| below 1e-13 of its bound
 ANGLE, F, DG, BAR, KIND, STABLE, VAA, VAB, VBB, LEVEL = range(10)
+EQUILIBRIUM_SIZE = 10
 SADDLE, NODE, FOCUS, DEGENERATE = range(4)
 
 

@@ -60,6 +60,10 @@ SPIN_UP_PLUS, SPIN_UP_MINUS, PERIODIC_ROTATION, PERIODIC_LIBRATION, EQUILIBRIUM_
 INFINITE, UNDETERMINED, NO_TURNS = -1, -2, -(2**31)
 # LIMIT of an undecided fate whose cycles are not known: the table that would decide it.
 NEEDS_PLUS, NEEDS_MINUS, NEEDS_LIBRATIONS = -2, -3, -4
+# sizes of the tables that decide: rows of the equilibria and of the cycles of each kind; then the
+# stratum, and 1 where weak foci attract
+EQUILIBRIA, ROTATIONS_PLUS, ROTATIONS_MINUS, LIBRATIONS, STRATUM, ATTRACTING = range(6)
+SIZES = 6
 NOT_KNOWN = -1  # instead of the number of rows of a table of cycles
 # steps that a motion without its cycles is followed, in case an equilibrium captures it
 PATIENT = 500
@@ -183,16 +187,15 @@ def fate(
     """Fill out (VERDICT to STATUS of `records`) for `start` (START_PHI to START_W_BAR).
 
     LIMIT is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
-    sizes = numbers of rows of these, then the stratum and whether weak foci attract. Where a table of cycles is
-    NOT_KNOWN, equilibria alone decide.
+    sizes: EQUILIBRIA to ATTRACTING. Where a table of cycles is NOT_KNOWN, equilibria alone decide.
     """
     count, n_plus, n_minus, n_lib, stratum, weak = (
-        sizes[0],
-        sizes[1],
-        sizes[2],
-        sizes[3],
-        sizes[4],
-        sizes[5] > 0,
+        sizes[EQUILIBRIA],
+        sizes[ROTATIONS_PLUS],
+        sizes[ROTATIONS_MINUS],
+        sizes[LIBRATIONS],
+        sizes[STRATUM],
+        sizes[ATTRACTING] > 0,
     )
     out[rc.VERDICT], out[rc.LIMIT] = UNDECIDED, -1
     out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNDETERMINED, NO_TURNS, OK

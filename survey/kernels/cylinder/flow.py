@@ -20,7 +20,7 @@ import numpy as np
 
 from survey.kernels.cylinder import program
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
-from survey.kernels.cylinder.records import GIVEN, PHI0, START_PHI, START_W, W0
+from survey.kernels.cylinder.records import GIVEN, PHI0, SIX, START_PHI, START_W, W0
 from survey.kernels.jit import for_constants, inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -38,6 +38,7 @@ PHI, W, SIN, COS, SIN2, COS2, E, Y, U1, Z1, U2, Z2, F_, DG = range(ROWS)
 TRUNC_PHI, TRUNC_W, STEP, WEIGHT = range(4)
 
 B12, B31, D, C23, S2, S3, BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(10)
+OF_F, OF_G = slice(B12, B31 + 1), slice(D, S3 + 1)  # the parameters of f, and those of g
 TWO_PI = 2.0 * math.pi
 TWO_PI_LOW = 2.4492935982947064e-16  # 2 pi - TWO_PI
 
@@ -70,12 +71,12 @@ def spread(rows, P, starts):
     """
     for i in range(len(rows)):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
-        for k in range(6):
+        for k in range(SIX):
             P[i, k] = rows[i, k]
         b, c, s = (
-            math.hypot(P[i, 0], P[i, 1]),
-            math.hypot(0.5 * P[i, 2], P[i, 3]),
-            math.hypot(P[i, 4], P[i, 5]),
+            math.hypot(P[i, B12], P[i, B31]),
+            math.hypot(0.5 * P[i, D], P[i, C23]),
+            math.hypot(P[i, S2], P[i, S3]),
         )
         P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = (
             b,
@@ -91,7 +92,7 @@ def spread_programs(rows, P, starts):
     for i in range(len(rows)):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(P.shape[1]):
-            P[i, k] = rows[i, k if k < 6 else k + GIVEN - 6]
+            P[i, k] = rows[i, k if k < SIX else k + GIVEN - SIX]
         if not on_circle(P[i]):
             program.bound_near(P[i], rows[i, PHI0])
 

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.equilibria import MOST, equilibria_inside
+from survey.kernels.cylinder.equilibria import EQUILIBRIUM_SIZE, MOST, equilibria_inside
 from survey.kernels.cylinder.flow import (
     B12,
     B31,
@@ -254,7 +254,7 @@ def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
     `origin` is the time there, and its error; `sign` that of w just after it, and `still` whether
     it is an equilibrium.
     """
-    A, T, eqs, end = scratch(), table(), np.zeros((MOST, 10)), np.zeros(5)
+    A, T, eqs, end = scratch(), table(), np.zeros((MOST, EQUILIBRIUM_SIZE)), np.zeros(5)
     size, _hidden = equilibria_inside(p, eqs)
     phi, w, ellipse = start[0], start[1], round_about(start[2])
     t, at_rest, late = (origin[0], 0.0), w[0] == 0.0, origin[1]

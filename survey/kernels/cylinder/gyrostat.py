@@ -3,9 +3,9 @@ equation.
 
     A w' = (A w + lambda) x w + u x nu,   u = B w - C nu + s,   nu' = nu x w                     (1)-(6)
 
-A system is an array G of 14 rows of three: A (0-2), its inverse (3-5), B (6-8), C (9-11), lambda
-(12), s (13). A step keeps its series in T[n, column], columns w, nu, A w + lambda, u of three each,
-and the products of the variational equation in V[n, column of the start, row]; a state is (w, nu).
+A system is an array G of ROWS of three: A, its inverse, B and C, three rows each, then lambda and
+s. A step keeps its series in T[n, column], columns w, nu, A w + lambda, u of three each, and the
+products of the variational equation in V[n, column of the start, row]; a state is (w, nu).
 
 Source: M. E. Lesina, Ya. V. Zinovyeva (2004), whose components (1)-(6) are this vector form.
 """
@@ -21,7 +21,9 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 ORDER = 20
 LAST = ORDER + 1  # T[LAST, 0]: truncation error of the step, relative
 _W, _NU, _L, _U = 0, 3, 6, 9
-_INVERSE, _B, _C, _LAMBDA, _S = 3, 6, 9, 12, 13
+# The rows of G: where the tensors begin, and the vectors.
+A, INVERSE, B, C, LAMBDA, S = 0, 3, 6, 9, 12, 13
+ROWS = 14
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FIRST_ORDER = 1e-5  # accuracy of the variational equation, which only carries errors and growth
 A11 = 1.5
@@ -67,12 +69,12 @@ def embed(p, free, G):
     The set's conditions (case B): A12 = A31 = B11 = 0, lambda2 = lambda3 = 0 (53), C12 = C31 = 0
     (54), s1 = 0.
     """
-    _turned(G, 0, 1.0, 0.0, 0.0, free[A22], free[A23], free[A33])
-    _turned(G, _B, 0.0, p[B12], p[B31], free[B22], free[B23], free[B33])
-    _turned(G, _C, free[C11], 0.0, 0.0, 0.75 * p[D], p[C23], -0.25 * p[D])
+    _turned(G, A, 1.0, 0.0, 0.0, free[A22], free[A23], free[A33])
+    _turned(G, B, 0.0, p[B12], p[B31], free[B22], free[B23], free[B33])
+    _turned(G, C, free[C11], 0.0, 0.0, 0.75 * p[D], p[C23], -0.25 * p[D])
     for i in range(3):
-        G[_LAMBDA, i] = A11 * FRAME[i, 0] * free[LAMBDA1]
-        G[_S, i] = A11 * (FRAME[i, 1] * p[S2] + FRAME[i, 2] * p[S3])
+        G[LAMBDA, i] = A11 * FRAME[i, 0] * free[LAMBDA1]
+        G[S, i] = A11 * (FRAME[i, 1] * p[S2] + FRAME[i, 2] * p[S3])
     invert(G)
 
 
@@ -93,11 +95,13 @@ def invert(G):
     for i in range(3):
         for j in range(3):
             a, b, c, d = (j + 1) % 3, (j + 2) % 3, (i + 1) % 3, (i + 2) % 3
-            G[_INVERSE + i, j] = G[a, c] * G[b, d] - G[a, d] * G[b, c]
-    determinant = G[0, 0] * G[3, 0] + G[0, 1] * G[4, 0] + G[0, 2] * G[5, 0]
+            G[INVERSE + i, j] = G[A + a, c] * G[A + b, d] - G[A + a, d] * G[A + b, c]
+    determinant = (
+        G[A, 0] * G[INVERSE, 0] + G[A, 1] * G[INVERSE + 1, 0] + G[A, 2] * G[INVERSE + 2, 0]
+    )
     for i in range(3):
         for j in range(3):
-            G[_INVERSE + i, j] /= determinant
+            G[INVERSE + i, j] /= determinant
 
 
 @kernel
@@ -115,11 +119,11 @@ def series(G, state, T, order):
         T[0, i] = state[i]
     for n in range(order + 1):
         for i in range(3):
-            k = 1.0 * G[_LAMBDA, i] if n == 0 else 0.0
-            u = 1.0 * G[_S, i] if n == 0 else 0.0
+            k = 1.0 * G[LAMBDA, i] if n == 0 else 0.0
+            u = 1.0 * G[S, i] if n == 0 else 0.0
             for j in range(3):
-                k += G[i, j] * T[n, j]
-                u += G[_B + i, j] * T[n, j] - G[_C + i, j] * T[n, 3 + j]
+                k += G[A + i, j] * T[n, j]
+                u += G[B + i, j] * T[n, j] - G[C + i, j] * T[n, 3 + j]
             T[n, _L + i], T[n, _U + i] = k, u
         if n == order:
             return
@@ -135,7 +139,7 @@ def series(G, state, T, order):
         for i in range(3):
             T[n + 1, i] = 0.0
             for j in range(3):
-                T[n + 1, i] += G[_INVERSE + i, j] * T[LAST, j]
+                T[n + 1, i] += G[INVERSE + i, j] * T[LAST, j]
 
 
 @kernel
@@ -205,8 +209,8 @@ def variation(G, T, V):
             for i in range(3):
                 k = u = 0.0
                 for j in range(3):
-                    k += G[i, j] * V[n, c, j]
-                    u += G[_B + i, j] * V[n, c, j] - G[_C + i, j] * V[n, c, 3 + j]
+                    k += G[A + i, j] * V[n, c, j]
+                    u += G[B + i, j] * V[n, c, j] - G[C + i, j] * V[n, c, 3 + j]
                 V[n, c, _L + i], V[n, c, _U + i] = k, u
             if n == LOW:
                 break
@@ -225,7 +229,7 @@ def variation(G, T, V):
             for i in range(3):
                 V[n + 1, c, i] = 0.0
                 for j in range(3):
-                    V[n + 1, c, i] += G[_INVERSE + i, j] * h[j]
+                    V[n + 1, c, i] += G[INVERSE + i, j] * h[j]
 
 
 @kernel
@@ -254,9 +258,9 @@ def local_error(G, T, dt):
     w = abs(T[0, 0]) + abs(T[0, 1]) + abs(T[0, 2])
     moment, force = 0.0, 0.0
     for i in range(3):
-        moment, force = max(moment, abs(G[_LAMBDA, i])), max(force, abs(G[_S, i]))
-    torque = (_norm(G, 0) * w + moment) * w + (_norm(G, _B) * w + _norm(G, _C) + force) * 2.0
-    rate = _norm(G, _INVERSE) * torque
+        moment, force = max(moment, abs(G[LAMBDA, i])), max(force, abs(G[S, i]))
+    torque = (_norm(G, A) * w + moment) * w + (_norm(G, B) * w + _norm(G, C) + force) * 2.0
+    rate = _norm(G, INVERSE) * torque
     truncation = T[LAST, 0]
     by_w = truncation * (1.0 + w) + ROUNDOFF_UP * (1.5 * w + 4.0 * dt * rate)
     return by_w, truncation + ROUNDOFF_UP * (1.5 + 4.0 * dt * w)

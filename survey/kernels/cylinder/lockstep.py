@@ -421,7 +421,14 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
             if finite(times[waiting]) == 0:
                 status[waiting] = OK
             else:
-                enter(P[waiting], starts[waiting, 0], starts[waiting, 1], state, fixed, i)
+                enter(
+                    P[waiting],
+                    starts[waiting, rc.START_PHI],
+                    starts[waiting, rc.START_W],
+                    state,
+                    fixed,
+                    i,
+                )
                 fixed[NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
             waiting += 1
     return waiting

@@ -279,8 +279,8 @@ def _refill(
         while waiting < len(P) and row[i] < 0:
             p, phi0, w0, size = (
                 P[waiting],
-                starts[waiting, 0],
-                starts[waiting, 1],
+                starts[waiting, rc.START_PHI],
+                starts[waiting, rc.START_W],
                 finite(targets[waiting]),
             )
             at, rows, codes = (

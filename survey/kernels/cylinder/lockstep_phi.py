@@ -284,9 +284,9 @@ def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            p, w0 = P[waiting], starts[waiting, 1]
+            p, w0 = P[waiting], starts[waiting, rc.START_W]
             if math.isfinite(targets[waiting, 0]) and w0 > 0.0:
-                psi, turns = reduced(starts[waiting, 0])
+                psi, turns = reduced(starts[waiting, rc.START_PHI])
                 slip = (4.0 * ROUNDOFF_UP) * (turns != 0.0)
                 bend = p[BOUND_F] + p[BOUND_G] / w0
                 bound = slip * bend

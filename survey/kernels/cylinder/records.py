@@ -4,13 +4,16 @@ read.
 Angles are in radians; a name with _BAR is the error bound of the value named before it.
 """
 
-# A solution in the order of the parameters: six of the system (columns B12 to S3 of `flow`), then
+# A solution in the order of the parameters: SIX of the system (columns B12 to S3 of `flow`), then
 # its initial state; of a flow of one's own the further columns of its `program`, from BOUND_F on,
-# follow.
+# follow. Of one on a separatrix the number of the saddle stands in the place of w0.
+SIX = 6
 PHI0, W0 = 6, 7
+NUMBER = W0
 GIVEN = 8
-# A start: phi0 and w0, and what they may be off.
+# A start: phi0 and w0, and what they may be off; an exact start: phi0 and w0 alone.
 START_PHI, START_W, START_PHI_BAR, START_W_BAR = range(4)
+START, EXACT_START = 4, 2
 # A solution at a time.
 PHI, W, PHI_BAR, W_BAR = range(4)
 # A solution at an angle: w and t there, or phi and t of the turning point before it.

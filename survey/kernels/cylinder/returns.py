@@ -29,6 +29,7 @@ ROTATION, LIBRATION = 0, 1
 NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
 # a node of a scan: x, class, D, map', bar of D, time, left
 X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)
+NODE_SIZE = 7
 (
     CYCLE_X,
     MULTIPLIER,
@@ -41,6 +42,11 @@ X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)
     BELOW,
     ABOVE,
 ) = range(10)
+CYCLE_SIZE = 10
+# edges of a scan: w_c and w_d of a rotation, D and its bar at the last node and at the first, the
+# number of nodes without an answer
+BORDER, IMAGE, LAST_CHANGE, LAST_ERROR, FIRST_CHANGE, FIRST_ERROR, UNANSWERED = range(7)
+EDGES = 7
 MOST_CYCLES = 16
 MOST_NODES = 400
 LIMIT = 40_000
@@ -162,28 +168,27 @@ def fixed_points(
 
     Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no
     change of sign but dips towards 0, the dip is followed down (a pair of cycles near its fold).
-    edges = (w_c, w_d) of a rotation, D and its bar at the last node and at the first, the number of
-    nodes without an answer.
+    edges: those of the scan.
     """
-    nodes = np.zeros((MOST_NODES, 7))
+    nodes = np.zeros((MOST_NODES, NODE_SIZE))
     size = scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes)
-    edges[0], edges[1], edges[2], edges[3] = (
+    edges[BORDER], edges[IMAGE], edges[LAST_CHANGE], edges[LAST_ERROR] = (
         math.nan,
         math.nan,
         nodes[size - 1, CHANGE],
         nodes[size - 1, ERROR],
     )
-    edges[4], edges[5], edges[6] = (
+    edges[FIRST_CHANGE], edges[FIRST_ERROR], edges[UNANSWERED] = (
         nodes[0, CHANGE],
         nodes[0, ERROR],
         1.0 * (nodes[0, CLASS] == UNKNOWN),
     )
-    m = np.zeros(7)
+    m = np.zeros(NODE_SIZE)
     for i in range(1, size):
         a, b = nodes[i - 1], nodes[i]
-        edges[6] += b[CLASS] == UNKNOWN
+        edges[UNANSWERED] += b[CLASS] == UNKNOWN
         if b[CLASS] == 1.0 and a[CLASS] != 1.0:
-            edges[0], edges[1] = b[X], b[X] + b[CHANGE]
+            edges[BORDER], edges[IMAGE] = b[X], b[X] + b[CHANGE]
         if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS] or found + 2 > len(cycles) or b[X] <= a[X]:
             continue
         copy(m, b)
@@ -225,7 +230,7 @@ def copy(target, source):
 @splice
 def scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes):
     """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number."""
-    a, c, d = np.zeros(7), np.zeros(7), np.zeros(7)
+    a, c, d = np.zeros(NODE_SIZE), np.zeros(NODE_SIZE), np.zeros(NODE_SIZE)
     grain = 1e-15 * (xs[-1] - xs[0])
     image_of(kind, p, eqs, count, anchor, xs[0], tolerance, nodes[0])
     size, i, x, step = 1, 1, xs[0], 0.0
@@ -296,7 +301,7 @@ def followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
 @splice
 def solved(image_of, kind, p, eqs, count, anchor, interval, a, b, tolerance, row):
     """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
-    low, high, m = a[X], b[X], np.zeros(7)
+    low, high, m = a[X], b[X], np.zeros(NODE_SIZE)
     rising = b[CHANGE] > 0.0
     share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
     x = low + min(max(share, 0.02), 0.98) * (high - low)

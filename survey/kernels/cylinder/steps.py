@@ -184,7 +184,8 @@ def trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats,
     """`trajectory` for each row of P; a row of times ends at its first infinity."""
     for i in range(len(P)):
         size = finite(times[i])
-        status[i] = trajectory(setting, begin, at, P[i], starts[i, 0], starts[i, 1], times[i, :size],
+        phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
+        status[i] = trajectory(setting, begin, at, P[i], phi0, w0, times[i, :size],
                                tolerance, limit, floats[i], turnings[i])  # fmt: skip
 
 
@@ -193,7 +194,8 @@ def abels(setting, begin, at, P, starts, targets, tolerance, limit, floats, stat
     """`abel` for each row of P; a row of targets ends at its first infinity."""
     for i in range(len(P)):
         size = finite(targets[i])
-        abel(setting, begin, at, P[i], starts[i, 0], starts[i, 1], targets[i, :size],
+        phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
+        abel(setting, begin, at, P[i], phi0, w0, targets[i, :size],
              tolerance, limit, floats[i], status[i])  # fmt: skip
 
 

@@ -11,6 +11,7 @@ Source: see `kernels.cylinder.flow_double`.
 import numpy as np
 
 from survey.kernels.cylinder import flow_double
+from survey.kernels.cylinder import records as rc
 
 ORDER = 30
 SERVES = ()  # a last resort, never a user's choice
@@ -26,14 +27,21 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
     for i in range(len(P)):
         asked = _asked(times[i])
         status[i] = flow_double.trajectory(
-            P[i], starts[i, 0], starts[i, 1], asked, floats[i], turnings[i]
+            P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], asked, floats[i], turnings[i]
         )
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     """See `steps.abels`, and `flow_trajectories`."""
     for i in range(len(P)):
-        flow_double.abel(P[i], starts[i, 0], starts[i, 1], _asked(targets[i]), floats[i], status[i])
+        flow_double.abel(
+            P[i],
+            starts[i, rc.START_PHI],
+            starts[i, rc.START_W],
+            _asked(targets[i]),
+            floats[i],
+            status[i],
+        )
 
 
 def _asked(row):

@@ -11,10 +11,12 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import (
     ANGLE,
     BAR,
     DG,
+    EQUILIBRIUM_SIZE,
     FOCUS,
     KIND,
     MOST,
@@ -101,7 +103,7 @@ def counts(setting, begin, at, p, phi0, w0, times, tolerance, limit, out):
     """Fill out[j] with the number of turning points before the ascending times[j] >= 0 where it is
     UNDETERMINED.
     """
-    eqs, end, T = np.zeros((MOST, 10)), np.zeros(5), table()
+    eqs, end, T = np.zeros((MOST, EQUILIBRIUM_SIZE)), np.zeros(5), table()
     count, _hidden = equilibria_inside(p, eqs)
     if p[BOUND_G] == 0.0 or rests(p, phi0, w0):
         out[: len(times)] = 0
@@ -158,8 +160,8 @@ def turnings(setting, begin, at, P, starts, times, tolerance, limit, out):
             begin,
             at,
             P[i],
-            starts[i, 0],
-            starts[i, 1],
+            starts[i, rc.START_PHI],
+            starts[i, rc.START_W],
             times[i, :size],
             tolerance,
             limit,

@@ -24,22 +24,26 @@ BLURRED = 0.1
 # Of a block's slack, for each degree that its cells drop.
 DROPPED = 0.02
 CORNERS = 12  # of a square cut by four lines, at most 8
+# A block, or a cell: along each axis how often it is halved, and the number of the part; along axis
+# 0 or 1 these are the columns AXIS * axis + HALVED_X and + PLACE_X.
+HALVED_X, PLACE_X, HALVED_Y, PLACE_Y = range(4)
+AXIS, BLOCK = 2, 4
+# A leaf: its block, its verdict, or UNSOLVED, and which parts of it are stable and unstable at least.
+VERDICT, STABLE_PART, UNSTABLE_PART = range(4, 7)
 LEAF = 7
 
 
 @kernel
 def descend(series, doubts, blocks, depth, halves):
-    """Halve B blocks until a cell is decided or `depth` halvings small: leaves (>= M, 7), and M.
+    """Halve B blocks until a cell is decided or `depth` halvings small: leaves (>= M, LEAF), and M.
 
     `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor the series' tail in X, in Y, and its
-    other slack; `blocks` (B, 4): number of halvings and index along X, the same along Y; `halves`
-    (2, depth, 2, n, n): per axis and number of halvings the matrices to the lower and to the upper
-    half. A leaf is its block, its verdict, or UNSOLVED, and which parts of it are stable and
-    unstable at least.
+    other slack; `blocks` (B, BLOCK); `halves` (2, depth, 2, n, n): per axis and number of halvings
+    the matrices to the lower and to the upper half.
     """
     n, most = series.shape[2], depth[0] + depth[1] + 2
     stack, slack = np.empty((most, 4, n, n)), np.empty((most, 4))
-    where, size = np.empty((most, 4), np.int64), np.empty((most, 2), np.int64)
+    where, size = np.empty((most, BLOCK), np.int64), np.empty((most, 2), np.int64)
     sums, polygons = np.empty((4, 2)), np.empty((2, CORNERS, 2))
     leaves, count = np.empty((1024, LEAF)), 0
     for b in range(len(series)):
@@ -51,7 +55,7 @@ def descend(series, doubts, blocks, depth, halves):
             here, own, bars = where[top], stack[top], slack[top]
             _add_up(own, size[top], sums)
             verdict = decide(sums, bars)
-            left = max(depth[0] - here[0], depth[1] - here[2])
+            left = max(depth[0] - here[HALVED_X], depth[1] - here[HALVED_Y])
             short_x, short_y = False, False
             if verdict == UNDECIDED:
                 short_x, short_y = _too_short(sums, bars, doubts[b], here, blocks[b], depth)
@@ -64,8 +68,9 @@ def descend(series, doubts, blocks, depth, halves):
                 _write(here, verdict, stable, unstable, leaves[count])
                 count, top = count + 1, top - 1
             else:
-                axis = 0 if depth[0] - here[0] == left else 1
-                _halve(stack, slack, where, size, top, axis, halves[axis, here[2 * axis]], sums)
+                axis = 0 if depth[0] - here[HALVED_X] == left else 1
+                level = here[AXIS * axis + HALVED_X]
+                _halve(stack, slack, where, size, top, axis, halves[axis, level], sums)
                 _shorten(stack[top], slack[top], size[top], doubts[b])
                 _shorten(stack[top + 1], slack[top + 1], size[top + 1], doubts[b])
                 top += 1
@@ -85,8 +90,10 @@ def _more(leaves, count):
 @inline
 def _begin(series, doubt, block, own, slack, where, size):
     """The block as the first cell."""
+    for i in range(BLOCK):
+        where[i] = block[i]
     for f in range(4):
-        slack[f], where[f] = doubt[f, 0] + doubt[f, 1] + doubt[f, 2], block[f]
+        slack[f] = doubt[f, 0] + doubt[f, 1] + doubt[f, 2]
         for j in range(series.shape[1]):
             for k in range(series.shape[2]):
                 own[f, j, k] = series[f, j, k]
@@ -95,9 +102,9 @@ def _begin(series, doubt, block, own, slack, where, size):
 
 @inline
 def _write(here, verdict, stable, unstable, leaf):
-    for i in range(4):
+    for i in range(BLOCK):
         leaf[i] = here[i]
-    leaf[4], leaf[5], leaf[6] = verdict, stable, unstable
+    leaf[VERDICT], leaf[STABLE_PART], leaf[UNSTABLE_PART] = verdict, stable, unstable
 
 
 @inline
@@ -145,8 +152,9 @@ def _too_short(sums, bars, doubt, here, block, depth):
     helps.
     """
     x = y = hidden_x = hidden_y = False
-    full = here[0] == block[0] and here[2] == block[2]
-    share = ENOUGH * 0.5 ** max(depth[0] - here[0], depth[1] - here[2]) if full else BLURRED
+    full = here[HALVED_X] == block[HALVED_X] and here[HALVED_Y] == block[HALVED_Y]
+    left_x, left_y = depth[0] - here[HALVED_X], depth[1] - here[HALVED_Y]
+    share = ENOUGH * 0.5 ** max(left_x, left_y) if full else BLURRED
     for f in range(4):
         if not _sure(sums, bars, f):
             most, size = max(share * sums[f, 1], doubt[f, 2]), abs(sums[f, 0]) + sums[f, 1]
@@ -155,12 +163,10 @@ def _too_short(sums, bars, doubt, here, block, depth):
             hidden_x |= not doubt[f, 0] <= size
             hidden_y |= not doubt[f, 1] <= size
     if not full:
-        return x and here[0] > block[0], y and here[2] > block[2]
-    if (hidden_x and here[0] == depth[0]) or (hidden_y and here[2] == depth[1]):
+        return x and here[HALVED_X] > block[HALVED_X], y and here[HALVED_Y] > block[HALVED_Y]
+    if (hidden_x and left_x == 0) or (hidden_y and left_y == 0):
         return False, False
-    return x and here[0] < depth[0] and hidden_x >= hidden_y, y and here[2] < depth[
-        1
-    ] and hidden_y >= hidden_x
+    return x and left_x > 0 and hidden_x >= hidden_y, y and left_y > 0 and hidden_y >= hidden_x
 
 
 @inline
@@ -168,14 +174,16 @@ def _children(here, block, along_x, along_y, leaves, count):
     """What must be solved next: halves or quarters of the block, or this cell of it; returns the
     new count.
     """
-    full = here[0] == block[0] and here[2] == block[2]
+    full = here[HALVED_X] == block[HALVED_X] and here[HALVED_Y] == block[HALVED_Y]
     for i in range(2 if full and along_x else 1):
         for j in range(2 if full and along_y else 1):
             _write(here, UNSOLVED, 0.0, 0.0, leaves[count])
             if full and along_x:
-                leaves[count, 0], leaves[count, 1] = here[0] + 1, 2 * here[1] + i
+                leaves[count, HALVED_X] = here[HALVED_X] + 1
+                leaves[count, PLACE_X] = 2 * here[PLACE_X] + i
             if full and along_y:
-                leaves[count, 2], leaves[count, 3] = here[2] + 1, 2 * here[3] + j
+                leaves[count, HALVED_Y] = here[HALVED_Y] + 1
+                leaves[count, PLACE_Y] = 2 * here[PLACE_Y] + j
             count += 1
     return count
 
@@ -183,14 +191,16 @@ def _children(here, block, along_x, along_y, leaves, count):
 @inline
 def _halve(stack, slack, where, size, top, axis, matrices, sums):
     """Put the lower half of the cell at `top` above it, and the upper half in its place."""
-    for i in range(4):
+    for i in range(BLOCK):
         where[top + 1, i] = where[top, i]
+    for i in range(4):
         slack[top, i] += EPS * (4.0 + 2.0 * size[top, axis]) * (abs(sums[i, 0]) + sums[i, 1])
         slack[top + 1, i] = slack[top, i]
     size[top + 1, 0], size[top + 1, 1] = size[top, 0], size[top, 1]
+    halved, place = AXIS * axis + HALVED_X, AXIS * axis + PLACE_X
     for at in (top, top + 1):
-        where[at, 2 * axis] += 1
-        where[at, 2 * axis + 1] = 2 * where[at, 2 * axis + 1] + (1 if at == top else 0)
+        where[at, halved] += 1
+        where[at, place] = 2 * where[at, place] + (1 if at == top else 0)
     _times(matrices[0], stack[top], size[top], axis, stack[top + 1])
     _times(matrices[1], stack[top], size[top], axis, stack[top])
 

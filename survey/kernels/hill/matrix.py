@@ -1,8 +1,7 @@
 """2x2 step matrices as four scalars: a step made of two half steps, with its local error bounds."""
 
 from survey.kernels.jit import inline
-
-ROUNDING = 2.2e-16  # about two roundings; `rounding` takes it twice, for z four times
+from survey.kernels.math.roundoff import EPS
 
 
 @inline
@@ -20,14 +19,14 @@ def samples_only(samples, h, coefficients):
 
 @inline
 def rounding(size, h):
-    """Bounds D11, D12, D21 of the rounding of one step h; z itself is known to 4 ROUNDING times `size` >= |z|.
+    """Bounds D11, D12, D21 of the rounding of one step h; z itself is known to 4 EPS times `size` >= |z|.
 
     Where `size` is large on the step's scale, as it is beside larger values of z, that reaches y
     within the step.
     """
     excess = 0.125 * h * h * size - 0.5
-    within = 2.0 * ROUNDING * (1.0 + 4.0 * (excess + abs(excess)))
-    return within, within * h, 4.0 * ROUNDING * (h * size)
+    within = 2.0 * EPS * (1.0 + 4.0 * (excess + abs(excess)))
+    return within, within * h, 4.0 * EPS * (h * size)
 
 
 @inline

@@ -1,9 +1,9 @@
 """Planar motions of a satellite along one row of the map: w = dx/du and z = c0 + rho c1 + rho^2 at
 given u.
 
-A row is `rows[r]` = (k, k', half period, oblate, given, which): for rotations k > 1 and k' is the
-complement of 1/k; `given` is the parameter of this row that is known exactly, and `which` says
-which one it is. `scenes/satellite.md`: The equation: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2
+A row holds the columns MODULUS to WHICH: k, k', the half period, oblate, given, which. For rotations
+k > 1 and k' is the complement of 1/k; `given` is the parameter of this row that is known exactly,
+and `which` says which one it is. `scenes/satellite.md`: The equation: z = (rho + w)^2 + g with g = dn^2 (PL), -k^2
 sn^2 (OL), cn^2 (PR), -sn^2 (OR): no cancelling constant.
 """
 
@@ -16,6 +16,8 @@ from survey.kernels.math.sines import sin_cos
 
 # A relative gap of the means whose square is below the rounding of extended floats.
 CLOSE = 1e-10
+MODULUS, COMPLEMENT, HALF, OBLATE, GIVEN, WHICH = range(6)
+ROW = 6
 
 
 def complete_integrals(k, kc):
@@ -88,7 +90,8 @@ def sample(rows, nodes, out):
             if abs(nodes[i] + nodes[j] - 1.0) < abs(nodes[i] + nodes[partner[i]] - 1.0):
                 partner[i] = j
     for r in range(rows.shape[0]):
-        k, kc, span, oblate = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3] > 0.0
+        k, kc, span = rows[r, MODULUS], rows[r, COMPLEMENT], rows[r, HALF]
+        oblate = rows[r, OBLATE] > 0.0
         last = means(kc, pairs)
         librates = k <= 1.0
         scale = span / steps if librates else k * (span / steps)
@@ -119,8 +122,9 @@ def sample(rows, nodes, out):
 @inline
 def potential(u, rho, row, table):
     """z at any u in [0, half period] and what its rounding is relative to; `table` from `tabulate`."""
-    mirror = row[0] <= 1.0 and 2.0 * u > row[2]
-    w, g = motion(row[2] - u if mirror else u, row[0], row[3] > 0.0, table, int(table[0, MEANS]))
+    k, half = row[MODULUS], row[HALF]
+    mirror = k <= 1.0 and 2.0 * u > half
+    w, g = motion(half - u if mirror else u, k, row[OBLATE] > 0.0, table, int(table[0, MEANS]))
     shifted = rho - w if mirror else rho + w
     return shifted * shifted + g, (abs(rho) + abs(w)) * abs(shifted) + abs(g)
 
@@ -128,7 +132,7 @@ def potential(u, rho, row, table):
 @inline
 def tabulate(row, table):
     """What `potential` needs of a row, once: the means of 1 and k', and as the last entry their number."""
-    table[0, MEANS] = means(row[1], table)
+    table[0, MEANS] = means(row[COMPLEMENT], table)
 
 
 # In double-double the clock is the pendulum itself, x'' = -sin x cos x: sin x, cos x, w = x', and
@@ -138,35 +142,37 @@ CLOCK = 4
 # What a row is given by: k, 1 - k or asin k.
 K, ONE_MINUS_K, AMPLITUDE = 0.0, 1.0, 2.0
 # A row in double-double: k and sqrt(|1 - k^2|), each as two numbers, rotates, oblate.
+EXACT_K, EXACT_K_LOW, EXACT_SHORT, EXACT_SHORT_LOW, EXACT_ROTATES, EXACT_OBLATE = range(6)
 EXACTLY = 6
 
 
 @inline
 def exactly(row, exact):
     """Fill `exact` (EXACTLY) from what the row is given by."""
-    given, which = (row[4], 0.0), row[5]
+    given, which = (row[GIVEN], 0.0), row[WHICH]
     rotates = False
     if which == AMPLITUDE:
-        rest = dd.add(dd.two_sum(dd.HALF_PI[0], -row[4]), (dd.HALF_PI[1], dd.HALF_PI_REST))
-        k, _ = sin_cos(row[4])
+        rest = dd.add(dd.two_sum(dd.HALF_PI[0], -row[GIVEN]), (dd.HALF_PI[1], dd.HALF_PI_REST))
+        k, _ = sin_cos(row[GIVEN])
         sine, cosine = sin_cos(rest[0])
         complement = dd.shifted(sine, rest[1] * cosine[0])
     else:
-        other = dd.two_sum(1.0, -row[4])
+        other = dd.two_sum(1.0, -row[GIVEN])
         k, short = (given, other) if which == K else (other, given)
         rotates = short[0] < 0.0
         short = dd.neg(short) if rotates else short
         complement = dd.sqrt(dd.mul(short, dd.add((1.0, 0.0), k)))
-    exact[0], exact[1] = k
-    exact[2], exact[3] = complement
-    exact[4], exact[5] = 1.0 if rotates else 0.0, row[3]
+    exact[EXACT_K], exact[EXACT_K_LOW] = k
+    exact[EXACT_SHORT], exact[EXACT_SHORT_LOW] = complement
+    exact[EXACT_ROTATES], exact[EXACT_OBLATE] = 1.0 if rotates else 0.0, row[OBLATE]
 
 
 @inline
 def half_period(exact):
     """2 K(k), or K(1/k) / k for rotations, as a double-double."""
-    k, complement = (exact[0], exact[1]), (exact[2], exact[3])
-    if exact[4] > 0.0:
+    k = exact[EXACT_K], exact[EXACT_K_LOW]
+    complement = exact[EXACT_SHORT], exact[EXACT_SHORT_LOW]
+    if exact[EXACT_ROTATES] > 0.0:
         return dd.div(dd.HALF_PI, dd.mean(k, complement))
     return dd.div(dd.PI, dd.mean((1.0, 0.0), complement))
 
@@ -178,12 +184,12 @@ def slowest(exact, clock):
     """
     for n in range(CLOCK):
         clock[n, 0, 0], clock[n, 1, 0] = 0.0, 0.0
-    if exact[4] > 0.0:
+    if exact[EXACT_ROTATES] > 0.0:
         clock[SIN, 0, 0] = 1.0
-        clock[W, 0, 0], clock[W, 1, 0] = exact[2], exact[3]
+        clock[W, 0, 0], clock[W, 1, 0] = exact[EXACT_SHORT], exact[EXACT_SHORT_LOW]
     else:
-        clock[SIN, 0, 0], clock[SIN, 1, 0] = exact[0], exact[1]
-        clock[COS, 0, 0], clock[COS, 1, 0] = exact[2], exact[3]
+        clock[SIN, 0, 0], clock[SIN, 1, 0] = exact[EXACT_K], exact[EXACT_K_LOW]
+        clock[COS, 0, 0], clock[COS, 1, 0] = exact[EXACT_SHORT], exact[EXACT_SHORT_LOW]
 
 
 @inline
@@ -204,7 +210,7 @@ def coefficient(side, exact, rho, clock, z):
     """Series of z = (rho + w)^2 + g; w is odd about u = K for librations, even about K(1/k) / k for
     rotations.
     """
-    sign, oblate = 1.0 if exact[4] > 0.0 else side, exact[5] > 0.0
+    sign, oblate = 1.0 if exact[EXACT_ROTATES] > 0.0 else side, exact[EXACT_OBLATE] > 0.0
     twice = dd.scaled(rho, 2.0 * sign)
     for n in range(1, clock.shape[2]):
         shift = dd.mul((clock[W, 0, n], clock[W, 1, n]), twice)
@@ -215,7 +221,7 @@ def coefficient(side, exact, rho, clock, z):
     g = (clock[row, 0, 0], clock[row, 1, 0])
     g = dd.mul(g, g)
     z[0, 0], z[1, 0] = dd.add(dd.mul(shifted, shifted), dd.neg(g) if oblate else g)
-    return 2.0 * (abs(rho[0]) + exact[0]) * exact[0] + 2.0
+    return 2.0 * (abs(rho[0]) + exact[EXACT_K]) * exact[EXACT_K] + 2.0
 
 
 @inline
@@ -223,7 +229,7 @@ def missed(exact, clock):
     """Where w is largest sin x = 0, |cos x| = 1, |w| = k: how far off, sin x and w relative to
     their amplitudes.
     """
-    k = exact[0], exact[1]
+    k = exact[EXACT_K], exact[EXACT_K_LOW]
     sine = abs(clock[SIN, 0, 0]) / min(1.0, k[0])
     cosine, w = (clock[COS, 0, 0], clock[COS, 1, 0]), (clock[W, 0, 0], clock[W, 1, 0])
     cosine = dd.sub(dd.neg(cosine) if cosine[0] < 0.0 else cosine, (1.0, 0.0))

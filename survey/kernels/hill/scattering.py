@@ -18,6 +18,9 @@ from survey.kernels.math.roundoff import EPS
 ORDER = 24
 TAIL = 48  # terms of the series in exp(-u)
 REACH = 0.25  # of the singularities' distance, and of the wave's length, for a step
+# A passage: Re f f'* and its bar, |f f'| and its bar, at u = 0.
+PRODUCT, PRODUCT_BAR, SIZE, SIZE_BAR = range(4)
+PASSAGE = 4
 FAR = 8.0  # exp(u) where the tail's series starts, at rho = 0
 
 
@@ -83,7 +86,7 @@ def _jost(rho, rest, nu, finer, work, series):
 
 @kernel
 def jost(rho, rest, rate, oscillates, out):
-    """Fill `out` (n, 4): Re f f'* and its bar, |f f'| and its bar at u = 0, for each rho; rate = |nu| > 0."""
+    """Fill `out` (n, PASSAGE) for each rho; rate = |nu| > 0."""
     work, series = np.zeros((3, ORDER + 1)), np.zeros(ORDER + 1, np.complex128)
     for i in range(len(rho)):
         nu = complex(0.0, -rate[i]) if oscillates[i] else complex(rate[i], 0.0)
@@ -92,5 +95,6 @@ def jost(rho, rest, rate, oscillates, out):
         one, two = f * slope.conjugate(), g * other.conjugate()
         size = abs(one)
         rounding = 8.0 * EPS * (1.0 + abs(rho[i]) + count) * size
-        out[i, 0], out[i, 1] = two.real, 2.0 * abs(two.real - one.real) + rounding
-        out[i, 2], out[i, 3] = abs(two), 2.0 * abs(abs(two) - size) + rounding
+        out[i, PRODUCT] = two.real
+        out[i, PRODUCT_BAR] = 2.0 * abs(two.real - one.real) + rounding
+        out[i, SIZE], out[i, SIZE_BAR] = abs(two), 2.0 * abs(abs(two) - size) + rounding

@@ -18,10 +18,16 @@ from survey.kernels.libration.lie_plan import (
     DELTA,
     DIVIDE,
     ETA,
+    FACTOR,
     FINISH,
+    FIRST,
+    LAST,
     LINEAR,
     MULTIPLY,
     ONE,
+    OPERATION,
+    SOURCE,
+    TARGET,
     XI,
 )
 from survey.kernels.math import double
@@ -112,8 +118,9 @@ def start(mu, i, harmonics, big, divisors):
 @kernel
 def run(code, indices, numbers, divisors, big, norms, lane, count):
     for c in range(len(code)):
-        operation, first, last = code[c, 0], code[c, 4], code[c, 5]
-        target, source, factor = np.uint64(code[c, 1]), np.uint64(code[c, 2]), np.uint64(code[c, 3])
+        operation, first, last = code[c, OPERATION], code[c, FIRST], code[c, LAST]
+        target, source = np.uint64(code[c, TARGET]), np.uint64(code[c, SOURCE])
+        factor = np.uint64(code[c, FACTOR])
         if operation == MULTIPLY:
             for t in range(first, last):
                 _multiply(big[target + indices[0, t]], big[source + indices[1, t]], big[factor + indices[2, t]],

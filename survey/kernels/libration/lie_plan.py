@@ -21,6 +21,8 @@ import numpy as np
 from survey.kernels.libration.monomials import brackets, monomials, norm, products
 
 CLEAR, MULTIPLY, LINEAR, FINISH, DIVIDE, MEASURE = range(6)
+# A line of the code: the operation; rows of target, source and factor; first and last of the terms.
+OPERATION, TARGET, SOURCE, FACTOR, FIRST, LAST = range(6)
 # the rows set before the first operation, and the first other one
 XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10
 NONE = -1
@@ -30,8 +32,7 @@ SQRT_3 = Fraction(isqrt(3 * 10**80), 10**40)  # 40 digits
 class Plan(NamedTuple):
     """What the kernel runs: arrays."""
 
-    # (n, 6): operation; rows of target, source and factor; first and last of the terms
-    code: np.ndarray
+    code: np.ndarray  # lines (n, OPERATION to LAST)
     indices: np.ndarray  # (3, T) of the terms
     numbers: (
         np.ndarray
@@ -72,6 +73,7 @@ class Draft:
         return first, first + len(indices[0])
 
     def add(self, operation, target=0, source=0, factor=0, first=0, last=0):
+        """A line of the code, OPERATION to LAST."""
         self.code.append((operation, target, source, factor, first, last))
 
     def multiply(self, name, terms, rows, target, source, factor):

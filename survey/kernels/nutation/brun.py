@@ -133,7 +133,7 @@ def measure(row, start, c, u, theta, p_theta):
 
 @kernel
 def of_states(points, rows, kinds, count, heights, starts):
-    """The well of each initial state (A, C, epsilon, theta0, p_theta0, p_psi, p_phi).
+    """The well of each initial state (n, STATE).
 
     Fills rows (n, SIZE), kinds (n) (LOST outside the domain), the number of wells (-1 on a
     separatrix), heights (n, HEIGHT) and starts (n, START), with the columns of `records`.
@@ -165,8 +165,8 @@ def of_states(points, rows, kinds, count, heights, starts):
 
 @kernel
 def of_integrals(points, sign, rows, kinds, heights):
-    """As `of_states`, at (l, alpha, beta), where A = 1 and k = `sign`: both wells, rows (n, 2,
-    SIZE), kinds (n, 2).
+    """As `of_states`, at scaled integrals alone (n, INTEGRALS), where A = 1 and k = `sign`: both
+    wells, rows (n, 2, SIZE), kinds (n, 2).
     """
     k = (sign, 0.0)
     for i in range(len(points)):
@@ -182,11 +182,17 @@ def of_integrals(points, sign, rows, kinds, heights):
 
 @kernel
 def heights_of_states(points, heights):
-    """Fill `heights` (n, 3) as `of_states`, for points in columns (7, n)."""
+    """Fill `heights` (n, HEIGHT) as `of_states`, for points in columns (STATE, n)."""
     for i in range(len(heights)):
-        b, a = points[5, i], points[6, i]
+        b, a = points[rc.P_PSI, i], points[rc.P_PHI, i]
         k, level, at_plus, at_minus, u, _inside = of_state(
-            points[0, i], points[1, i], points[2, i], points[3, i], points[4, i], b, a
+            points[rc.SIZE_A, i],
+            points[rc.SIZE_C, i],
+            points[rc.EPSILON, i],
+            points[rc.THETA, i],
+            points[rc.P_THETA, i],
+            b,
+            a,
         )
         loose = looseness(a, b, abs(level[0]) + 2.0 * abs(k[0]) * u[0] * u[0])
         found = barrier(a, b, k, about_equator(a, b, level, k), loose, at_plus[0], at_minus[0])
@@ -199,12 +205,13 @@ def heights_of_states(points, heights):
 
 @kernel
 def saddles_of_states(points, u, bars):
-    """u of the saddle at the momenta of each state, in columns (7, n), and its bar; NaN where there
-    is none.
+    """u of the saddle at the momenta of each state, in columns (STATE, n), and its bar; NaN where
+    there is none.
     """
     for i in range(len(u)):
-        b, a = points[5, i], points[6, i]
-        k = points[2, i] * points[0, i] * (points[0, i] - points[1, i])
+        b, a = points[rc.P_PSI, i], points[rc.P_PHI, i]
+        size_a = points[rc.SIZE_A, i]
+        k = points[rc.EPSILON, i] * size_a * (size_a - points[rc.SIZE_C, i])
         u[i], rise, _doubtful = saddle(a, b, k)
         bars[i] = roughness(u[i], a, b, k) / rise if rise > 0.0 else np.nan
         u[i] = u[i] if rise > 0.0 else np.nan
@@ -212,9 +219,10 @@ def saddles_of_states(points, u, bars):
 
 @kernel
 def heights_of_integrals(points, heights):
-    """As `heights_of_states`, for the columns (l, sign, -, -, -, beta, alpha)."""
+    """As `heights_of_states`, for scaled integrals in the place of a state."""
     for i in range(len(heights)):
-        level, sign, b, a = points[0, i], points[1, i], points[5, i], points[6, i]
+        level, sign = points[rc.LEVEL, i], points[rc.SIGN, i]
+        b, a = points[rc.P_PSI, i], points[rc.P_PHI, i]
         pair, k, high, product = (
             (level, 0.0),
             (sign, 0.0),

@@ -1,8 +1,7 @@
 """As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, lastly
 in double-double.
 
-Points are columns of GIVEN numbers: A, C, epsilon, theta0, p_theta0, b, a; or l, the sign of k, -1
-for the lower of two wells and 1 for the upper one, C/A, nothing, b, a.
+Points are columns of GIVEN numbers: a state, or scaled integrals in its place (see `records`).
 """
 
 import numpy as np
@@ -36,27 +35,28 @@ def states(work):
     for i in range(TILE):
         b, a = work[B + i], work[A + i]
         k, level, at_plus, at_minus, u, inside = of_state(
-            work[i],
-            work[TILE + i],
-            work[2 * TILE + i],
-            work[3 * TILE + i],
-            work[4 * TILE + i],
+            work[nl.SIZE_A + i],
+            work[nl.SIZE_C + i],
+            work[nl.EPSILON + i],
+            work[nl.THETA + i],
+            work[nl.P_THETA + i],
             b,
             a,
         )
         polynomial(work, (k[0] if inside else np.nan, k[1]), level, at_plus, at_minus, i)
         work[nl.U + i] = u[0]
-        work[nl.HERE + i] = work[4 * TILE + i] ** 2 * (1.0 - u[0]) * (1.0 + u[0])
+        work[nl.HERE + i] = work[nl.P_THETA + i] ** 2 * (1.0 - u[0]) * (1.0 + u[0])
 
 
 @kernel
 def integrals(work):
     """The polynomials of scaled integrals."""
     for i in range(TILE):
-        level, sign, product = work[i], work[TILE + i], dd.two_prod(work[B + i], work[A + i])
+        level, sign = work[nl.GIVEN_LEVEL + i], work[nl.SIGN + i]
+        product = dd.two_prod(work[B + i], work[A + i])
         high = dd.two_sum(level, sign)
         polynomial(work, (sign, 0.0), (level, 0.0), dd.sub(high, product), dd.add(high, product), i)
-        work[nl.U + i] = 2.0 * work[2 * TILE + i]
+        work[nl.U + i] = 2.0 * work[nl.WELL + i]
 
 
 @inline
@@ -121,14 +121,14 @@ def solve(work, steps, within, exactly, actions):
 @kernel
 def answer_states(work, answers):
     for i in range(TILE):
-        a, c = work[i], work[TILE + i]
+        a, c = work[nl.SIZE_A + i], work[nl.SIZE_C + i]
         finish(work, a, work[A + i] * ((a - c) / (a * c)), i, answers)
 
 
 @kernel
 def answer_integrals(work, answers):
     for i in range(TILE):
-        ratio = work[3 * TILE + i]
+        ratio = work[nl.RATIO + i]
         finish(work, 1.0, work[A + i] * ((1.0 - ratio) / ratio), i, answers)
 
 

@@ -13,9 +13,10 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.kernels.math.chebyshev import nodes
 from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
+from survey.kernels.nutation import records as rc
 
 TILE = 64
-GIVEN = 7  # rows of what is given
+GIVEN = rc.STATE  # rows of what is given
 # The outputs of a nutation, and the rows of a tile that hold them, then their bars.
 NAMES = ("u_min", "u_max", "period", "precession", "spin", "action")
 U_MIN, U_MAX, PERIOD, PRECESSION, SPIN, ACTION = range(0, 6 * TILE, TILE)
@@ -30,8 +31,15 @@ NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
 SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
 NODES = 16
 COSINES = nodes(NODES)
-# where the rows of a tile begin: of what is given the last two, b and a
-B, A = 5 * TILE, 6 * TILE
+# where the rows of a tile begin: of what is given, a state or scaled integrals in its place; its
+# last two are b and a
+SIZE_A, SIZE_C, EPSILON, THETA, P_THETA, B, A = (
+    TILE * column
+    for column in (rc.SIZE_A, rc.SIZE_C, rc.EPSILON, rc.THETA, rc.P_THETA, rc.P_PSI, rc.P_PHI)
+)
+GIVEN_LEVEL, SIGN, WELL, RATIO = (
+    TILE * column for column in (rc.LEVEL, rc.SIGN, rc.WELL, rc.RATIO)
+)
 # pairs: k, L, L + k - a b, L + k + a b, b - a, b + a
 K, L, PLUS_POLE, MINUS_POLE, MINUS, PLUS = range(7 * TILE, 19 * TILE, 2 * TILE)
 # pairs: 1 - u and 1 + u of both turning points (first, roughly, of those beside their poles), ul +

@@ -5,6 +5,16 @@ Angles are in radians; a name with _BAR is the error bound of the value named be
 of a well are those of `wells` beside this file.
 """
 
+# An initial state, in the order of the scene's parameters: A, C, epsilon, theta0, p_theta0, p_psi
+# (b) and p_phi (a).
+SIZE_A, SIZE_C, EPSILON, THETA, P_THETA, P_PSI, P_PHI = range(7)
+STATE = 7
+# Scaled integrals in the place of a state, P_PSI and P_PHI as there: l, the sign of k, -1 for the
+# lower of two wells and 1 for the upper one, C/A.
+LEVEL, SIGN, WELL, RATIO = range(4)
+# Scaled integrals alone: l, alpha, beta.
+ENERGY, ALPHA, BETA = range(3)
+INTEGRALS = 3
 # A nutation: T / A, the precession, the spin less a (1/C - 1/A) T, the action.
 PERIOD, PRECESSION, SPIN, ACTION, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(8)
 PERIODS = 8

@@ -2,7 +2,7 @@
 axis holds.
 
 The reduced flow on the set is one on the cylinder, so a method of the family "body" offers what one
-of "cylinder" does, and the motions of the whole body besides. G (rows, 14, 3) holds the systems as
+of "cylinder" does, and the motions of the whole body besides. G (rows, ROWS, 3) holds the systems as
 in `kernels.cylinder.gyrostat`, in the body's own axes; the columns of `floats` are w, nu and their
 error bounds.
 """

@@ -7,11 +7,12 @@ kept. Motions into the past are those of the reversed body: (B, lambda, w, t) ->
 import numpy as np
 
 from survey.kernels.body.motion import FLOATS, STATE
+from survey.kernels.cylinder.gyrostat import LAMBDA, ROWS, B
 from survey.kernels.cylinder.steps import OK
 from survey.measures.cylinder.solution import STEPS, attempts
 
-_REVERSED = np.ones((14, 1))
-_REVERSED[6:9] = _REVERSED[12] = -1.0
+_REVERSED = np.ones((ROWS, 1))
+_REVERSED[B : B + 3] = _REVERSED[LAMBDA] = -1.0
 
 
 def trajectories(method, G, starts, times, rtol):

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.measures.body.system import ROUNDING
 
 MOST = 6
@@ -133,5 +134,5 @@ def _polished(system, nu):
         step = -tangent @ (inverse @ (tangent.T @ force))
         nu = nu + step
         nu = nu / math.sqrt(nu @ nu)
-        bar = 4.0 * np.linalg.norm(inverse, 2) * 2.0**-53 * 12.0 * size + 4.0 * 2.0**-53
+        bar = 4.0 * np.linalg.norm(inverse, 2) * ROUNDOFF * 12.0 * size + 4.0 * ROUNDOFF
     return nu, bar + 2.0 * float(np.abs(step).max())

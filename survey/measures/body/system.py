@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from survey.kernels.math.roundoff import ROUNDOFF
+
 # 72 roundings: what turning a body into another frame may leave of a number that is 0
 ROUNDING = 8e-15
 OFF, VERTICAL, CASE_A, CASE_B = range(4)
@@ -55,7 +57,7 @@ class System:
 
     @property
     def table(self):
-        """As `kernels.cylinder.gyrostat` takes it, (14, 3)."""
+        """As `kernels.cylinder.gyrostat` takes it, (ROWS, 3)."""
         return np.vstack([self.A, np.linalg.inv(self.A), self.B, self.C, self.moment, self.s])
 
     def torque(self):
@@ -151,7 +153,7 @@ class Placed:
             for bars, size in ((self.six_bars[:2], b), (self.six_bars[2:], c))
             if size > 0.0
         ]
-        return 1.0 + max(shares, default=0.0) / (4.0 * 2.0**-53)
+        return 1.0 + max(shares, default=0.0) / (4.0 * ROUNDOFF)
 
 
 def place(system):
@@ -236,7 +238,7 @@ def _placed(system, axis):
     six = np.array([b.B[0, 1], b.B[2, 0], (b.C[1, 1] - b.C[2, 2]) * sin, b.C[1, 2] * sin,
                     b.s[1] - b.C[0, 1] * cos, b.s[2] - b.C[2, 0] * cos]) * sin / a  # fmt: skip
     turned = np.count_nonzero(Q) > 3  # else nothing but the division by A11 is rounded
-    rounding = ROUNDING if turned else 4.0 * 2.0**-53
+    rounding = ROUNDING if turned else 4.0 * ROUNDOFF
     scales = (
         np.array(
             [

@@ -19,11 +19,11 @@ import numpy as np
 
 from survey.kernels.body import transversal as kernel
 from survey.kernels.cylinder.flow import coefficients
+from survey.kernels.math.roundoff import EPS
 from survey.measures.body.system import CASE_A, CASE_B, ROUNDING, VERTICAL
 
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1
 MOST = 4  # exponents beside a limit: 2 in case B, 3 in case A, 4 about the vertical
-EPS = 2.0**-52
 
 
 @dataclass(frozen=True)

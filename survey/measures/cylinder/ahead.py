@@ -7,9 +7,12 @@ or one of the two of Abel's equation.
 
 import numpy as np
 
+from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.equilibria import EQUILIBRIUM_SIZE
 from survey.kernels.cylinder.flow import coefficients
 from survey.kernels.cylinder.program import COLUMNS
+from survey.kernels.cylinder.returns import CYCLE_SIZE
 from survey.methods import taylor
 
 
@@ -17,7 +20,7 @@ def compile_ahead(variables, options):
     """For the gyrostat's questions but those on separatrices."""
     if options.get("question") == "abel" and "separatrix" not in options:
         taylor.flow_abels_ahead()
-    _compile(coefficients(*np.zeros(6)), options)
+    _compile(coefficients(*np.zeros(rc.SIX)), options)
 
 
 def of_functions(variables, options):
@@ -26,10 +29,11 @@ def of_functions(variables, options):
 
 
 def _compile(p, options):
-    question, none = options.get("question"), np.empty((0, 2))
+    question, none = options.get("question"), np.empty((0, rc.EXACT_START))
     if question in ("fate", "portrait") and "separatrix" not in options:
-        tables, sizes = [np.empty((0, 10)) for _ in range(4)], np.zeros(6, np.int64)
-        fates = np.empty((0, 4)), 0.0, 0, np.empty((0, rc.FATE))
+        tables = np.empty((0, EQUILIBRIUM_SIZE)), *[np.empty((0, CYCLE_SIZE)) for _ in range(3)]
+        sizes = np.zeros(kf.SIZES, np.int64)
+        fates = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
         taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *fates)
     if question == "portrait":
         floats, status = np.empty((0, 2, rc.STATE)), np.empty((0, 2), np.int64)

@@ -76,7 +76,7 @@ class Basins:
             1.0, self.p[BOUND_F] + math.sqrt(self.p[BOUND_DG])
         ):
             return None
-        out, known = self.of(np.ascontiguousarray(state[None, :2]))
+        out, known = self.of(np.ascontiguousarray(state[None, : rc.EXACT_START]))
         return out[0] if known[0] else None
 
 
@@ -285,7 +285,7 @@ def _curves(method, s, edges, falls, scale, top, most):
         return out[:count].copy() if whole else None
 
     for kind in (eq.SADDLE, eq.NODE):
-        starts = np.zeros((2, 4))
+        starts = np.zeros((2, rc.START))
         for row in eqs:
             if row[eq.KIND] != kind or (kind == eq.NODE and row[eq.F] <= 0.0):
                 continue

@@ -20,6 +20,7 @@ from functools import partial
 import numpy as np
 
 from survey.kernels.cylinder import equilibria as eq
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.flow import BOUND_G, coefficients
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.math.roundoff import ROUNDOFF
@@ -135,7 +136,7 @@ def counted(plane, kind, xy, error, known):
             row = plane.flows(x[i][None] + sign * ASIDE * across)[0]
             if not np.isfinite(row).all():
                 continue
-            s = remembered(taylor, row if len(row) > COLUMNS else row[:6])
+            s = remembered(taylor, row if len(row) > COLUMNS else row[: rc.SIX])
             if s.stratum == G and s.conclusive and not s.folded and not s.unknown:
                 side[i] = len(s.plus) + len(s.minus) + len(s.librations)
     names = ("cycles_left", "cycles_right")
@@ -373,7 +374,7 @@ def _hopf_of_both(plane, name, side):
 
 def _hopfs_at_rest(plane):
     """Both axes in f: at each equilibrium a straight line through b = 0."""
-    table = np.zeros((eq.MOST, 10))
+    table = np.zeros((eq.MOST, eq.EQUILIBRIUM_SIZE))
     p = np.ascontiguousarray(
         coefficients(*(_rest(plane)[name] for name in ("b12", "b31", *FORCES)))
     )

@@ -8,6 +8,7 @@ where the ends change, by 1 or not at all (see `segments`).
 
 import numpy as np
 
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.program import COLUMNS
 from survey.measures import contours
 from survey.measures.cylinder.fate import KINDS, LIBRATIONS, MINUS, PLUS, G, remembered
@@ -86,7 +87,7 @@ def lost_on_border(plane, rows, ticks, counts):
 def _count(row):
     """The numbers of the cycles of each kind of one flow, or UNKNOWN."""
     if np.isfinite(row).all():
-        s = remembered(taylor, row if len(row) > COLUMNS else row[:6])
+        s = remembered(taylor, row if len(row) > COLUMNS else row[: rc.SIX])
         on_curve = len(row) == COLUMNS and s.K == 0.0
         if s.stratum == G and not (s.folded or s.unknown or on_curve) and s.conclusive:
             return [len(s.cycles(kind).table) for kind in KINDS]

@@ -56,7 +56,7 @@ class Maps:
         The section of rotations is phi = 0.
         """
         p, eqs = self.flows[kind]
-        node = np.zeros(7)
+        node = np.zeros(rt.NODE_SIZE)
         if not self.good:
             return 0, *np.full(4, np.nan)
         if kind == LIBRATION:

@@ -15,6 +15,7 @@ from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
+from survey.kernels.cylinder.flow import OF_F
 from survey.kernels.cylinder.program import COLUMNS
 from survey.measures.cylinder.fate import I1, LIBRATIONS, MINUS, PLUS, Cycles, followed, outline
 from survey.measures.cylinder.separatrices import TWO_PI, Level, far_end
@@ -59,7 +60,7 @@ def table(method, s, rtol):
                 )
         return end, limit
     for first, flow in ((0, s), (2, backward(s))):
-        starts = np.zeros((2 * len(saddles), 4))
+        starts = np.zeros((2 * len(saddles), rc.START))
         branches.unstable(flow.p, flow.equilibria, len(flow.equilibria), starts)
         for i, found in enumerate(followed(method, flow, starts, rtol)):
             at = saddles[i // 2], first + i % 2
@@ -72,8 +73,8 @@ def table(method, s, rtol):
 def backward(s):
     """The Skeleton of the flow that S1 makes of that of s."""
     flipped = s.p.copy()
-    flipped[:2] *= -1.0
-    turned = outline(flipped if len(s.p) > COLUMNS else flipped[:6])
+    flipped[OF_F] *= -1.0
+    turned = outline(flipped if len(s.p) > COLUMNS else flipped[: rc.SIX])
     swapped = {PLUS: MINUS, MINUS: PLUS, LIBRATIONS: LIBRATIONS}
     return replace(
         turned, search=lambda _turned, kind, _above=0.0: _inverted(s.cycles(swapped[kind]))

@@ -18,7 +18,7 @@ from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder import taylor_double
-from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, coefficients
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, OF_F, OF_G, coefficients
 from survey.kernels.cylinder.flow_double import energy as energy_beside
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
@@ -29,7 +29,7 @@ from survey.measures.cylinder.solution import tolerances, trajectories
 NO_TURNS = kf.NO_TURNS
 I0, I1, I2, G = 0, 1, 2, 3  # strata
 KINDS = PLUS, MINUS, LIBRATIONS = kf.NEEDS_PLUS, kf.NEEDS_MINUS, kf.NEEDS_LIBRATIONS  # of cycles
-_NONE = np.zeros((0, 10))
+_NONE = np.zeros((0, rt.CYCLE_SIZE))
 # starts of one system that are followed before its cycles are searched, which most may do without
 FEW = 8
 EXACT = 7e-16  # three ulp: K and L are 0 within the rounding of decimal parameters
@@ -83,7 +83,7 @@ def write(s, out, starts, result, where):
         limits(s, out[first], result, where[first])
         for name in LIMITS:
             result[name][where[alike]] = result[name][where[first]]
-    wind(s, out, starts[:, 0], result, where)
+    wind(s, out, starts[:, rc.START_PHI], result, where)
 
 
 def _alike(out):
@@ -118,7 +118,7 @@ def followed(method, s, starts, rtol, told=None):
         if open_.any():
             out[open_] = fates(method, s, starts[open_], tolerance, MORE)
     if (
-        s.stratum not in (I0, I1) and starts.shape[1] == 2 and len(s.p) == COLUMNS
+        s.stratum not in (I0, I1) and starts.shape[1] == rc.EXACT_START and len(s.p) == COLUMNS
     ):  # no better than the bars of a start can its fate be
         for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
             _handed_over(method, s, starts[i], first, out[i], told)
@@ -129,8 +129,8 @@ def _handed_over(method, s, start, tolerance, out, told=None):
     """Follow one start in double-double past what float64 cannot decide, until its fate from there
     on is decided.
     """
-    times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[1]))
-    row, done = np.concatenate([s.p[:6], start])[None], 0
+    times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[rc.START_W]))
+    row, done = np.concatenate([s.p[: rc.SIX], start])[None], 0
     ways = ([told] if told else []) + [lambda state: fates(method, s, state[None], tolerance)[0]]
     for later_of in ways:  # what is told costs nothing, so it is asked at all times first
         for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
@@ -317,11 +317,11 @@ def _searched(method, s, kind, above=0.0):
 
 def flow_of(six):
     """The row p of the kernels for six parameters, or for a program, which is that row."""
-    return np.ascontiguousarray(six if len(six) > COLUMNS else coefficients(*six[:6]))
+    return np.ascontiguousarray(six if len(six) > COLUMNS else coefficients(*six[: rc.SIX]))
 
 
 def signed(six, signs):
-    return np.concatenate([np.asarray(six[:6]) * signs, six[6:]])
+    return np.concatenate([np.asarray(six[: rc.SIX]) * signs, six[rc.SIX :]])
 
 
 def _outline_of_program(p):
@@ -332,7 +332,7 @@ def _outline_of_program(p):
     p[MEAN] = known.mean_f
     f_is_0, g_is_0 = p[BOUND_F] == 0.0, p[BOUND_G] == 0.0
     stratum = I0 if g_is_0 else I1 if f_is_0 else G if known.attract.all() else I2
-    table = np.zeros((MOST_OF_PROGRAM, 10))
+    table = np.zeros((MOST_OF_PROGRAM, eq.EQUILIBRIUM_SIZE))
     count = eq.bisected(p, table) if not g_is_0 else 0
     eqs = table[: max(count, 0)]
     saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE]
@@ -345,13 +345,13 @@ def outline(six):
     """The skeleton without cycles."""
     if len(six) > COLUMNS:
         return _outline_of_program(np.array(six, dtype=float))
-    six = [float(value) for value in six[:6]]
+    six = [float(value) for value in six[: rc.SIX]]
     p = np.ascontiguousarray(coefficients(*six))
     K, L = constants(*six)
     stratum = stratum_of(*six)
     sign = np.sign(K) if K != 0.0 else np.sign(L)
     ends = np.array([sign, sign if K != 0.0 else -sign])
-    table = np.zeros((eq.MOST, 10))
+    table = np.zeros((eq.MOST, eq.EQUILIBRIUM_SIZE))
     count, folded = eq.equilibria(p, table) if stratum != I0 else (0, False)
     eqs = table[:count]
     return Skeleton(p, stratum, K, L, ends, _section(p, eqs), eqs, folded)
@@ -362,7 +362,7 @@ def _section(p, eqs):
     saddles = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE] if len(eqs) else ()
     if not len(saddles):
         return 0.0
-    d, c23, s2, s3 = p[2:6]
+    d, c23, s2, s3 = p[OF_G]
     s, c = np.sin(saddles), np.cos(saddles)
     highest = saddles[np.argmax(0.5 * d * s * s + c23 * s * c - s2 * s - s3 * c)]
     return float(highest - 2.0 * math.pi if highest > math.pi else highest)
@@ -378,12 +378,14 @@ def mirrored_equilibria(eqs):
 def _rotations(method, p, eqs, section, end, K, L, above):
     """The Cycles with w > `above` of the flow p, ascending in w; conclusive only where these are all."""
     scale = p[BOUND_F] + math.sqrt(p[BOUND_DG])
-    table, edges, fine = np.zeros((rt.MOST_CYCLES, 10)), np.zeros(7), max(FINE, method.FLOW_FINEST)
+    table, edges = np.zeros((rt.MOST_CYCLES, rt.CYCLE_SIZE)), np.zeros(rt.EDGES)
+    fine = max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(LEAST, 30.0, 80)
     xs = xs[min(max(np.searchsorted(xs, above) - 1, 0), len(xs) - 2) :]
     found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
-    border, start, unknown = edges[:2].copy(), edges[4], edges[6]
-    top, change, error, last = xs[-1], edges[2], edges[3], 0.0
+    border, image = edges[rt.BORDER], edges[rt.IMAGE]
+    start, unknown = edges[rt.FIRST_CHANGE], edges[rt.UNANSWERED]
+    top, change, error, last = xs[-1], edges[rt.LAST_CHANGE], edges[rt.LAST_ERROR], 0.0
     while (
         change * end < 0.0
         and abs(change) > 4.0 * error
@@ -396,10 +398,10 @@ def _rotations(method, p, eqs, section, end, K, L, above):
         found = method.flow_cycles(
             rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges
         )
-        unknown += edges[6]
+        unknown += edges[rt.UNANSWERED]
         if found > before and (found - before) % 2:
             break
-        top, change, error = xs[-1], edges[2], edges[3]
+        top, change, error = xs[-1], edges[rt.LAST_CHANGE], edges[rt.LAST_ERROR]
     cycles = table[:found]
     last = np.sign(change) if abs(change) > error else last  # the last certain sign of D
     last = cycles[-1, rt.ABOVE] if found else last
@@ -407,11 +409,11 @@ def _rotations(method, p, eqs, section, end, K, L, above):
         cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
     # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d
     # below it too
-    near = np.sign(border[1] - border[0]) if border[0] > 0.0 else np.sign(start)
-    sure = border[0] > 0.0 or start > LEAST * scale
+    near = np.sign(image - border) if border > 0.0 else np.sign(start)
+    sure = border > 0.0 or start > LEAST * scale
     sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
     fit = unknown == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1]
-    return Cycles(cycles, tuple(border), bool(fit))
+    return Cycles(cycles, (border, image), bool(fit))
 
 
 def _far_cycle(p, section, K, L, scale):
@@ -421,7 +423,7 @@ def _far_cycle(p, section, K, L, scale):
     The expansion leaves a shift of the size of the velocities of the system, which the error bound
     covers.
     """
-    b12, b31 = p[0], p[1]
+    b12, b31 = p[OF_F]
     w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
     w = max(w, 30.0 * scale)
     slope = math.pi * K / w**3
@@ -445,8 +447,8 @@ def _far_cycle(p, section, K, L, scale):
 def _librations(method, p, eqs, folded):
     """The Cycles of librations, by their right turning point, of every interval where g < 0."""
     table, edges, fine, found = (
-        np.zeros((rt.MOST_CYCLES, 10)),
-        np.zeros(7),
+        np.zeros((rt.MOST_CYCLES, rt.CYCLE_SIZE)),
+        np.zeros(rt.EDGES),
         max(FINE, method.FLOW_FINEST),
         0,
     )
@@ -462,10 +464,10 @@ def _librations(method, p, eqs, folded):
             )
             against = (
                 row[eq.KIND] == eq.FOCUS
-                and edges[4] * row[eq.STABLE] < 0.0
-                and abs(edges[4]) > edges[5]
+                and edges[rt.FIRST_CHANGE] * row[eq.STABLE] < 0.0
+                and abs(edges[rt.FIRST_CHANGE]) > edges[rt.FIRST_ERROR]
             )
-            sure = sure and not against and edges[6] == 0.0
+            sure = sure and not against and edges[rt.UNANSWERED] == 0.0
     return Cycles(table[:found], conclusive=bool(sure and found < len(table) - 2))
 
 
@@ -513,7 +515,7 @@ def _needs(out):
 def _by_tables(method, s, tolerance, more, known, starts):
     """`fates` by the equilibria and the tables of the `known` kinds of cycles alone."""
     out = np.zeros((len(starts), rc.FATE))
-    section = s.section if s.stratum == G else math.atan2(s.p[0], s.p[1])
+    section = s.section if s.stratum == G else math.atan2(*s.p[OF_F])
     tables = [
         np.ascontiguousarray(table)
         for table in (s.equilibria, *(known.get(kind, _NONE) for kind in KINDS))
@@ -538,7 +540,7 @@ def _free(s, starts):
 
     There is no table of limits: LIMIT_PHI is the unwrapped angle that is reached.
     """
-    b12, b31 = s.p[:2]
+    b12, b31 = s.p[OF_F]
     b, axis = math.hypot(b12, b31), math.atan2(b12, b31)
     out = np.zeros((len(starts), rc.FREE_FATE))
     for row, (phi, w) in zip(out, starts, strict=True):
@@ -582,7 +584,7 @@ def _conservative(s, starts):
     """b = 0: H = w^2/2 + V is conserved; rotation above the highest V, libration below, but for
     separatrices.
     """
-    _b12, _b31, d, c23, s2, s3 = s.p[:6]
+    d, c23, s2, s3 = s.p[OF_G]
 
     def potential(phi):
         sin, cos = np.sin(phi), np.cos(phi)

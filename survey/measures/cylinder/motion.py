@@ -33,12 +33,14 @@ def solve(trajectories, outputs, system, point, time=None, panels=ON_CYLINDER, f
     time = 40.0 if time is None else float(time)
     own = point.get("phi0", 0.0), point.get("w0", 1.0)
     starts = np.array([own, *[(phi, w) for phi in AROUND for w in (-1.5, -0.5, 0.0, 0.5, 1.5)]])
-    starts[1:, 1] *= max(1.0, abs(own[1]))
+    starts[1:, rc.START_W] *= max(1.0, abs(own[1]))
     t = np.linspace(0.0, time, POINTS)
 
     def followed(states, t):
         asked = {name: np.full((1, 1), point[name]) for name in system}
-        return trajectories(asked | {"phi0": states[:, :1], "w0": states[:, 1:2], "t": t})
+        return trajectories(
+            asked | {"phi0": states[:, [rc.START_PHI]], "w0": states[:, [rc.START_W]], "t": t}
+        )
 
     out = followed(starts, t[None])
     named = {
@@ -92,7 +94,7 @@ def _branches(s, time):
     its saddle.
     """
     for kind, flow, sign in ((0, s, 1.0), (1, backward(s), -1.0)):
-        starts = np.zeros((2 * len(s.equilibria), 4))
+        starts = np.zeros((2 * len(s.equilibria), rc.START))
         size = branches.unstable(flow.p, flow.equilibria, len(flow.equilibria), starts)
         states = starts[:size, [rc.START_PHI, rc.START_W]] * [1.0, sign]
         yield states, sign * np.linspace(0.0, time, ALONG)[None], kind

@@ -118,7 +118,7 @@ def _rests(plane, position):
     row = plane.flow(position)
     if row is None:
         return []
-    table = np.zeros((MOST_OF_PROGRAM, 10))
+    table = np.zeros((MOST_OF_PROGRAM, eq.EQUILIBRIUM_SIZE))
     rows = table[: max(eq.bisected(row, table), 0)]
     return [("hopf", None, one[eq.ANGLE], one[eq.F]) for one in rows if one[eq.DG] < 0.0]
 

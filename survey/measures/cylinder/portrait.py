@@ -14,7 +14,7 @@ import numpy as np
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
-from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F
+from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, OF_F
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import TURNING
 from survey.measures.cylinder import destinations, ends, solution
@@ -173,7 +173,7 @@ def _verdict(s, ends_of_branches):
 
 def _is_exact(p):
     """Is K = b12 s3 - b31 s2 zero, and not only within its rounding?"""
-    b12, b31, _d, _c23, s2, s3 = map(Fraction, p[:6])
+    b12, b31, _d, _c23, s2, s3 = map(Fraction, p[: rc.SIX])
     return b12 * s3 == b31 * s2
 
 
@@ -236,7 +236,7 @@ def _librations(method, cycles, rtol):
 
     def half(x, b):
         rows = solution.rows(six, x, np.zeros(len(x)))
-        rows[:, :2] *= b
+        rows[:, OF_F] *= b
         floats, status = solution.abel(
             method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol, by_row=True
         )

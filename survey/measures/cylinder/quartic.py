@@ -11,7 +11,8 @@ from fractions import Fraction
 
 import numpy as np
 
-ROUNDING = 2.3e-16
+from survey.kernels.math.roundoff import EPS
+
 BINOMIALS = np.array([1.0, 4.0, 6.0, 4.0, 1.0])
 
 
@@ -31,8 +32,8 @@ def coefficients(d, c23, s2, s3, n, n_bar):
     half = 0.5 * d
     a = np.column_stack([half + n - 2 * s3, s2 + c23, n / 3 - half, s2 - c23, half + n + 2 * s3])
     size = np.abs(d) + np.abs(n) + 2 * np.abs(s3)
-    outer, inner = n_bar + 2 * ROUNDING * size, ROUNDING * (np.abs(s2) + np.abs(c23))
-    return a, np.column_stack([outer, inner, n_bar / 3 + ROUNDING * size, inner, outer])
+    outer, inner = n_bar + 2 * EPS * size, EPS * (np.abs(s2) + np.abs(c23))
+    return a, np.column_stack([outer, inner, n_bar / 3 + EPS * size, inner, outer])
 
 
 def system(a):
@@ -57,7 +58,7 @@ def invariants(a, bars):
         + s0 * b4
         + 4 * (b1 * s3 + s1 * b3)
         + 6 * s2 * b2
-        + 4 * ROUNDING * (s0 * s4 + 4 * s1 * s3 + 3 * s2**2)
+        + 4 * EPS * (s0 * s4 + 4 * s1 * s3 + 3 * s2**2)
     )
     d3 = (
         (s2 * s4 + s3**2) * b0
@@ -65,10 +66,10 @@ def invariants(a, bars):
         + (s0 * s4 + 2 * s1 * s3 + 3 * s2**2) * b2
     )
     d3 = d3 + 2 * (s1 * s2 + s0 * s3) * b3 + (s0 * s2 + s1**2) * b4
-    d3 = d3 + 5 * ROUNDING * (s0 * s2 * s4 + 2 * s1 * s2 * s3 + s2**3 + s4 * s1**2 + s0 * s3**2)
+    d3 = d3 + 5 * EPS * (s0 * s2 * s4 + 2 * s1 * s2 * s3 + s2**3 + s4 * s1**2 + s0 * s3**2)
     G = g2**3 - 27 * g3**2
     wide = 3 * (np.abs(g2) + d2) ** 2 * d2 + 54 * (np.abs(g3) + d3) * d3
-    return (g2, d2), (g3, d3), (G, wide + 4 * ROUNDING * (np.abs(g2) ** 3 + 27 * g3**2))
+    return (g2, d2), (g3, d3), (G, wide + 4 * EPS * (np.abs(g2) ** 3 + 27 * g3**2))
 
 
 def roots(a, bars):
@@ -119,7 +120,7 @@ def _discs(rows, bars, zeros):
             )
         z = np.where(np.isfinite(move) & (np.abs(move) < 0.1 * (1 + np.abs(z))), z - move, z)
     gaps = z[:, :, None] - z[:, None] + one
-    blur = _value(np.abs(rows) * 4 * (degree + 1) * ROUNDING + bars, np.abs(z))
+    blur = _value(np.abs(rows) * 4 * (degree + 1) * EPS + bars, np.abs(z))
     with np.errstate(all="ignore"):
         radius = (
             degree * (np.abs(_value(rows, z)) + blur) / np.abs(rows[:, :1] * np.prod(gaps, axis=2))

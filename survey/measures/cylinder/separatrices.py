@@ -15,7 +15,7 @@ from survey.kernels.cylinder import lines
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder import returns as rt
 from survey.kernels.cylinder.branches import unstable
-from survey.kernels.cylinder.flow import BOUND_G
+from survey.kernels.cylinder.flow import BOUND_G, OF_F, OF_G
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.measures.cylinder.fate import I0, I1, G, flow_of, outline, remembered, signed
@@ -97,7 +97,7 @@ def _flipped(p):
 
 def _branches(window, s):
     """Both stable branches of every saddle."""
-    p, starts = _flipped(s.p), np.zeros((2 * max(len(s.equilibria), 1), 4))
+    p, starts = _flipped(s.p), np.zeros((2 * max(len(s.equilibria), 1), rc.START))
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
     if not len(saddles):
         return
@@ -118,7 +118,7 @@ def _branches(window, s):
             [[saddle[eq.ANGLE] - TWO_PI * (saddle[eq.ANGLE] > math.pi), 0.0, 0.0, 0.0, bar]]
         )
         off = start[rc.START_PHI] - saddle[eq.ANGLE]
-        shift = round((start[rc.START_PHI] - first[0, 0] - off) / TWO_PI)
+        shift = round((start[rc.START_PHI] - first[0, lines.ANGLE_AT] - off) / TWO_PI)
         first[0, lines.TURNS] = shift
         yield from _copied(window, np.vstack([first, points]), "stable_manifold", known)
 
@@ -207,7 +207,7 @@ def _equilibria(window, s):
 
 def _free(window, six):
     """g = 0: w = F + |b| and w = F - |b|."""
-    b12, b31 = six[:2]
+    b12, b31 = six[OF_F]
     b = math.hypot(b12, b31)
     for side in (1.0, -1.0) if b else ():
 
@@ -273,7 +273,7 @@ class Level:
 
     def depth(self, x):
         """Twice the integral of g: sin(x/2) times what vanishes at x = 0."""
-        d, c23, s2, s3 = self.p[2:6]
+        d, c23, s2, s3 = self.p[OF_G]
         middle, half = self.angle + 0.5 * x, 0.5 * x
         whole = 2.0 * np.cos(half) * (0.5 * d * np.sin(2.0 * middle) + c23 * np.cos(2.0 * middle))
         return -2.0 * np.sin(half) * (whole - 2.0 * s2 * np.cos(middle) + 2.0 * s3 * np.sin(middle))
@@ -284,7 +284,7 @@ class Level:
     def slope(self, x):
         """V' there."""
         phi = self.angle + np.asarray(x, float)
-        d, c23, s2, s3 = self.p[2:6]
+        d, c23, s2, s3 = self.p[OF_G]
         return (
             0.5 * d * np.sin(2.0 * phi)
             + c23 * np.cos(2.0 * phi)

@@ -1,7 +1,7 @@
 """Solutions on a separatrix: the stable and unstable branches of the saddles, as exactly as their
 parameters are given.
 
-A start is a row of eight numbers: the six parameters, phi0, and the number of the saddle, by its
+A start is a row of GIVEN numbers: the six parameters, phi0, and the NUMBER of the saddle, by its
 angle in [0, 2 pi). The branch is that of the saddle next to phi0: on its right side phi0 - 2 pi <
 phi_s < phi0, on its left phi0 < phi_s < phi0 + 2 pi, and phi0 lies between the saddle and the first
 turning point of the branch, if it turns. There t = 0.
@@ -17,6 +17,7 @@ import numpy as np
 
 from survey.kernels.cylinder import branch_double, separatrix
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import B12, B31, OF_F, OF_G
 from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, MULTIPLICITY, SLIP
 from survey.kernels.cylinder.steps import (
     EQUILIBRIUM,
@@ -26,6 +27,7 @@ from survey.kernels.cylinder.steps import (
     TURNING,
     UNDETERMINED,
 )
+from survey.kernels.math.roundoff import EPS
 from survey.measures.cylinder import quartic, solution
 from survey.methods import closed
 from survey.status import INVALID_PARAMETERS
@@ -33,7 +35,6 @@ from survey.status import INVALID_PARAMETERS
 HEADS = 4  # of a row: the angle of the saddle, w at phi0, and their bars
 SADDLE, SADDLE_BAR, START, START_BAR = range(HEADS)
 NO_FORM, DEGENERATE = 19, 21  # as in the STATUS of scenes/gyrostat.py
-_ULP = 2.3e-16
 
 
 def trajectories(method, rows, times, rtol, stable, left):
@@ -95,20 +96,21 @@ class Starts:
         turned = solution.reverse(rows) if stable else rows
         turned = solution.mirror(turned) if left else turned
         self.P, starts = solution.split(turned)
-        self.phi0, self.branches = starts[:, 0].copy(), [None] * len(rows)
+        self.phi0, self.branches = starts[:, rc.START_PHI].copy(), [None] * len(rows)
         for i in range(len(rows)):
             place = np.zeros(separatrix.SADDLE)
-            if not separatrix.saddle(plain[i], rows[i, 7], place):
+            if not separatrix.saddle(plain[i], rows[i, rc.NUMBER], place):
                 continue
             angle, many = place[ANGLE] % (2 * np.pi), place[MULTIPLICITY]
-            self.heads[i, :2] = angle, _ULP * (1.0 + angle) + place[SLIP]
+            self.heads[i, SADDLE] = angle
+            self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle) + place[SLIP]
             if left:
                 place[ANGLE], place[ANGLE_LOW] = -place[ANGLE], -place[ANGLE_LOW]
-            free = rows[i, 0] == 0.0 and rows[i, 1] == 0.0
+            free = not rows[i, OF_F].any()
             if many > separatrix.ONE and not (free and _multiple(rows[i], many)):
                 self.status[i] = DEGENERATE
             elif free:
-                self.heads[i, SADDLE_BAR] = _ULP * (1.0 + angle)
+                self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle)
                 self._elliptic(i, place, many > separatrix.ONE or symmetric(rows[i]))
             elif method is closed:
                 self.status[i] = NO_FORM
@@ -177,7 +179,7 @@ def _by_steps(starts, rows, solve):
     given[:, rc.W0] = np.where(good, starts.heads[:, START], 0.0)
     results, beside = solve(given), given.copy()
     beside[:, rc.W0] += np.where(
-        good, starts.heads[:, START_BAR] + _ULP * np.abs(given[:, rc.W0]), 0.0
+        good, starts.heads[:, START_BAR] + EPS * np.abs(given[:, rc.W0]), 0.0
     )
     others, bars = solve(beside), rc.STATE // 2
     floats = results[0]
@@ -195,11 +197,16 @@ def _by_steps(starts, rows, solve):
     return results
 
 
+def numbered(row, number):
+    """The row, alone, of the start on a branch of the saddle of that number."""
+    return np.array([[*row[: rc.NUMBER], number]])
+
+
 def symmetric(row):
     """Is V exactly even about the direction of s, or s = 0? Then saddles on both sides of it have
     the same energy.
     """
-    d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
+    d, c23, s2, s3 = (Fraction(float(x)) for x in row[OF_G])
     return d * s2 * s3 + c23 * (s3 * s3 - s2 * s2) == 0
 
 
@@ -207,7 +214,7 @@ def _multiple(row, many):
     """Has g exactly a root of this multiplicity? By the invariants of its quartic in tan(phi/2):
     I^3 = 27 J^2.
     """
-    d, c23, s2, s3 = (Fraction(float(x)) for x in row[2:6])
+    d, c23, s2, s3 = (Fraction(float(x)) for x in row[OF_G])
     a, b, c, e, f = -c23 - s2, (d - s3) / 2, c23, -(d + s3) / 2, s2 - c23
     first = a * f - 4 * b * e + 3 * c * c
     second = a * c * f + 2 * b * c * e - a * e * e - b * b * f - c * c * c
@@ -224,7 +231,7 @@ def branch_of(row):
     that of a saddle. None if that saddle is not found, or phi0 is not reached from it.
     """
     p, place = solution.split(np.array([row]))[0][0], np.zeros(separatrix.SADDLE)
-    d, c23, s2, s3, phi0, w0 = row[2:8]
+    (d, c23, s2, s3), phi0, w0 = row[OF_G], row[rc.PHI0], row[rc.W0]
     level = w0 * w0 - quartic.square_of_w(d, c23, s2, s3, phi0)[0]
     missed = []
     for number in range(1, 5):
@@ -238,7 +245,7 @@ def branch_of(row):
             left = (w0 < 0.0) != stable
             if (
                 off < 1e-9 * size
-                and Starts(closed, np.array([[*row[:7], number]]), stable, left).status[0] == OK
+                and Starts(closed, numbered(row, number), stable, left).status[0] == OK
             ):
                 return number, stable, left
     return None
@@ -250,7 +257,7 @@ def through(rows, columns, rtol, branches, measure=trajectories):
     """
     found = []
     for i, (number, stable, left) in enumerate(branches):
-        given = np.array([[*rows[i, :7], number]])
+        given = numbered(rows[i], number)
         found.append(measure(closed, given, columns[i : i + 1], rtol, stable, left)[:-1])
     return tuple(np.concatenate(parts) for parts in zip(*found, strict=True))
 
@@ -261,11 +268,11 @@ def exact_starts(rows):
     phi0 is 0 there: of any other angle of binary64 sine and cosine are transcendental, but the
     energies of saddles are algebraic.
     """
-    at = np.flatnonzero((rows[:, rc.PHI0] == 0.0) & (rows[:, 0] == 0.0))  # as a rule, none
+    at = np.flatnonzero((rows[:, rc.PHI0] == 0.0) & (rows[:, B12] == 0.0))  # as a rule, none
     some = rows[at, : rc.GIVEN]
     found = {}
-    for i in at[(some[:, 1] == 0.0) & (some[:, rc.W0] != 0.0) & np.isfinite(some).all(axis=1)]:
-        exact = [Fraction(float(x)) for x in (*rows[i, 2:6], rows[i, rc.W0])]
+    for i in at[(some[:, B31] == 0.0) & (some[:, rc.W0] != 0.0) & np.isfinite(some).all(axis=1)]:
+        exact = [Fraction(float(x)) for x in (*rows[i, OF_G], rows[i, rc.W0])]
         if quartic.is_degenerate(quartic.at_zero(*exact)):
             branch = branch_of(rows[i])
             found |= {int(i): branch} if branch else {}

@@ -13,6 +13,7 @@ import numpy as np
 from survey.kernels.cylinder import branches
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import fate as kf
+from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.steps import SEPARATRIX
 from survey.measures.cylinder import destinations, fate, separatrix
 from survey.measures.cylinder.separatrices import TWO_PI, Level, far_end
@@ -22,15 +23,15 @@ SADDLE = 1  # as in the verdicts of scenes/gyrostat.py
 
 
 def solve(method, rows, rtol, stable, left):
-    """({output: values (N)}, HEADS (N, 4)) for rows of six parameters, phi0 and the number of a saddle."""
+    """({output: values (N)}, HEADS (N, HEADS)) for rows that start on a branch (see `separatrix`)."""
     starts = separatrix.Starts(None, rows, stable, left)
     result = fate.empty(len(rows), OK)
     result["status"][:] = starts.status
     ends = {}
     for i in np.flatnonzero(starts.status == OK):
-        key = (*rows[i, :6].tolist(), starts.heads[i, separatrix.SADDLE])
+        key = (*rows[i, : rc.SIX].tolist(), starts.heads[i, separatrix.SADDLE])
         if not stable and key not in ends:
-            ends[key] = _end(method, rows[i, :6], key[-1], rtol, left)
+            ends[key] = _end(method, rows[i, : rc.SIX], key[-1], rtol, left)
         if stable:
             _at_saddle(
                 result,
@@ -40,7 +41,7 @@ def solve(method, rows, rtol, stable, left):
                 0,
             )
         else:
-            _written(result, i, rows[i, 6], *ends[key], left)
+            _written(result, i, rows[i, rc.PHI0], *ends[key], left)
     return result, starts.heads
 
 
@@ -63,7 +64,7 @@ def _end(method, six, angle, rtol, left):
     if s.stratum == fate.I1:
         reached = destinations.level_end(s, at, -1.0 if left else 1.0)
         return s, at, None, reached if reached >= 0 else None
-    starts = np.zeros((2 * len(saddles), 4))
+    starts = np.zeros((2 * len(saddles), rc.START))
     branches.unstable(s.p, s.equilibria, len(s.equilibria), starts)
     own = starts[2 * int(np.argmin(off)) + (0 if left else 1)]
     return s, at, fate.followed(method, s, own[None], rtol)[0], None

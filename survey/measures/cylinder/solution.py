@@ -38,7 +38,7 @@ def _signed(rows, signs):
 
 def rows(flows, phi0, w0):
     """Solutions from six parameters, or programs (N, n) of `equation.flows`, and their initial states (N)."""
-    return np.column_stack([flows[:, :6], phi0, w0, flows[:, 6:]])
+    return np.column_stack([flows[:, : rc.SIX], phi0, w0, flows[:, rc.SIX :]])
 
 
 def tolerances(method, rtol):
@@ -61,8 +61,8 @@ def split(rows):
     """Rows of GIVEN numbers (see `records`) as the kernels take them: coefficients and initial states."""
     own = rows.shape[1] > rc.GIVEN
     P, starts = (
-        np.empty((len(rows), rows.shape[1] - 2 if own else COLUMNS)),
-        np.empty((len(rows), 2)),
+        np.empty((len(rows), rows.shape[1] - (rc.GIVEN - rc.SIX) if own else COLUMNS)),
+        np.empty((len(rows), rc.EXACT_START)),
     )
     (spread_programs if own else spread)(np.ascontiguousarray(rows, dtype=float), P, starts)
     P.flags.writeable = own

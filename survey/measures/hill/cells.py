@@ -17,7 +17,20 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
-from survey.kernels.hill.cells import ENOUGH, UNSOLVED, descend
+from survey.kernels.hill.cells import (
+    AXIS,
+    BLOCK,
+    ENOUGH,
+    HALVED_X,
+    HALVED_Y,
+    PLACE_X,
+    PLACE_Y,
+    STABLE_PART,
+    UNSOLVED,
+    UNSTABLE_PART,
+    VERDICT,
+    descend,
+)
 from survey.kernels.math.chebyshev import lebesgue, nodes, tail, to_coefficients
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill.edges import FACTORS, has_factors
@@ -30,6 +43,9 @@ CHECK = 0.539  # near an extremum of T_16, and of no period with it
 START = 2  # halvings of the first blocks
 BATCH = 16  # blocks of one task
 MOST = 10_000_000  # cells
+# A cell between two of the smallest parts of each side; its VERDICT is where a leaf has it.
+LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)
+MERGED = VERDICT + 1
 
 X = nodes(NODES)
 POINTS = np.append(X, CHECK)
@@ -127,11 +143,11 @@ def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descen
         batches = [todo[first : first + BATCH] for first in range(0, len(todo), BATCH)]
         leaves = np.concatenate(each(task, batches, "parts of the cells"))
         points += len(todo) * POINTS.size**2
-        unsolved = leaves[:, 4] == UNSOLVED
-        todo = leaves[unsolved, :4].astype(np.int64)
+        unsolved = leaves[:, VERDICT] == UNSOLVED
+        todo = leaves[unsolved, :BLOCK].astype(np.int64)
         kept.append(leaves[~unsolved])
         if report:
-            report(1 - float((0.5 ** (todo[:, 0] + todo[:, 2])).sum()), points)
+            report(1 - float((0.5 ** (todo[:, HALVED_X] + todo[:, HALVED_Y])).sum()), points)
         if sum(map(len, kept)) > MOST:
             raise OverflowError(f"more than {MOST:,} cells")
     return _gathered(x, y, depth, np.concatenate(kept), points)
@@ -145,20 +161,24 @@ def accuracy(depth):
 
 
 def _first(depth):
-    """The first blocks (B, 4), as `descend` takes them."""
+    """The first blocks (B, BLOCK), as `descend` takes them."""
     level = np.minimum(depth, START)
     i, j = (
         grid.reshape(-1)
         for grid in np.meshgrid(*(np.arange(1 << at) for at in level), indexing="ij")
     )
-    return np.column_stack([np.full(i.size, level[0]), i, np.full(i.size, level[1]), j])
+    blocks = np.empty((i.size, BLOCK), np.int64)
+    blocks[:, HALVED_X], blocks[:, PLACE_X] = level[0], i
+    blocks[:, HALVED_Y], blocks[:, PLACE_Y] = level[1], j
+    return blocks
 
 
 def _series(solve, x, y, blocks, of):
     """The functions' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y,
     the rest (B, 4, 3).
     """
-    (middle_x, radius_x), (middle_y, radius_y) = _spans(x, blocks[:, :2]), _spans(y, blocks[:, 2:])
+    middle_x, radius_x = _spans(x, blocks[:, HALVED_X], blocks[:, PLACE_X])
+    middle_y, radius_y = _spans(y, blocks[:, HALVED_Y], blocks[:, PLACE_Y])
     out = solve(
         (middle_x[:, None] + radius_x[:, None] * POINTS)[:, :, None],
         (middle_y[:, None] + radius_y[:, None] * POINTS)[:, None, :],
@@ -184,48 +204,50 @@ def _series(solve, x, y, blocks, of):
     return series, np.stack([*tails, noise], axis=2)
 
 
-def _spans(side, blocks):
-    """Middle and half width of the blocks (B, 2: number of halvings, index) along one side."""
-    part = 0.5 ** blocks[:, 0]
-    low, high = side.at(blocks[:, 1] * part), side.at((blocks[:, 1] + 1) * part)
+def _spans(side, halved, place):
+    """Middle and half width of blocks, so often halved and at these places, along one side."""
+    part = 0.5**halved
+    low, high = side.at(place * part), side.at((place + 1) * part)
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def _gathered(x, y, depth, leaves, points):
     """The Cells: areas, and decided neighbours as one."""
-    cells = leaves[:, :5].astype(np.int64)
-    for at in (0, 2):
-        size = 1 << (depth[at // 2] - cells[:, at])
-        cells[:, at] = cells[:, at + 1] * size
-        cells[:, at + 1] = cells[:, at] + size
-    parts = cells[:, :4] / np.repeat(2.0**depth, 2)
-    stable, unstable = (x.length(*parts[:, :2].T) * y.length(*parts[:, 2:].T)) @ leaves[:, 5:]
+    blocks = leaves[:, :BLOCK].astype(np.int64)
+    cells = np.empty((len(leaves), MERGED), np.int64)
+    cells[:, VERDICT] = leaves[:, VERDICT]
+    for axis in (0, 1):
+        halved, place = blocks[:, AXIS * axis + HALVED_X], blocks[:, AXIS * axis + PLACE_X]
+        size = 1 << (depth[axis] - halved)
+        cells[:, AXIS * axis + LOW_X] = place * size
+        cells[:, AXIS * axis + HIGH_X] = (place + 1) * size
+    parts = cells[:, :VERDICT] / np.repeat(2.0**depth, 2)
+    area = x.length(parts[:, LOW_X], parts[:, HIGH_X]) * y.length(parts[:, LOW_Y], parts[:, HIGH_Y])
+    stable, unstable = area @ leaves[:, STABLE_PART : UNSTABLE_PART + 1]
     merged = _merged(cells)
-    parts = merged[:, :4] / np.repeat(2.0**depth, 2)
-    box = np.column_stack([axis.at(parts[:, at]) for axis, at in ((x, 0), (x, 1), (y, 2), (y, 3))])
+    parts = merged[:, :VERDICT] / np.repeat(2.0**depth, 2)
+    sides = ((x, LOW_X), (x, HIGH_X), (y, LOW_Y), (y, HIGH_Y))
+    box = np.column_stack([side.at(parts[:, at]) for side, at in sides])
     total = (x.high - x.low) * (y.high - y.low)
-    return Cells(box, merged[:, 4].astype(np.int8), float(stable), float(unstable), total, points)
+    return Cells(
+        box, merged[:, VERDICT].astype(np.int8), float(stable), float(unstable), total, points
+    )
 
 
 def _merged(cells):
-    """Decided cells (low, high, low, high, verdict) that share a whole side as one, sorted;
-    undecided ones stay.
-    """
+    """Decided cells (LOW_X to VERDICT) that share a whole side as one, sorted; undecided ones stay."""
     before = len(cells) + 1
     while len(cells) < before:
         before = len(cells)
-        for along, across in ((0, 2), (2, 0)):
-            cells = cells[
-                np.lexsort((cells[:, along], cells[:, across + 1], cells[:, across], cells[:, 4]))
-            ]
+        for low, high, *across in ((LOW_X, HIGH_X, LOW_Y, HIGH_Y), (LOW_Y, HIGH_Y, LOW_X, HIGH_X)):
+            shared = [VERDICT, *across]
+            cells = cells[np.lexsort(cells[:, [*shared, low]].T[::-1])]
             new = np.ones(len(cells), np.bool_)
-            same = (cells[1:, [across, across + 1, 4]] == cells[:-1, [across, across + 1, 4]]).all(
-                axis=1
-            )
+            same = (cells[1:, shared] == cells[:-1, shared]).all(axis=1)
             new[1:] = (
-                ~same | (cells[1:, along] != cells[:-1, along + 1]) | (cells[1:, 4] == UNDECIDED)
+                ~same | (cells[1:, low] != cells[:-1, high]) | (cells[1:, VERDICT] == UNDECIDED)
             )
-            ends = cells[np.append(np.flatnonzero(new)[1:], len(cells)) - 1, along + 1]
+            ends = cells[np.append(np.flatnonzero(new)[1:], len(cells)) - 1, high]
             cells = cells[new]
-            cells[:, along + 1] = ends
-    return cells[np.lexsort((cells[:, 2], cells[:, 0]))]
+            cells[:, high] = ends
+    return cells[np.lexsort((cells[:, LOW_Y], cells[:, LOW_X]))]

@@ -56,9 +56,9 @@ def solve(rho, rotates, oblate, wanted):
     m = (places - 1.0) * (places + 1.0) if oblate else places * places
     passages = []
     for side in (1.0, -1.0):
-        out = np.empty((places.size, 4))
+        out = np.empty((places.size, scattering.PASSAGE))
         scattering.jost(side * places, m, np.sqrt(np.abs(m)), m > 0, out)
-        there = np.full((4, *rho.shape), np.nan)
+        there = np.full((scattering.PASSAGE, *rho.shape), np.nan)
         there[:, known] = out[where].T
         passages.append(there)
     rate = np.sqrt(np.abs(square))
@@ -72,9 +72,8 @@ def solve(rho, rotates, oblate, wanted):
 def _decaying(passages, rate, those):
     """Wronskian of f(u) and f(-u) over 2 nu: -f f'/nu."""
     found = {}
-    for name, (product, bar, _, _) in zip(
-        ("amplification", "amplification_back"), passages, strict=True
-    ):
+    for name, passage in zip(("amplification", "amplification_back"), passages, strict=True):
+        product, bar = passage[scattering.PRODUCT], passage[scattering.PRODUCT_BAR]
         value = -product / rate
         found[f"separatrix_{name}"] = _kept(those, value, bar / rate + 4.0 * EPS * np.abs(value))
     return found
@@ -83,7 +82,8 @@ def _decaying(passages, rate, those):
 def _passing(passages, rate, those, rotates):
     """From the rapidities a of both passages: t = 1/cosh a."""
     rapidities = []
-    for product, bar, _, _ in passages:
+    for passage in passages:
+        product, bar = passage[scattering.PRODUCT], passage[scattering.PRODUCT_BAR]
         sinh = np.abs(product) / rate
         rapidities.append(
             (np.arcsinh(sinh), (bar / rate + 4.0 * EPS * sinh) / np.hypot(1.0, sinh) + 4.0 * EPS)

@@ -19,16 +19,18 @@ import numpy as np
 
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation.wells import HIGH, LOW, PASSAGE
 from survey.measures import contours
 from survey.measures.nutation import wells
 
+# the parameters of a state, in the order of its columns in `records`
 STATE = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
 LINES = 513
 
 
 def traced(square, axes, fixed):
-    """[(function, positions (m, 2) in the square, errors (m), columns (7, m) of states)] of every
+    """[(function, positions (m, 2) in the square, errors (m), columns (STATE, m) of states)] of every
     curve on the map.
 
     The function is one of those below.
@@ -51,7 +53,7 @@ def traced(square, axes, fixed):
 
 
 def states(square, axes, fixed, x):
-    """Columns (7, m) of the initial states at positions x (m, 2)."""
+    """Columns (STATE, m) of the initial states at positions x (m, 2)."""
     here = dict(zip(axes, square.parameters(x).T, strict=True))
     return np.stack(
         [np.broadcast_to(here.get(name, fixed.get(name)), len(x)).astype(float) for name in STATE]
@@ -88,12 +90,14 @@ def precession(columns):
 
 def upper_pole(columns):
     """p_psi - p_phi."""
-    return columns[5] - columns[6], ROUNDOFF * abs(columns[5] - columns[6])
+    value = columns[rc.P_PSI] - columns[rc.P_PHI]
+    return value, ROUNDOFF * abs(value)
 
 
 def lower_pole(columns):
     """p_psi + p_phi."""
-    return columns[5] + columns[6], ROUNDOFF * abs(columns[5] + columns[6])
+    value = columns[rc.P_PSI] + columns[rc.P_PHI]
+    return value, ROUNDOFF * abs(value)
 
 
 def _reaching(function, x, error, columns):
@@ -102,7 +106,7 @@ def _reaching(function, x, error, columns):
     if function in (upper_pole, lower_pole):
         side = 1.0 if function is upper_pole else -1.0
         columns = columns.copy()
-        columns[5] = side * columns[6]
+        columns[rc.P_PSI] = side * columns[rc.P_PHI]
         rows, kinds, *_ = wells.of_states(columns.T)
         reached = rows[:, HIGH] if side > 0.0 else -rows[:, LOW]
         good = (kinds == PASSAGE) & (reached == 1.0)
@@ -110,7 +114,7 @@ def _reaching(function, x, error, columns):
 
 
 def along(function, columns):
-    """{name: (values, bounds)} of the precession to which each state (7, m) of a curve belongs;
+    """{name: (values, bounds)} of the precession to which each state (STATE, m) of a curve belongs;
     none at poles.
     """
     if function in (upper_pole, lower_pole):

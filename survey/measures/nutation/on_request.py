@@ -6,12 +6,12 @@ import numpy as np
 
 from survey import methods
 from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation import records as rc
 from survey.measures.nutation import rotation, separatrix, twist
 from survey.measures.nutation import wells as nutation
 from survey.modules import load
 from survey.status import OK
 
-_HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)
 _RTOL = 1e-13
 
 
@@ -64,7 +64,7 @@ def _of_integrals(given, valid, sign, wanted):
     rows = np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]))
     ratio = np.repeat(np.where(valid, given["ratio"], 1.0), 2)
     found = twist.determinants(
-        rows, kinds.ravel(), (np.ones_like(ratio), ratio, np.repeat(points[:, 1], 2)), wanted
+        rows, kinds.ravel(), (np.ones_like(ratio), ratio, np.repeat(points[:, rc.ALPHA], 2)), wanted
     )
     return {name: tuple(x.reshape(-1, 1, 2) for x in pair) for name, pair in found.items()}
 
@@ -74,9 +74,9 @@ def _of_states(given, valid, times, out, wanted):
     if wanted.isdisjoint(twist.NAMES) and not phased and not moving:
         return {}
     points = np.column_stack(list(given.values()))
-    points[~valid] = _HARMLESS
+    points[~valid] = nutation.HARMLESS
     rows, kinds, _count, _heights, starts = nutation.of_states(points)
-    sizes = points[:, 0], points[:, 1], points[:, 6]
+    sizes = points[:, rc.SIZE_A], points[:, rc.SIZE_C], points[:, rc.P_PHI]
     found = twist.determinants(rows, kinds, sizes, wanted)
     if phased or moving:
         periods, kinds = nutation.periods(load(methods, "agm", "method"), rows, kinds, _RTOL)

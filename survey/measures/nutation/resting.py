@@ -20,7 +20,7 @@ _PI_SHORT = 1e-32  # 1 + cos of the float64 next to pi, and more
 
 def at_times(found, those, points, times, drift):
     """`found` (u, psi, phi and bars, each (n, m)) with the answers of the rows `those` (n) of the
-    states (n, 7).
+    states (n, STATE).
 
     drift: a (1/C - 1/A).
     """
@@ -89,7 +89,7 @@ def _part(over, under):
 
 def rotations(states, u, off):
     """sin theta, p_theta and (p_psi - p_phi u) / sin theta, and bars, each (n, m), of `states` (n,
-    7) that rest at u.
+    STATE) that rest at u.
 
     u and its bar `off`: (n, m), as from `at_times`.
     """

@@ -9,6 +9,7 @@ Source: `scenes/brun.md`, (3), (10) and (11) corrected, for any A = B.
 import numpy as np
 
 from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation import records as rc
 from survey.kernels.nutation import rotation as rt
 from survey.kernels.nutation import wells as nu
 from survey.measures.nutation import resting
@@ -35,8 +36,9 @@ AT_T = {
 
 
 def constants(rows, kinds, starts, periods, points):
-    """{name: (values, bars)} of alpha1 to beta3, each (n), of initial states `points` (n, 7)."""
-    size_a, size_c, epsilon, b, a = (points[:, i] for i in (0, 1, 2, 5, 6))
+    """{name: (values, bars)} of alpha1 to beta3, each (n), of initial states `points` (n, STATE)."""
+    size_a, size_c, epsilon = points[:, rc.SIZE_A], points[:, rc.SIZE_C], points[:, rc.EPSILON]
+    b, a = points[:, rc.P_PSI], points[:, rc.P_PHI]
     level = rows[:, nu.L]
     found = np.full((len(rows), 2, rt.PLACE), np.nan)
     turning = (kinds >= nu.NUTATION) & np.isfinite(periods).all(axis=1)
@@ -75,13 +77,13 @@ def _where(share, value, bar, roundings, size=None):
 
 def at_times(rows, kinds, starts, periods, times, points, motion):
     """{name: (values, bars)} of AT_T, each (n, m) at `times` (n, m), of initial states `points` (n,
-    7).
+    STATE).
 
     motion: u, psi and phi there, and their bars.
     """
     found = np.full((*times.shape, 2, rt.PLACE), np.nan)
     turning = (kinds >= nu.NUTATION) & np.isfinite(periods).all(axis=1)
-    size_a, size_c, a = (points[:, i, None] for i in (0, 1, 6))
+    size_a, size_c, a = (points[:, i, None] for i in (rc.SIZE_A, rc.SIZE_C, rc.P_PHI))
     some = np.empty((np.count_nonzero(turning), times.shape[1], 2, rt.PLACE))
     inside = np.ascontiguousarray((times / size_a)[turning])
     rt.places(rows[turning], starts[turning], periods[turning], inside, some)

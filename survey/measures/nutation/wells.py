@@ -16,12 +16,13 @@ from survey.kernels.nutation.lanes import NAMES, OUTPUTS
 TRUST = 0.03  # relative errors beyond are no errors of first order
 UNDECIDED = -1
 NO_MOTION = 16  # the status of integrals without a motion
+HARMLESS = (1.0, 1.0, 0.0, 1.0, 1.0, 0.0, 0.0)  # a state, in the place of those outside the domain
 FAR = 1e38  # distances in units of |k| beyond this only say that there is next to no field
 
 
 def of_states(points):
     """rows (n, SIZE), kinds (n), numbers of wells (n), heights (n, HEIGHT), starts (n, START) of
-    states (n, 7).
+    states (n, STATE).
     """
     n = len(points)
     rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
@@ -31,7 +32,7 @@ def of_states(points):
 
 
 def of_integrals(points, sign):
-    """The same but starts for (l, alpha, beta) (n, 3): rows (n, 2, SIZE), kinds (n, 2)."""
+    """The same but starts for scaled integrals (n, INTEGRALS): rows (n, 2, SIZE), kinds (n, 2)."""
     n = len(points)
     rows, kinds, heights = (
         np.zeros((n, 2, nu.SIZE)),
@@ -44,8 +45,8 @@ def of_integrals(points, sign):
 
 
 def in_lanes(kernel, points, actions):
-    """Values and bounds (OUTPUTS, n) of `points` (7, n), numbers of wells (n), who is answered (n):
-    see `brun_lanes`.
+    """Values and bounds (OUTPUTS, n) of `points` (STATE, n), numbers of wells (n), who is answered
+    (n): see `brun_lanes`.
 
     actions: to full accuracy in small wells, too.
     """
@@ -157,7 +158,7 @@ def verdicts(rows, kinds):
 
 
 def heights(kernel, points):
-    """Heights (n, HEIGHT) of points (7, n), columns of `kernels.nutation.records`."""
+    """Heights (n, HEIGHT) of points (STATE, n), columns of `kernels.nutation.records`."""
     found = np.empty((points.shape[1], rc.HEIGHT))
     kernel(points, found)
     return found
