@@ -174,7 +174,7 @@ def _readme(name, ds, pictures):
         f"Computed by survey {said('version_survey')} with Python {said('version_python')}, {said('date_created')}. "
         "Every value has an error bar.", "",
         f"- `{name}`: the data, netCDF 4 (`xarray.open_dataset`), and its digest",
-        "- `workflow.toml`: what was asked", "- `requirements.txt`: the versions that answered",
+        "- `workflow.toml`: the workflow", "- `requirements.txt`: the versions that computed the data",
         *[f"- `{picture}`: a picture" for picture in pictures],
         f"- `{CRATE}`: this description for machines (RO-Crate 1.1), with the sha256 of each file", "",
         "Verify all of it: `survey verify FOLDER` (or the .zip). Compute the data again, to the same bits with the "

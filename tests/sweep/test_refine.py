@@ -139,7 +139,7 @@ def test_the_cells_are_drawn_instead_of_the_points(path):
         ({"scene": "gyrostat", "axes": {"w0": {"values": [1.0, 2.0]}}, "options": {}}, "not supported for the scene"),
         ({"scene": "satellite_triaxial", "axes": {"yaw_ratio": {"values": [-0.5, 0.5]}, "amplitude": 0.5,
                                                   "roll_ratio": {"values": [-0.5, 0.5]}}, "options": {}},
-         "refine: of satellite_triaxial cells are not known"),
+         "refine: satellite_triaxial: cells are available only"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused(changes, words):
