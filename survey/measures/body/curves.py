@@ -38,7 +38,9 @@ def serves(scene):
 def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if options and options["question"] not in AXES:
-        return f"question = {options['question']} has no verdict ({' and '.join(AXES)} have)"
+        return (
+            f"question = {options['question']} has no verdict (only {' and '.join(AXES)} have one)"
+        )
     if len(axes) in (1, 2, 3) and any(set(axes) <= set(own) for own in AXES.values()):
         return None
     known = " or of ".join(
