@@ -502,7 +502,7 @@ DATASET = [
     ),
     (
         lambda ds, scene: ds.isel(e=1).survey.point(a=1.0, e=0.5),
-        "e is 1 at all points of this survey, so it is no axis",
+        "e is 1 at all points of this survey, so it is not an axis",
     ),
     (
         lambda ds, scene: ds.isel(e=1).survey.zoom(e=(0.5, 1.0)),

@@ -152,7 +152,7 @@ def test_what_evaluate_returns_is_a_file_like_others_once_saved(bodies, grid, tm
 def test_points_on_no_grid_have_no_areas(samples):
     for question in (samples.survey.areas, samples.survey.boundary):
         with pytest.raises(
-            BadInput, match="sample only counts points, of a, q: they lie on no grid"
+            BadInput, match="sample only counts points, of a, q: they do not lie on a grid"
         ):
             question()
 

@@ -56,7 +56,7 @@ def refuse_members(ds, what):
         along = [name for name, c in ds.coords.items() if dim in c.dims]
         if dim not in ds.coords and along:
             raise BadInput(
-                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: they lie on no grid; use counts()"
+                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: they do not lie on a grid; use counts()"
             )
 
 

@@ -33,7 +33,7 @@ def attributes(path):
         return {}
     if "scene" not in found and "complete" not in found:
         raise BadInput(
-            f"{path}: this netCDF file was not written by survey; write another with -o, or use --fresh"
+            f"{path}: this netCDF file was not written by survey; write to another with -o, or use --fresh"
         )
     return found if found.get("complete") == 1 else {}
 

@@ -192,6 +192,6 @@ def _fraction(widths, key, values, axis):
     )
     if fraction < MIN_FRACTION:
         raise BadInput(
-            f"{where} = {width:g}: such cells are too many; use at least a millionth of the axis"
+            f"{where} = {width:g}: there would be too many cells; use at least a millionth of the axis"
         )
     return float(fraction), log

@@ -46,7 +46,7 @@ CONTRACT = {
     ),
     "OPTIONS": Value("survey.scene.Option: switches with a few values each", tuple, needed=True),
     "OUTPUTS": Value(
-        "survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True
+        "survey.scene.Output: what `solve` gives, except `status`", tuple, needed=True
     ),
     "FAMILY": Value(
         "the methods whose SERVES names this family can solve the scene", str, needed=True

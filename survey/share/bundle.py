@@ -237,7 +237,7 @@ def _described(folder, files, ds, data, author, license_url):
 
 
 def _zipped(folder, files, file):
-    """Write the folder as a zip; the same survey gives the same bytes but for pictures."""
+    """Write the folder as a zip; the same survey gives the same bytes, except for pictures."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in files:
             member = zipfile.ZipInfo(f"{folder.name}/{name}", (1980, 1, 1, 0, 0, 0))

@@ -92,7 +92,7 @@ def test_files_of_other_programs_are_not_lost(small, tmp_path, monkeypatch):
     xr.Dataset({"x": ("t", np.arange(3.0))}).to_netcdf("small.nc")
     with pytest.raises(
         BadInput,
-        match=r"small\.nc: this netCDF file was not written by survey; write another with -o",
+        match=r"small\.nc: this netCDF file was not written by survey; write to another with -o",
     ):
         survey.run(small)
     assert list(xr.load_dataset("small.nc")) == ["x"]
