@@ -51,12 +51,15 @@ def of_map(ds):
 
 
 def refuse_members(ds, what):
-    """Raise BadInput where points lie along a dimension that is no parameter, such as that of an ensemble."""
+    """Raise BadInput where points lie along a dimension that is not a parameter, such as that of an
+    ensemble.
+    """
     for dim in ds.status.dims:
         along = [name for name, c in ds.coords.items() if dim in c.dims]
         if dim not in ds.coords and along:
             raise BadInput(
-                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: they do not lie on a grid; use counts()"
+                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: "
+                "they do not lie on a grid; use counts()"
             )
 
 

@@ -138,7 +138,7 @@ def _domain(parameter):
 
 
 def _range(parameter, ends, near):
-    """(low, high) of the part of the domain that is searched; None for what lies around `near`."""
+    """(low, high) of the part of the domain that is searched; None for a range around `near`."""
     name = parameter.name
     if ends is None and near is not None:
         return None

@@ -373,8 +373,8 @@ class FloquetScene(TracedScene):
 
 
 def _effort(points):
-    """{"series": functions of time in A, "steps": in a period}: the means over some Points, by
-    which a point's cost goes."""
+    """{"series": functions of time in A, "steps": in a period}: the means over some Points, on
+    which a point's cost depends."""
     reach, valid = monodromy.method_of("auto").floquet_reach(1e-10), np.flatnonzero(points.valid)
     if not valid.size:
         return {}

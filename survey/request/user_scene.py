@@ -618,7 +618,9 @@ def _function(
     what: str,
     refuse: Callable[[str], NoReturn],
 ) -> None:
-    """Refuse what is no function of these arguments, or has one of these names in another place."""
+    """Refuse a value that is not a function of these arguments, or has one of these names in
+    another position.
+    """
     call = f"{letter}({', '.join(arguments)})"
     count = {2: "two", 3: "three", 4: "four"}[len(arguments)]
     if not callable(function) or _arguments(function) != len(arguments):

@@ -293,7 +293,7 @@ def _extract(archive, folder, path):
 
 
 def complaints(folder):
-    """(sentences on what is wrong with the bundle, the path of its data); raises Damaged without a
+    """(sentences on the faults of the bundle, the path of its data); raises Damaged where it has no
     description.
     """
     folder, described = Path(folder), folder / CRATE

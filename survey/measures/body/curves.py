@@ -31,7 +31,7 @@ LINES = 129
 
 
 def serves(scene):
-    """Are curves known of the scene? Of whole gyrostats they are not."""
+    """Are curves known for the scene? For whole gyrostats they are not."""
     return "Omega" in {p.name for p in scene.PARAMETERS}
 
 
