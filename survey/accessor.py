@@ -32,7 +32,7 @@ class Survey:
                    and ds[dim].size and isinstance(ds[dim].values.flat[0], tuple)]  # fmt: skip
         if stacked:
             raise BadInput(
-                f"this survey is stacked along {stacked[0]}: give it its axes back with .unstack()"
+                f"this survey is stacked along {stacked[0]}: restore its axes with .unstack()"
             )
         schema.check(ds, complete=False)
         self._ds = ds
@@ -58,8 +58,8 @@ class Survey:
         `var`: a name, or booleans at the points, such as `a.survey.where("stable") &
         b.survey.where("stable")`. `x` and `y`: which axes are drawn; others at their first value,
         unless a `slice` fixes them. `cmap`, `vmin`, `vmax`: colours of a variable of numbers; by
-        default they span its values but for 1 % at either end, where the colour bar has arrows
-        (`robust=False`: all of them), and diverge about 0 where values have both signs; of a curve
+        default they span its values except 1 % at either end, where the colour bar has arrows
+        (`robust=False`: all of them), and diverge about 0 where values have both signs; for a curve
         `vmin` and `vmax` are the ends of its axis.
 
         Solutions of Abel's equation at several angles are curves, one for each value of the first
@@ -108,8 +108,8 @@ class Survey:
         """True where the verdict, or the status, is `name` (a boolean DataArray):
         `ds.survey.where("stable")`.
 
-        Masks of several surveys combine with `&`, `|` and `~`, and `map` draws the result. An undecided point is in no
-        mask but that of "undecided", so `~where("stable")` contains it.
+        Masks of several surveys combine with `&`, `|` and `~`, and `map` draws the result. An
+        undecided point is only in the mask of "undecided", so `~where("stable")` contains it.
         """
         from survey.analysis import verdicts
 
@@ -137,7 +137,8 @@ class Survey:
 
         For each parameter along which the scene has boundaries, all others fixed: `value`, `edge` (the nearest
         boundary), `edge_error` (a bound), `distance` (edge less value) and `edge_class`. NaN where none was found
-        within two hundred times 1 + |value|. They are exact, as those of `survey.edge`, and need no file of a map.
+        within two hundred times 1 + |value|. They are exact, like those of `survey.edge`, and need
+        no file of a map.
         """
         from survey.analysis import edge, point
 
@@ -205,7 +206,7 @@ class Survey:
 
         For each output X in both: `X_difference`, and `X_excess`, its size over the sum of both
         error bars (above 1 they contradict each other); `verdict_differs`. The attribute `summary`
-        is the result in a line, `unlike` lists what was asked differently.
+        is the result in a line, `unlike` lists how the requests differ.
         """
         from survey.analysis import compare
 

@@ -54,12 +54,12 @@ def run(
     output : path of the netCDF file, instead of the workflow's.
     workers : number of worker processes; by default threads of this process.
     scheduler : address or scheduler file of a dask.distributed cluster, or a Client of it.
-    fresh : replace what earlier runs have left at the output: a finished file, or the blocks of an interrupted run.
+    fresh : replace the results of earlier runs at the output: a finished file, or the blocks of an interrupted run.
         Otherwise a finished file of the same workflow is returned as it is (nothing is computed, pictures are drawn
         again), and one of another workflow is refused.
     block_timeout : seconds after which a worker process that has not finished its block is replaced (five minutes more
         for its first, to compile); by default 20 times the longest block so far, and at least five minutes.
-    reuse : a file of an earlier run: points that are in it, too, are taken from it where the bits would be the same
+    reuse : a file of an earlier run: points that it also holds are taken from it where the bits would be the same
         (the attribute `points_reused` of the result is their number). With longer or finer axes only the rest is
         solved.
 
@@ -518,7 +518,7 @@ def _output_text(module: Any, o: Output) -> str:
 
 
 def _unit(units: str, module: Any, ratio: bool = False) -> str:
-    """The unit of a parameter or an output, in parentheses; an own scene does not tell unless it
+    """The unit of a parameter or an output, in parentheses; a user's own scene has none unless it
     names one.
     """
     if units != "1":

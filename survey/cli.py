@@ -134,7 +134,7 @@ def init(scene, output):
 
 @program.command()
 def schema():
-    """Print the JSON schema of a workflow file, by which editors complete and check it."""
+    """Print the JSON schema of a workflow file, which editors use to complete and check it."""
     from survey.request import starter
 
     _show(starter.schema(), True)
@@ -167,15 +167,16 @@ def schema():
     "--block-timeout",
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
-    help="Replace a worker that takes longer for a block; by default 20 times the longest so far, at least 5 minutes.",
+    help="Replace a worker that takes longer than this for a block; by default 20 times the longest "
+    "block so far, and at least 5 minutes.",
 )
 @click.option(
-    "--fresh", is_flag=True, help="Replace what earlier runs left: the file or its blocks."
+    "--fresh", is_flag=True, help="Replace the results of earlier runs: the file or its blocks."
 )
 @click.option(
     "--reuse",
     metavar="FILE.nc",
-    help="Take the points that this file of an earlier run holds from it.",
+    help="Reuse the points that this file of an earlier run already holds.",
 )
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, reuse, quiet):
@@ -203,7 +204,7 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     "-o",
     "--output",
     metavar="OUT.nc",
-    help="The netCDF file, instead of the workflow's with _proved added.",
+    help="The netCDF file; by default the workflow's output.path with _proved added.",
 )
 @click.option(
     "--set",
@@ -239,7 +240,10 @@ def prove(workflow, output, overrides, fresh, quiet):
 @program.command()
 @click.argument("workflow", type=WORKFLOW)
 @click.option(
-    "-o", "--output", metavar="OUT.model", help="The model; by default beside the output, .model."
+    "-o",
+    "--output",
+    metavar="OUT.model",
+    help="The model file; by default beside the output, with the suffix .model.",
 )
 @click.option(
     "--set",
@@ -251,7 +255,7 @@ def prove(workflow, output, overrides, fresh, quiet):
 @click.option(
     "--proof",
     metavar="PROVED.nc",
-    help="The proof of this map (survey prove): the model carries it.",
+    help="The proof of this map (from survey prove), which the model then carries.",
 )
 def model(workflow, output, overrides, proof):
     """Write the map's series, which answer anywhere with error bars: survey.Model reads them, with
@@ -296,8 +300,8 @@ def model(workflow, output, overrides, proof):
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, size, method and estimated time, by what this machine has needed so far; no
-    kernel is called.
+    """Points, blocks, size, method, and the time estimated from earlier runs on this machine;
+    nothing is solved.
     """
     from survey.request.workflow import read
     from survey.sweep import plan
@@ -477,7 +481,7 @@ def plot(path, output, var, style, width, at):
 @click.argument("path", metavar="OUT.nc")
 @click.option("-o", "--output", metavar="OUT.html", help="The page; by default beside the file.")
 @click.option(
-    "--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map of more axes."
+    "--at", metavar="NAME=VALUE", multiple=True, help="Show this plane of a map with more axes."
 )
 @click.option("--trust-scene", is_flag=True, help=TRUST)
 def share(path, output, at, trust_scene):
@@ -622,7 +626,7 @@ def precision(scene, peers, output):
     type=float,
     default=1.0,
     metavar="S",
-    help="Of the points along each axis: below 1 coarser.",
+    help="Fraction of the points along each axis; below 1 is coarser.",
 )
 @click.option(
     "-o",
@@ -633,7 +637,9 @@ def precision(scene, peers, output):
     help="Folder for JSON, page and PNG.",
 )
 def failures(scene, share, output):
-    """Where each method fails: its true error and its error bar over the planes on which it should break."""
+    """Where each method fails: its true error and its error bar over the planes on which it is
+    expected to fail.
+    """
     from survey.failures import write
 
     for path in write(scene, output, share, say=lambda line: err.print(plain(line), markup=False)):
@@ -733,13 +739,11 @@ def _summarise(finished, paths):
         err.print(f"edges: {curves} could not be followed to the map's border (curve_complete = 0)")
     if attributes.get("surfaces_left_out"):
         lost = counted(attributes["surfaces_left_out"], "triangle")
-        err.print(
-            f"surfaces: {lost} left out, of which a corner is not certain (at edges and tips)"
-        )
+        err.print(f"surfaces: {lost} with an uncertain corner left out (at edges and tips)")
     if attributes.get("curves_unexplained"):
         segments = counted(attributes["curves_unexplained"], "segment")
         err.print(
-            f"edges: along {segments} of lines across the map a curve is missing (curves_unexplained)"
+            f"edges: a curve is missing on {segments} of lines across the map (curves_unexplained)"
         )
     if "edge_left_out" in attributes:
         err.print(

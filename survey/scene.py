@@ -1,4 +1,4 @@
-"""What a scene describes itself with: parameters, options, outputs, and what is asked of it."""
+"""The classes with which a scene describes itself: parameters, options, outputs, and requests."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -162,7 +162,7 @@ def plus_minus(value: Any, bar: Any) -> str:
 
 
 def named(answer: Any, name: str) -> str:
-    """`name = value +- bar` of an output that is known of a point."""
+    """`name = value +- bar` of an output that is known at a point."""
     return f"{name} = {plus_minus(answer[name], answer[f'{name}_error'])}"
 
 

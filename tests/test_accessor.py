@@ -454,7 +454,7 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         (lambda s: s.map("y3"), "unknown variable 'y3'"),
         (lambda s: s.map(style="poster"), "unknown style 'poster'"),
         (lambda s: s.map(style="paper", width="triple"), "unknown width 'triple'"),
-        (lambda s: s.boundary(index=2), "this survey knows no index of its boundaries"),
+        (lambda s: s.boundary(index=2), "this survey does not record the index of its boundaries"),
         (lambda s: s.where(["stable", "unstable"]), "give the name of one verdict or status"),
         (lambda s: s.zoom(), "give a range"),
         (lambda s: s.zoom(a=(2.0, 1.0)), "the lower one first"),
@@ -468,7 +468,10 @@ def test_lazy_files_are_read_in_part(mathieu, tmp_path):
         ),
         (lambda s: s.compare(survey.evaluate("libration", mu=0.01)), "the scenes differ"),
         (lambda s: s.slice(q=1.0).survey.slice(a=1.0).survey.areas(), "two values or more"),
-        (lambda s: s._ds.isel(a=[0, 1, 1, 2]).survey.areas(), "values of a must rise, or fall"),
+        (
+            lambda s: s._ds.isel(a=[0, 1, 1, 2]).survey.areas(),
+            "values of a must increase, or decrease",
+        ),
     ],
 )
 def test_what_cannot_be_answered_is_said_in_one_line(mathieu, ask, words):

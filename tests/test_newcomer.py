@@ -106,7 +106,7 @@ SHELL = [
     ("info nothing.nc", "there is no such file; name a netCDF file"),
     ("scenes pendulum", "unknown scene 'pendulum' (allowed: brun, brun_triaxial, gyrostat"),
     ("init sattelite", "did you mean 'satellite'?"),
-    ("merge map.nc map.nc -o both.nc", "they are of the same points"),
+    ("merge map.nc map.nc -o both.nc", "they have the same points"),
     ("prove good.toml", "add [refine] with a width"),
     ("precision xyz", "xyz"),
     ("share map.nc -o map.nc", "this file ends in .html or .htm; name one, such as 'map.html'"),
@@ -211,7 +211,7 @@ PYTHON = [
     (lambda ds: ds.survey.where("stabel"), "did you mean 'stable'?"),
     (lambda ds: ds.survey.compare("other.nc"), "give the dataset of another survey"),
     (lambda ds: xr.Dataset().survey.map(), "this dataset was not written by survey"),
-    (lambda ds: survey.concat([ds, ds]), "they are of the same points"),
+    (lambda ds: survey.concat([ds, ds]), "they have the same points"),
     (
         lambda ds: survey.hill("cos(t)", period=1.0, parameters="a"),
         "z must be a function of two arguments, z(u, p)",
@@ -412,11 +412,14 @@ OWN = [
         lambda: at(orbit(half_filled), F=0.3),
         "leaves out[1] 0: v never changes; fill out[1] = dv/dt",
     ),
-    (lambda: at(orbit(whole_state), F=0.3), "an entry that f(t, x, p, out) fills in is no number"),
+    (
+        lambda: at(orbit(whole_state), F=0.3),
+        "f(t, x, p, out) fills in an entry that is not a number",
+    ),
     (lambda: at(orbit(named_state), F=0.3), "x and p hold numbers; write x[0], ..., p[0]"),
     (
         lambda: at(orbit(period=None, start=(1.0, 0.0, 6.0)), F=0.3),
-        "depends on t, so that period must be given; give the period of f in t",
+        "depends on t, so period must be given; give the period of f in t",
     ),
     (
         lambda: orbit(period=None, start=(1.0, 0.0, -6.0)),
@@ -499,7 +502,7 @@ DATASET = [
     ),
     (
         lambda ds, scene: ds.isel(e=1).survey.point(a=1.0, e=0.5),
-        "e is 1 at all points of this survey, so it is no axis",
+        "e is 1 at all points of this survey, so it is not an axis",
     ),
     (
         lambda ds, scene: ds.isel(e=1).survey.zoom(e=(0.5, 1.0)),
@@ -511,7 +514,7 @@ DATASET = [
     ),
     (
         lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, np.inf)),
-        "a = (0, inf): it is searched along, so",
+        "a = (0, inf): boundaries are searched for along it, so",
     ),
     (
         lambda ds, scene: survey.edge(scene, along="a", e=1.0, a=(0, 1), rtol=1e-8),
@@ -527,7 +530,7 @@ DATASET = [
         lambda ds, scene: survey.edge(
             "brun_triaxial", along="Omega", A=1.0, B=0.5, C=0.3, Omega=(0, 2)
         ),
-        "edge: none at Omega = 1, A = 1, B = 0.5, C = 0.3, epsilon = 1: the parameters lie outside the domain: ",
+        "edge: there is none at Omega = 1, A = 1, B = 0.5, C = 0.3, epsilon = 1: the parameters lie outside the domain",
     ),
 ]
 
@@ -580,14 +583,14 @@ FILES = [
         FILE.replace("PERIOD = pi", ""),
         "PERIOD is missing; write PERIOD = 2 * pi (its length), or a function of p",
     ),
-    (FILE.replace("PERIOD", "Period"), "Period is not read; write PERIOD"),
-    (FILE + 'STRUCTUR = "symplectic"\n', "STRUCTUR is not read; write STRUCTURE"),
-    (FILE + 'structure = "symplectic"\n', "structure is not read; write STRUCTURE"),
+    (FILE.replace("PERIOD", "Period"), "unknown name Period; did you mean PERIOD?"),
+    (FILE + 'STRUCTUR = "symplectic"\n', "unknown name STRUCTUR; did you mean STRUCTURE?"),
+    (FILE + 'structure = "symplectic"\n', "unknown name structure; did you mean STRUCTURE?"),
     (FILE + "raise SystemExit(3)\n", "the scene file failed to run (SystemExit: 3)"),
     (FILE.replace("out[0, 0] =", "out ="), "K(t, p, out) leaves out all 0"),
     (ORBIT.replace('STATES = ("x", "v")', ""), 'STATES is missing; write STATES = ("x", "v")'),
     (ORBIT.replace("PERIOD = 2 * pi", ""), "or a function of p, or None if f does not depend on t"),
-    (ORBIT + "def JACOBIAN(t, x, p, out): pass\n", "JACOBIAN is not read; write jacobian"),
+    (ORBIT + "def JACOBIAN(t, x, p, out): pass\n", "unknown name JACOBIAN; did you mean jacobian?"),
     (
         ORBIT.replace("(t, x, p, out)", "(phi, p)"),
         "f must be a function of four arguments, f(t, x, p, out)",

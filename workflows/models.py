@@ -385,7 +385,7 @@ def row(scene, full, compared, number, off, seconds, reduced):
 PAGE = """# Reduced and full models, measured
 
 Made by `python workflows/models.py --points {points}`. Random points of each scene's domain; the full model is
-integrated without the reduction, small deviations by a complex step. "off": what they differ by, most of which is the
+integrated without the reduction, small deviations by a complex step. "off": their difference, most of which is the
 error of the integration, whose steps are fixed. Times are processor time for a point, of this integration (numpy, many
 points side by side, no attempt at speed) and of the scene with all its error bars, overhead of the call included.
 

@@ -15,7 +15,7 @@ from survey.request import user_scene
 NO_ANSWER = -2
 SLAB = 2**20  # points read at once
 COMMENT = ("the area between neighbouring points of one verdict is counted for that verdict; the error bar covers all "
-           "area between neighbours that differ; what lies between points of one verdict is not seen")  # fmt: skip
+           "area between neighbours that differ; anything between points of one verdict is not seen")  # fmt: skip
 
 
 def of_map(ds):
@@ -30,7 +30,8 @@ def of_map(ds):
     for dim in ds.status.dims:
         if dim in ds.coords and ds[dim].dtype.kind in "iuf" and not _is_monotonic(ds[dim].values):
             raise BadInput(
-                f"areas: the values of {dim} must rise, or fall, without repetition: use ds.sortby"
+                f"areas: the values of {dim} must increase, or decrease, without repetition; "
+                "use ds.sortby"
             )
     codes = flag_codes(ds.verdict.attrs)
     codes["no_answer"] = NO_ANSWER
@@ -50,12 +51,15 @@ def of_map(ds):
 
 
 def refuse_members(ds, what):
-    """Raise BadInput where points lie along a dimension that is no parameter, such as that of an ensemble."""
+    """Raise BadInput where points lie along a dimension that is not a parameter, such as that of an
+    ensemble.
+    """
     for dim in ds.status.dims:
         along = [name for name, c in ds.coords.items() if dim in c.dims]
         if dim not in ds.coords and along:
             raise BadInput(
-                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: they lie on no grid; use counts()"
+                f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: "
+                "they do not lie on a grid; use counts()"
             )
 
 
@@ -85,7 +89,9 @@ def _of_cells(ds):
     total = float(ds.area.values[share.argmax()] / share.max())
     bar = ds.area_error.values.astype(float)
     values, bars = [*ds.area.values, total * undecided_share(ds)], [*bar, 1e-13 * total]
-    comment = "from cells that are decided as a whole; the area of the undecided cells is the others' error bar"
+    comment = (
+        "from cells that are decided as a whole; the error bars are the area of the undecided cells"
+    )
     units = ds.area.attrs.get("units", "1")
     return _described(
         [*names, "undecided"], np.array(values), np.array(bars), total, units, comment

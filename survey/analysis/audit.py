@@ -149,7 +149,9 @@ def _vertices(module, options, methods, rtol, ds, chosen, _solve, _random):
         measure is None
         or not np.isin(ds.surface_class.values, list(measure.CLASSES.values())).all()
     ):
-        raise Damaged(f"surface_class contains codes that are no boundaries of {ds.attrs['scene']}")
+        raise Damaged(
+            f"surface_class contains codes that are not boundaries of {ds.attrs['scene']}"
+        )
     box = boundaries.square_over([ds[name].values for name in names])
     fixed = {
         p.name: float(ds[p.name])

@@ -29,7 +29,8 @@ def find(ds, kind=None, index=None):
     for name, value in (("kind", kind), ("index", index)):
         if value is not None and name not in found:
             raise BadInput(
-                f"boundary: this survey knows no {name} of its boundaries; run its workflow with [boundaries]"
+                f"boundary: this survey does not record the {name} of its boundaries; run its "
+                "workflow with [boundaries]"
             )
     if kind is not None:
         classes = flag_codes(found.kind.attrs)

@@ -41,7 +41,7 @@ def edge(
     Parameters
     ----------
     scene : as in `survey.evaluate`.
-    along : the name of the parameter along which boundaries are searched.
+    along : the name of the parameter along which boundaries are searched for.
     near : a value of it: only the nearest boundary on each side of it is returned, at most two.
     **parameters : numbers for the scene's other parameters, and options. `along=(low, high)`, under that parameter's
         name, is the range that is searched; by default its whole domain, if that is bounded, less a thousandth at an
@@ -120,7 +120,9 @@ def _check_inside(scene, module, point, options):
         return
     if invalid:
         where = ", ".join(f"{key} = {value:g}" for key, value in point.items())
-        raise BadInput(f"edge: none at {where}: {status.table(module)['invalid_parameters'][1]}")
+        raise BadInput(
+            f"edge: there is none at {where}: {status.table(module)['invalid_parameters'][1]}"
+        )
 
 
 def _number(key, value, parameter):
@@ -136,7 +138,7 @@ def _domain(parameter):
 
 
 def _range(parameter, ends, near):
-    """(low, high) of the part of the domain that is searched; None for what lies around `near`."""
+    """(low, high) of the part of the domain that is searched; None for a range around `near`."""
     name = parameter.name
     if ends is None and near is not None:
         return None
@@ -155,8 +157,8 @@ def _range(parameter, ends, near):
         first = last = np.nan
     if not (low <= first < last <= high and np.isfinite([first, last]).all()):
         raise BadInput(
-            f"{name} = {shown(ends)}: it is searched along, so give (low, high) in its domain; allowed: "
-            f"{_domain(parameter)}"
+            f"{name} = {shown(ends)}: boundaries are searched for along it, so give a range "
+            f"(low, high) in its domain; allowed: {_domain(parameter)}"
         )
     return first, last
 
@@ -285,7 +287,7 @@ def margin(ds):
             progress(len(here), len(here))
     if not rows:
         raise BadInput(
-            f"margin: of {ds.attrs['scene']} {reasons[0].removeprefix('boundaries: ')}"
+            f"margin: {ds.attrs['scene']}: {reasons[0].removeprefix('boundaries: ')}"
             if reasons
             else f"margin: {_UNKNOWN} {ds.attrs['scene']}"
         )

@@ -53,8 +53,8 @@ def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Datase
 
     Raises
     ------
-    survey.BadInput where the parts do not belong together: another scene, option, method, rtol or set of outputs, more
-    than one axis that differs, or different values at a common point.
+    survey.BadInput where the parts do not belong together: different scenes, options, methods, rtol
+    or sets of outputs, more than one axis that differs, or different values at a common point.
     """
     joined, left_out = _together(datasets)
     if left_out:
@@ -69,7 +69,9 @@ def _together(datasets):
         OF_PARTS[name] for name in OF_PARTS if any(name in part.attrs for part in given)
     )
     left_out = (
-        f"what {' and '.join(tables)} found belongs to the parts, and is left out" if tables else ""
+        f"the results of {' and '.join(tables)} belong to the parts, and are left out"
+        if tables
+        else ""
     )
     return _concat([of_points(part) for part in given]), left_out
 
@@ -138,7 +140,7 @@ def _check_alike(one, other):
     for key in SAME:
         if one.attrs.get(key) != other.attrs.get(key):
             both = " and ".join(shown(ds.attrs.get(key)) for ds in (one, other))
-            raise BadInput(f"concat: the surveys have another {key}: {both}")
+            raise BadInput(f"concat: the surveys differ in {key}: {both}")
     names = [set(ds.data_vars) for ds in (one, other)]
     if names[0] != names[1]:
         only = ", ".join(sorted(names[0] ^ names[1]))
@@ -165,15 +167,15 @@ def _axis(parts):
         what = (
             f"in {', '.join(map(str, different))}"
             if different
-            else "in none: they are of the same points"
+            else "in none: they have the same points"
         )
-        raise BadInput(f"concat: surveys are joined along one axis, and these differ {what}")
+        raise BadInput(f"concat: surveys are joined along one axis, but these differ {what}")
     name = different[0]
     if first[name].dtype.kind not in "iuf" or any(
         part[name].dims not in ((), (name,)) for part in parts
     ):
         raise BadInput(
-            f"concat: {name} is no axis of numbers or names, along which surveys can be joined"
+            f"concat: surveys cannot be joined along {name}: it is not an axis of numbers or names"
         )
     return name, []
 

@@ -46,9 +46,9 @@ def nearest(ds, coords):
 
 
 def unknown_axis(ds, name, axes):
-    """One line for a name that is no axis of the survey; what is fixed is known, but no axis."""
+    """One line for a name that is not an axis of the survey; a fixed parameter is named as such."""
     if name in ds.coords and ds[name].ndim == 0 and ds[name].dtype.kind in "iuf":
-        return f"{name} is {float(ds[name]):g} at all points of this survey, so it is no axis; leave it out"
+        return f"{name} is {float(ds[name]):g} at all points of this survey, so it is not an axis; leave it out"
     return modules.unknown("axis", name, axes)
 
 

@@ -80,7 +80,8 @@ def combined(ds, given):
         given = xr.align(given, ds.status, join="exact")[0]
     except ValueError:
         raise BadInput(
-            "map: the array has other coordinates than the survey; combine surveys of the same axes"
+            "map: the coordinates of the array are not those of the survey; combine surveys with "
+            "the same axes"
         ) from None
     about = {"long_name": str(given.name or "combined verdict").replace("_", " "), "units": "1"}
     codes = xr.DataArray(

@@ -44,10 +44,13 @@ def sweep(ds, ranges, num=None, output=None):
 
 
 def _of_names(ds, ranges, num, output):
-    """The finer map of a survey with an axis of names, along which parameters lie: no workflow has such."""
+    """The finer map of a survey with an axis of names, along which parameters lie, which no workflow
+    can have.
+    """
     if output is not None:
         raise BadInput(
-            "zoom: no workflow has an axis of names: leave output out, and save the answer by to_netcdf"
+            "zoom: a workflow cannot have an axis of names; leave output out, and save the result "
+            "with to_netcdf"
         )
     name = user_scene.of_dataset(ds)
     scene = user_scene.find(name)[1]

@@ -101,7 +101,7 @@ def _planes(scene, share):
 
 
 def measure(planes, say=lambda line: None):
-    """Of each plane [(method, Comparison or None where it is not the method's question), ...]."""
+    """For each plane, [(method, Comparison or None where it is not the method's question), ...]."""
     from survey.failures.compare import compared
 
     found = []

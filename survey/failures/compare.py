@@ -143,7 +143,7 @@ def _answered(answer):
 
 
 def _missed(plane, answer, rtol):
-    """Where a bar exceeds what was asked."""
+    """Where a bar exceeds the requested accuracy."""
     _, module = user_scene.find(plane.scene)
     missed = np.zeros(answer["status"].shape, bool)
     for output in module.OUTPUTS:

@@ -6,8 +6,8 @@ from survey.failures.plane import MAP, RTOL
 
 PAGE = """# Where methods fail: {scene}
 
-Made by `survey failures {scene}{asked}`. Every method is asked for every point of {number} at rtol = {rtol:g};
-shown is the true error, the largest of all outputs', over 1 + |value|.
+Made by `survey failures {scene}{asked}`. Every method solves every point of {number} at rtol = {rtol:g};
+shown is the largest true error among the outputs, over 1 + |value|.
 
 {about}
 
@@ -83,5 +83,5 @@ def _auto(results):
     return (
         f"`auto` meets rtol at {int(met['auto'].sum()):,} of {points:,} points, at {gained:,} of them alone, and "
         f"misses it with an answer at {left:,}; where another method meets it, `auto` does too"
-        + (f" but for {lost:,} points." if lost else ".")
+        + (f" except at {lost:,} points." if lost else ".")
     )

@@ -214,7 +214,7 @@ class Blocks:
             raise BadInput(unfinished.drift(self.path, old, known, changed, self.workflow))
         raise Damaged(
             f"{manifest} is missing or damaged, and the blocks beside it belong to another survey; "
-            "--fresh deletes them and starts again, -o writes another file"
+            "--fresh deletes them and starts again, -o writes to another file"
         )
 
     def _is_foreign(self, file):

@@ -1,4 +1,6 @@
-"""What a finished file at the place of the output means for a run: already complete, or not to be lost."""
+"""What a run does when a finished file exists at its output path: report it complete, or refuse to
+overwrite it.
+"""
 
 import hashlib
 from pathlib import Path
@@ -31,7 +33,7 @@ def attributes(path):
         return {}
     if "scene" not in found and "complete" not in found:
         raise BadInput(
-            f"{path}: this netCDF file was not written by survey; write another with -o, or use --fresh"
+            f"{path}: this netCDF file was not written by survey; write to another with -o, or use --fresh"
         )
     return found if found.get("complete") == 1 else {}
 
@@ -67,7 +69,7 @@ def refuse(path, found, workflow, code, scene_hash):
     if differences:
         causes.append(f"of another workflow ({unfinished.listed(differences)})")
     if found.get("scene_hash", "") != scene_hash:
-        causes.append("of other functions of your own")
+        causes.append("of different functions of your own")
     if not causes:
         versions = {name: found.get(f"version_{name}") for name in ("survey", "numba", "llvmlite")}
         other = [
@@ -81,6 +83,7 @@ def refuse(path, found, workflow, code, scene_hash):
     points = found.get("points")
     many = f" of {points:,} points" if isinstance(points, (int, np.integer)) else ""
     raise BadInput(
-        f"{path} is a finished survey{many} {' and '.join(causes)}; write another file with -o, replace it with "
-        f"--fresh, or extend it with --reuse {path} (in Python output=, fresh=True, reuse=)"
+        f"{path} is a finished survey{many} {' and '.join(causes)}; write to another file with -o, "
+        f"replace it with --fresh, or extend it with --reuse {path} "
+        "(in Python output=, fresh=True, reuse=)"
     )

@@ -480,7 +480,7 @@ def flag_attributes(codes):
 def _status_attributes(scene):
     table = status.table(scene)
     return {
-        "long_name": "has the point an answer, and if not, why",
+        "long_name": "does the point have an answer, and if not, why",
         "coverage_content_type": "qualityInformation",
         "units": "1",
         "symbol": "status",

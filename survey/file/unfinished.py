@@ -96,7 +96,7 @@ def drift(path, old, new, changed, workflow):
         causes.append(f"from another version of the code ({_code(old, new)})")
         ways_back.append("that version")
     if "scene_hash" in changed:
-        causes.append("from another z(u, p), or other f and g")
+        causes.append("from a different z(u, p), or different f and g")
         ways_back.append("those functions")
     changes = _differences(folder, workflow)
     if not causes and not changes:
@@ -107,8 +107,8 @@ def drift(path, old, new, changed, workflow):
             f"that workflow (survey run {shlex.quote(str(folder / 'workflow.toml'))} -o {path})"
         )
     return (
-        f"{folder} contains {done} {' and '.join(causes)}; go back to {' and '.join(ways_back)}, or write another file "
-        f"with -o, or start again with --fresh, which deletes {done}"
+        f"{folder} contains {done} {' and '.join(causes)}; go back to {' and '.join(ways_back)}, "
+        f"or write to another file with -o, or start again with --fresh, which deletes {done}"
     )
 
 

@@ -27,7 +27,7 @@ QUESTIONS = {
             "the same from the outputs of the `scene`",
             ("scene", "square", "axes", "fixed", "options"),
         ),
-        "serves": Function("are curves known of the scene? They are if it is missing", ("scene",)),
+        "serves": Function("are curves known for the scene? Yes if it is missing", ("scene",)),
         "refusal": Function(
             "why there are no curves on a map of these axes, in words; None if there are; `options` may be missing",
             ("axes", "scene", "options"),
@@ -90,9 +90,9 @@ QUESTIONS = {
             "why there are no cells on maps of the scene about a point {parameter: value}, in words; None if there are",
             ("scene", "point"),
         ),
-        "serves": Function("are cells known of the scene? They are if it is missing", ("scene",)),
+        "serves": Function("are cells known for the scene? Yes if it is missing", ("scene",)),
         "keywords": Function(
-            "what `find` is told besides of this scene, {name: value}", ("scene",)
+            "further arguments of `find` for this scene, {name: value}", ("scene",)
         ),
         "Side": Value(
             "low, high, depth, log: a side of a rectangle and how often it may be halved",

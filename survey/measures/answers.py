@@ -61,8 +61,8 @@ class Ladder:
         return len(self.rungs) - 1
 
     def climb(self, rung, results, answers, solve, assess):
-        """Solve the points that missed what was asked again, on higher rungs; the better results
-        are kept.
+        """Solve again, on higher rungs, the points that missed the requested accuracy; the better
+        results are kept.
 
         `rung` (N), `results` (N, columns) and `answers` are changed. `solve(points, rung)` gives
         the results of points on their rungs, `assess(points, results)` their Answers.

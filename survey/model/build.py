@@ -165,7 +165,7 @@ def expanded(values, ulps):
 
 
 def _away(values, longer):
-    """The side along which what is not known lies at one end."""
+    """The side along which the unknown values lie at one end."""
     known = np.isfinite(values).all(axis=0)
     spread = [np.ptp(known.mean(axis=1 - side)) for side in range(2)]
     return longer if spread[0] == spread[1] else int(spread[1] > spread[0])

@@ -39,8 +39,8 @@ def of(workflow, names, fixed):
     maker = {"hill": _hill, "danby": _danby, "floquet": _floquet}.get(workflow.scene.FAMILY)
     if maker is None or (maker is _floquet and not isinstance(workflow.scene, FunctionScene)):
         raise BadInput(
-            f"model: the scene {workflow.name} is not answered by series; choose satellite, mathieu, "
-            "libration_elliptic, or a Hill equation or a linear periodic system of your own"
+            f"model: no series are available for the scene {workflow.name}; choose satellite, "
+            "mathieu, libration_elliptic, or a Hill equation or a linear periodic system of your own"
         )
     return (_damped if getattr(workflow.scene, "DAMPED", False) else maker)(workflow, names, fixed)
 
@@ -132,8 +132,8 @@ def _floquet(workflow, names, fixed):
     number = n // 2 if paired else n
     if n > dense.LARGEST or (paired and (n % 2 or number > 2)):
         raise BadInput(
-            f"model: {n} states of the structure {scene.structure!r} are not decided from series; at most "
-            f"{4 if paired else dense.LARGEST} are"
+            f"model: series cannot decide a system of {n} states with the structure "
+            f"{scene.structure!r}; they can for at most {4 if paired else dense.LARGEST} states"
         )
     columns = [p.name for p in scene.PARAMETERS]
     system, others = scene._system, tuple(float(fixed.get(name, 0.0)) for name in columns)

@@ -59,7 +59,7 @@ def matching(ds, workflow):
     found = of(ds)
     if found is None:
         raise BadInput(
-            "--proof: nothing is proved in this file; name the OUT.nc that survey prove wrote"
+            "--proof: this file contains no proof; name the OUT.nc that survey prove wrote"
         )
     options = ", ".join(f"{key}={value}" for key, value in workflow.request.options.items())
     same = ds.attrs["scene"] == workflow.name and ds.attrs.get("options", "") == options

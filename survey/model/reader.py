@@ -3,7 +3,7 @@ may be copied.
 
     model = Model("map.model")
     model(k=0.5, rho=[1.0, 1.2])     # an xarray Dataset: values, error bars, gradients, verdicts
-    model.at(k, rho)                 # the same of points as a dict of numpy arrays, without xarray
+    model.at(k, rho)                 # the same for points: a dict of numpy arrays, without xarray
 
 The file is a zip of `model.json` and `series.f64`: documented in workflows/docs/model.md. On a
 panel a function is sum_jk c_jk T_j(X) T_k(Y) within its bar, X and Y from -1 to 1 across the panel.
@@ -41,7 +41,7 @@ DERIVED = {"hill": ("discriminant", "exponent"), "trace": ("exponent",), "danby"
 
 
 class OutOfDomain(ValueError):
-    """A place outside the rectangle on which the model is known."""
+    """A point outside the rectangle on which the model is known."""
 
 
 class Model:

@@ -142,10 +142,10 @@ class Symbol:
         return self if self >= 0 else -self
 
     def __bool__(self):
-        raise Unsupported("it asks whether a number that is not known is zero")
+        raise Unsupported("it tests whether an unknown number is zero")
 
     def __eq__(self, other):
-        raise Unsupported("it asks whether numbers that are not known are equal")
+        raise Unsupported("it tests whether unknown numbers are equal")
 
     __hash__ = None
 

@@ -156,7 +156,7 @@ def _order(equation, sides, allowed):
         found = equation.factors(equation.steps(real, order), order, middle)
         if all(float(f.rad()) < 1e-3 * own for f, own in zip(found, allowed, strict=True)):
             return order
-    raise checker.Failed("the series of the steps leave out too much")
+    raise checker.Failed("the truncation error of the steps' series is too large")
 
 
 def panels(equation, sides, depth, tolerance, smallest=None):

@@ -36,8 +36,8 @@ STATUS = gyrostat.STATUS | {
     "PERIOD promises",
     "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is not a "
     "saddle, or there are more than 16 equilibria: the numbers of cycles, and perhaps of equilibria, are unknown",
-    "neutral_ends": "f or g is identically 0, or mean(f), mean(g), K and L all vanish within rounding: whether the "
-    "ends attract is not decided, and so no fate is",
+    "neutral_ends": "f or g is identically 0, or mean(f), mean(g), K and L all vanish within rounding: it "
+    "is not decided whether the ends attract, so no fate is decided either",
 }
 TRIED = (0.25, -1.5, 2.5)  # angles at which f and g are tried as Python
 

@@ -30,7 +30,8 @@ def find(workflow, path, fresh=False):
         found, why = _common(workflow, ds, Path(path))
     if why and not (fresh or finished.lost(ds.attrs)) and _is_output(workflow, path):
         remedy = (
-            "write another file with -o, or replace it with --fresh (in Python output=, fresh=True)"
+            "write to another file with -o, or replace it with --fresh "
+            "(in Python output=, fresh=True)"
         )
         raise BadInput(f"{path}: nothing can be taken from this file: {why}; {remedy}")
     if why:
@@ -54,7 +55,7 @@ def _unlike(workflow, attributes):
         if data.get("scene") != workflow.name:
             return f"another scene ({shown(data.get('scene'))}, not {shown(workflow.name)})"
         if attributes.get("scene_hash") != getattr(workflow.scene, "HASH", None):
-            return "another text of your own scene"
+            return "a different text of your own scene"
         old = _checked(workflow, attributes)
     except (KeyError, TypeError, ValueError) as error:  # BadInput is a ValueError
         return f"its workflow cannot be read ({short(error, 150)})"
@@ -64,7 +65,7 @@ def _unlike(workflow, attributes):
             return f"another {key} ({shown(before[key])}, not {shown(now[key])})"
     more = sorted(workflow.request.variables - old.request.variables)
     if more:
-        return f"it has no {', '.join(more)}, and all values of a point are found together"
+        return f"it has no {', '.join(more)}, and all values of a point are computed together"
     if attributes.get("fingerprint") != of_output(before):
         return "it is from another version of the code"
     return ""
@@ -90,12 +91,12 @@ def _common(workflow, ds, path):
     """
     old, new = _checked(workflow, ds.attrs).grid, workflow.grid
     if old.parameters.keys() != new.parameters.keys():
-        return None, "it has other parameters"
+        return None, "its parameters are different"
     where, fixed = {}, {}
     for name, (dims, values) in new.parameters.items():
         place = _places(np.atleast_1d(old.parameters[name][1]), np.atleast_1d(values))
         if name in new.uncut and not np.array_equal(place, np.arange(old.sizes.get(name, 1))):
-            return None, f"one solution serves the whole axis {name}, and that differs"
+            return None, f"one solution serves the whole axis {name}, and that axis differs"
         if (place < 0).all():
             return None, f"it has no value of {name} that is needed here"
         if dims:

@@ -58,7 +58,7 @@ def _check_closed(measure, scene, name, table, axes, given, options):
             filter(None, (measure.refusal(stack, scene, options) for stack in stacks)), None
         )
     if refusal:
-        raise BadInput(f"boundaries: of {name} {refusal}; change that, or leave the table out")
+        raise BadInput(f"boundaries: {name}: {refusal}; change that, or leave the table out")
     if table.axis is not None:
         raise BadInput(
             f"boundaries.axis: the curves of {name} are found without rows, and no axis is searched; leave it out"
@@ -107,7 +107,8 @@ def _check_undamped(scene, name, table):
     """Raise BadInput where Hill's equation is damped."""
     if getattr(scene, "DAMPED", False):
         raise BadInput(
-            f"{table}: it is known of undamped equations alone, not of {name}; leave the table out"
+            f"{table}: available only for undamped equations, and {name} is damped; "
+            "leave the table out"
         )
 
 
@@ -154,7 +155,7 @@ def _check_cells(measure, scene, name, given):
     }
     refusal = measure.refusal(scene, point)
     if refusal:
-        raise BadInput(f"refine: of {name} {refusal}; leave the table out")
+        raise BadInput(f"refine: {name}: {refusal}; leave the table out")
 
 
 def _check_width_table(widths, axes):
@@ -191,6 +192,6 @@ def _fraction(widths, key, values, axis):
     )
     if fraction < MIN_FRACTION:
         raise BadInput(
-            f"{where} = {width:g}: such cells are too many; use at least a millionth of the axis"
+            f"{where} = {width:g}: there would be too many cells; use at least a millionth of the axis"
         )
     return float(fraction), log

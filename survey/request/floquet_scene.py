@@ -18,7 +18,7 @@ TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is
 NODES = 1500  # that a map asks for, roughly
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
 STATUS = {
-    "invalid_parameters": "outside the domain, or A or T is not finite there, or A has not the stated structure",
+    "invalid_parameters": "outside the domain, or A or T is not finite there, or A does not have the stated structure",
     "no_convergence": "a branch of the code changes between BREAKS: name every time at which A jumps or has a kink",
 }
 
@@ -257,7 +257,7 @@ class FloquetScene(TracedScene):
         for own, bar, other in zip(recorded, bars, plain, strict=True):
             if other is not None and not (abs(own - np.array(other)) <= SAME * size + bar).all():
                 self._refuse(
-                    f"A(t, p, out) gives other values when its operations are recorded, at {self._where(point)}",
+                    f"A(t, p, out) gives different values when its operations are recorded, at {self._where(point)}",
                     "use + - * / ** and functions of math or numpy alone",
                 )
         self._check_structure(np.concatenate(recorded), size, point)
@@ -373,8 +373,8 @@ class FloquetScene(TracedScene):
 
 
 def _effort(points):
-    """{"series": functions of time in A, "steps": in a period}: the means over some Points, by
-    which a point's cost goes."""
+    """{"series": functions of time in A, "steps": in a period}: the means over some Points, on
+    which a point's cost depends."""
     reach, valid = monodromy.method_of("auto").floquet_reach(1e-10), np.flatnonzero(points.valid)
     if not valid.size:
         return {}

@@ -37,7 +37,7 @@ SAME = 8 * user_equation.SLACK
 LANES = 8
 # Meaning of two of the common codes here.
 STATUS = {
-    "invalid_parameters": "outside the domain, or z or T is not finite there, or z is not even, as it is said to be",
+    "invalid_parameters": "outside the domain, or z or T is not finite there, or z is declared even but is not",
     "no_convergence": "z is not smooth between its breaks: name every position where it jumps or has a kink",
 }
 
@@ -77,7 +77,10 @@ class HillScene(FunctionScene):
         checked = (
             f"every T/{self._divisor * user_equation.CHECKED} at the ends and middles of the axes"
         )
-        unseen = f"z is known by {self._sampling}, and {checked}; a spike narrower at half its height may go unseen"
+        unseen = (
+            f"z is known from {self._sampling}, and {checked}; a spike narrower at half its height "
+            "may go unseen"
+        )
         obstacle = self._obstacle
         digits = (
             f"none: {obstacle}"

@@ -22,7 +22,7 @@ LARGEST = 16  # states
 NEARBY = 0.01  # relative to the start: where symmetries are tried
 ELSEWHERE = "give a better start, or another point"
 BRANCH = Parameter(
-    "branch", "number of the orbit among those of the point, by the mean square of its states; from the last if < 0",
+    "branch", "number of the orbit at the point, by the mean square of its states; counted from the last if < 0",
     "i", default=1.0, minimum=-99.0, maximum=99.0, excluded=(0.0,), uncut=True,
     whole=True,
 )  # fmt: skip
@@ -207,7 +207,7 @@ class OrbitScene(TracedScene):
                 if x[k] != 0.0:
                     self._refuse(
                         f"START has {self.states[k]} = {x[k]:g} at {here}",
-                        f"states of {key} begin at 0",
+                        f"the states of {key} must begin at 0",
                     )
         spread = np.random.default_rng(1).standard_normal((TRIED.size, n))
         states = x + NEARBY * spread * (abs(x).max() + 1e-300)
@@ -284,7 +284,7 @@ class OrbitScene(TracedScene):
         plain = np.array([self._at(time, x, point) for time in t])
         if not (abs(plain - f) <= SAME * size).all():
             self._refuse(
-                f"f(t, x, p, out) gives other values when its operations are recorded, at {here}",
+                f"f(t, x, p, out) gives different values when its operations are recorded, at {here}",
                 "use + - * / ** and functions of math or numpy alone",
             )
         if self.period is not None:

@@ -40,7 +40,7 @@ def workflow(scene):
         "[axes]",
     ]
     lines += [
-        '# in this order the dimensions; { start, stop, num, spacing = "log" }, { values = [...] }, or a number'
+        '# the dimensions, in this order: { start, stop, num, spacing = "log" }, { values = [...] }, or a number'
     ]
     for p, number in zip(axes, NUMBERS, strict=False):
         low, high = given.get(p.name) or ends(p)

@@ -53,7 +53,7 @@ before, or allows it (see `trust.py`). Changes in what it imports are not notice
 resumed. z is continued with period T. [boundaries] and [refine] assume that z is analytic in the
 parameters.
 
-z is known by samples. Every point has one at least every T/128 (T/256 if EVEN), stored as
+z is known from samples. Every point has one at least every T/128 (T/256 if EVEN), stored as
 `z_resolved_width`; at the ends and middles of the axes there is one every T/16384 (T/32768), and a
 spike that only these show is refused. Features narrower than both may go unseen; near BREAKS the
 samples are as dense as necessary. A z without BREAKS that its code shows to have no spikes (see
@@ -342,7 +342,8 @@ def orbit(
     Parameters
     ----------
     f : function of t, x, p and out, plain Python or numba's: fills out, n numbers, with x'; x are the n states, p the
-        float64 array of the parameters, in order. It must be analytic in t and x: no abs, maximum or if of these.
+        float64 array of the parameters, in order. It must be analytic in t and x: no abs, maximum
+        or if on these.
     states : names of the n states.
     period : T, a number or a function of p; None: f does not depend on t, and T is found.
     parameters : their names, or `survey.scene.Parameter`s.
@@ -602,7 +603,7 @@ def _check_names(name: str, module: ModuleType, form: str) -> None:
             key, [other for other in others if other.isupper()], cutoff=ALIKE
         )
         if slips:
-            raise BadInput(f"{name}: {slips[0]} is not read; write {key}")
+            raise BadInput(f"{name}: unknown name {slips[0]}; did you mean {key}?")
         if key in FORMS[form]:
             none = (
                 ", or None if f does not depend on t" if (form, key) == ("orbit", "PERIOD") else ""
@@ -617,7 +618,9 @@ def _function(
     what: str,
     refuse: Callable[[str], NoReturn],
 ) -> None:
-    """Refuse what is no function of these arguments, or has one of these names in another place."""
+    """Refuse a value that is not a function of these arguments, or has one of these names in
+    another position.
+    """
     call = f"{letter}({', '.join(arguments)})"
     count = {2: "two", 3: "three", 4: "four"}[len(arguments)]
     if not callable(function) or _arguments(function) != len(arguments):

@@ -110,7 +110,7 @@ def _as_toml(data):
 
 
 def _why(path, error):
-    """Why a file is no workflow: what it is instead, where its name tells."""
+    """Why a file is not a workflow: what it is instead, where its name tells."""
     if path.suffix == ".nc":
         return "a netCDF file holds results: survey info, plot and verify read it"
     if (

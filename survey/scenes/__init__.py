@@ -52,7 +52,7 @@ CONTRACT = {
         "survey.scene.Option: switches with a few values each", tuple, needed=True, each=Option
     ),
     "OUTPUTS": Value(
-        "survey.scene.Output: what `solve` gives, but for `status`", tuple, needed=True, each=Output
+        "survey.scene.Output: what `solve` gives, except `status`", tuple, needed=True, each=Output
     ),
     "FAMILY": Value(
         "the methods whose SERVES names this family can solve the scene", str, needed=True

@@ -25,7 +25,7 @@ have the mean of both limits. [boundaries] gives these lines, the separatrices a
 precessions on maps of two of l, alpha, beta, or of two parameters of initial states.
 
 Known: T, precession and reduced spin are symmetric in p_psi <-> p_phi; both wells have the same T;
-without field (epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at
+without a field (epsilon = 0, or A = C) the advances are multiples of pi; T = 2 pi / omega_n at
 regular precessions; near a separatrix T grows as the logarithm of the distance.
 
 Source: Bekov, Shinibaev et al., on quadratures of Kobb's type, checked and corrected in `brun.md`
@@ -66,8 +66,8 @@ REFERENCES = (
     "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",
 )
 STATUS = {
-    "invalid_parameters": "the parameters lie outside the domain: C is at most 2 A, at theta0 = 0 p_psi is p_phi, and "
-    "more in `survey scenes brun`",
+    "invalid_parameters": "the parameters lie outside the domain: C must be at most 2 A, and p_psi "
+    "must equal p_phi at theta0 = 0; all conditions: `survey scenes brun`",
     "no_motion": "no motion has these integrals: l lies below the least effective potential",
     "overflow": "a value leaves the range of binary64: theta0 is too near to 0 or pi for these momenta",
 }
@@ -164,7 +164,8 @@ OUTPUTS = (
            applies="where there is one that float64 tells from a stable one beside it", on_request=True),
     Output("wells", "number of wells of motion at these integrals", integer=True, applies="off separatrices"),
     Output("verdict", "what the motion is", flags=_VERDICTS, when=_STATE),
-    Output("verdict", "what the motion is, the last of these that a well holds", flags=_VERDICTS, when=_SCALED),
+    Output("verdict", "what the motion is; with several wells, the last of these kinds that one of them holds",
+           flags=_VERDICTS, when=_SCALED),
 )  # fmt: skip
 
 

@@ -18,13 +18,14 @@ omega2, omega3 (w) and gamma1, gamma2, gamma3 (nu, of which only the direction c
 `axis`. For `critical` sigma and p_psi, the value of F3: the motions on which H + sigma F2 / 2 is
 stationary among all with this F3; option `sense` is the sign of their rate of turn.
 
-Known. The rotation about the middle axis is unstable (but, perhaps, at Omega^2 = epsilon, where a rotation about any
-vertical axis is permanent). With epsilon > 0 that about the axis of the least moment is stable, and that about the
-axis of the largest moment, A, if and only if |Omega| > sqrt(epsilon) sin(a + b), sin^2 a = B/A, sin^2 b = C/A; with
-epsilon < 0 the same holds with the least and the largest moment exchanged (7). Stable means Lyapunov's stability of the
-full motion: a combination of H, F2 and F3 has a strict extremum. Critical motions turn nu as a free body turns its
-angular momentum, w = turn_rate (1 + sigma I)^-1 nu (9); unstable ones, and unstable rotations, carry separatrices: the
-motions with the same H, F2 and F3.
+Known. The rotation about the middle axis is unstable (except, perhaps, at Omega^2 = epsilon, where
+a rotation about any vertical axis is permanent). With epsilon > 0 that about the axis of the least
+moment is stable, and that about the axis of the largest moment, A, if and only if |Omega| >
+sqrt(epsilon) sin(a + b), sin^2 a = B/A, sin^2 b = C/A; with epsilon < 0 the same holds with the
+least and the largest moment exchanged (7). Stable means Lyapunov's stability of the full motion: a
+combination of H, F2 and F3 has a strict extremum. Critical motions turn nu as a free body turns its
+angular momentum, w = turn_rate (1 + sigma I)^-1 nu (9); unstable ones, and unstable rotations,
+carry separatrices: the motions with the same H, F2 and F3.
 
 Source: V. Brun; A. Clebsch, Math. Ann. 3 (1871) 238; Bekov, Shinibaev et al., whose integrals (7)
 are F1 to F3 as corrected in `brun.md`. Stability and critical motions: derived in
@@ -59,8 +60,8 @@ REFERENCES = (
     "Bekov, Shinibaev et al.: quadratures of Kobb's type, a body in a Newtonian field (errata: survey/scenes/brun.md)",
 )
 STATUS = {
-    "invalid_parameters": "the parameters lie outside the domain: no moment of inertia is larger than the sum of the "
-    "others, and gamma is not 0",
+    "invalid_parameters": "the parameters lie outside the domain: no moment of inertia may exceed "
+    "the sum of the others, and gamma must not be 0",
     "no_motion": "there is no such motion: epsilon (1 + sigma A)(1 + sigma B)(1 + sigma C) is not positive, or p_psi "
     "over turn_rate lies outside the range of nu.I (1 + sigma I)^-1 nu",
 }
@@ -96,11 +97,11 @@ STARTER = {"B": (0.01, 0.99), "C": (0.01, 0.99), "A": 1.0, "Omega": 0.8}
 OUTPUTS = (
     Output("verdict", "is the rotation stable?", flags=_VERDICT, when=_ROTATION),
     Output("verdict", "is the critical motion stable?", flags=_VERDICT, when=_CRITICAL),
-    Output("growth", "growth rate beside the rotation, the largest", r"\Lambda", when=_ROTATION),
+    Output("growth", "largest growth rate beside the rotation", r"\Lambda", when=_ROTATION),
     *(Output(f"frequency_{which}", f"frequency of the {which} mode beside the rotation, 0 for real exponents",
              rf"\omega_\mathrm{{{which}}}", when=_ROTATION) for which in ("slow", "fast")),
     Output("critical_rate", "rate above which the rotation is stable", r"\Omega_*", when=_ROTATION, applies=_HAS_RATE),
-    Output("place", "which of the three moments that of the axis is", when=_ROTATION,
+    Output("place", "which of the three moments belongs to the axis", when=_ROTATION,
            flags={"shared": -2, "least": clebsch.LEAST, "middle": clebsch.MIDDLE, "largest": clebsch.LARGEST}, fill=-2),
     *(Output(name, words, symbol) for name, (words, symbol) in _KEPT.items() if name != "F3"),
     *(Output("F3", "integral F3, the momentum of the precession angle", "F_3", when=when)

@@ -5,7 +5,7 @@ the cylinder.
     g = -d cos phi sin phi - c23 cos 2phi + s2 cos phi - s3 sin phi                              (57)
 
 Model: the six equations of `gyrostat_body`, on a set that is invariant under conditions necessary
-and sufficient for it. Not for motions beside the set, which may leave it: `gyrostat_body` tells.
+and sufficient for it. Not for motions beside the set, which may leave it: see `gyrostat_body`.
 
 Parameters, in order: b12, b31 (components of B over A11), d = c22 - c33 and c23 (of C), s2, s3 (of
 s), up to 1e12; phi0 (rad) and w0, the initial angle and velocity. In (57) phi is the independent
@@ -26,26 +26,26 @@ of steps; the cycles are those that a lattice of return maps shows, with dips fo
 folds. b = 0 and g = 0 are taken exactly, K = 0 and L = 0 within the rounding of the parameters;
 where K is larger than that, but the return maps do not show their change beside rounding, verdicts
 are -1. `multiplier` and cycles carry error bars; verdicts near a stable separatrix are -1 (status
-`separatrix`), also those of starts at rest beside a saddle: `equilibrium_start` is given to exact
-equilibria only, and of binary64 angles none but phi0 = 0, where s2 = c23, is one (if g is not 0
-throughout).
+`separatrix`), also those of starts at rest beside a saddle: `equilibrium_start` is given only to
+exact equilibria, and phi0 = 0, where s2 = c23, is the only binary64 angle that is one (if g is not
+0 throughout).
 
-Of a map of a thousand or more initial states of one system the curves between basins are found
+On a map of a thousand or more initial states of one system the curves between basins are found
 once: stable branches of saddles, those by which motions enter a node fastest, unstable cycles. A
-start takes the fate of the region it lies in, which is that of two starts in it; what lies nearer
-to a curve than its error bar, or between windings too close to be told apart, is followed by
-itself. Fates are the same, but that some which could not be decided are.
+start takes the fate of the region it lies in, which is that of two starts in it; a start nearer
+to a curve than its error bar, or between windings too close to be told apart, is followed on its
+own. Fates are the same, except that some are decided which could not be otherwise.
 
 A motion is one curve through (phi0, w0), in time. As a solution w(phi) of (57) it has, where w0 = 0
 and g(phi0) != 0, two branches, w ~ +-sqrt(2 g (phi - phi0)), both on the side of phi0 to which g
 points. An Abel solution is the branch that the motion takes at t > 0, on which w has the sign of
-g(phi0); `branch = "before"` takes the other, by which the motion came: there w has the other sign
+g(phi0); `branch = "before"` takes the other, along which the motion came: there w has the other sign
 and t < 0. Where w0 != 0 there is one branch, and the option changes nothing.
 
 With `saddle` instead of w0 the solution lies on a separatrix, exactly: on a branch of the saddle of
 that number (by angle in [0, 2 pi)), one that leaves it (`separatrix = "unstable"`) or runs into it
-("stable"), on the `side` where phi0 is; of the saddle's copies, one a turn, that next to phi0. t =
-0 where the branch, followed from the saddle, first passes phi0, before it turns; `w_start` is w
+("stable"), on the `side` where phi0 is; of the saddle's copies, one per turn, the one next to phi0.
+t = 0 where the branch, followed from the saddle, first passes phi0, before it turns; `w_start` is w
 there. Where there is no such saddle, or the branch turns before phi0, the status is
 `invalid_parameters`. For b = 0 these are closed forms at any t, also into a second saddle of the
 same energy; so are motions whose phi0 = 0 and w0 give exactly the energy of a saddle (at no other
@@ -135,10 +135,10 @@ PARAMETERS = (
     Parameter("phi0", "initial angle of rotation", r"\varphi_0", units="rad", default=0.0, when=_STARTS,
               **_FAR),
     Parameter("w0", "initial angular velocity", "w_0", default=0.0, when=_STARTS, **_LARGE),
-    Parameter("saddle", "number of the saddle on a separatrix of which the solution lies, by angle in [0, 2 pi)", "n_S",
+    Parameter("saddle", "number, by angle in [0, 2 pi), of the saddle on whose separatrix the solution lies", "n_S",
               instead_of="w0", minimum=1.0, maximum=4.0, when=_STARTS),
     Parameter("t", "time from the initial state (negative: before it)", "t", when=_TIME, uncut=True, **_LARGE),
-    Parameter("phi", "angle of rotation at which w and t are asked, unwrapped", r"\varphi", units="rad", when=_ABEL,
+    Parameter("phi", "angle of rotation at which w and t are requested, unwrapped", r"\varphi", units="rad", when=_ABEL,
               uncut=True, **_FAR),
 )  # fmt: skip
 OPTIONS = (
@@ -155,9 +155,9 @@ STATUS = {
     "equilibrium": "the solution runs into an equilibrium, in infinite time, before it reaches phi",
     "separatrix": "the error bar leaves it open on which side of a separatrix the solution passes",
     "no_closed_form": "no closed form applies (they need b = 0, g = 0 or (61)): try another method",
-    "too_many_cycles": "there are more cycles than the file has room for: the first are given",
-    "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is no "
-    "saddle: the numbers of cycles are unknown; K, L, the stratum, the ends and the equilibria are given",
+    "too_many_cycles": "there are more cycles than the file has room for: only the first are given",
+    "degenerate_equilibrium": "within rounding g = g' = 0 at an angle, or f = g = 0 at an equilibrium that is "
+    "not a saddle: the numbers of cycles are unknown; K, L, the stratum, the ends and the equilibria are given",
 }
 _FATES = {
     "undecided": -1, "focus_or_node": 0, "saddle": 1, "rotation_plus": 2, "rotation_minus": 3, "libration": 4,
@@ -218,14 +218,14 @@ OUTPUTS = (
     Output("end_plus", "does w -> +inf attract?", flags=_ENDS, when=_PORTRAIT),
     Output("end_minus", "does w -> -inf attract?", flags=_ENDS, when=_PORTRAIT),
     Output("equilibria", "number of equilibria on the circle", integer=True, when=_PORTRAIT,
-           applies="but in stratum I0, where every angle is one"),
-    Output("saddles", "number of saddles", integer=True, when=_PORTRAIT, applies="but in stratum I0"),
+           applies="except in stratum I0, where every angle is an equilibrium"),
+    Output("saddles", "number of saddles", integer=True, when=_PORTRAIT, applies="except in stratum I0"),
     Output("rotations_plus", "number of isolated rotation cycles with w > 0", integer=True, when=_PORTRAIT,
-           applies="but beside a degenerate equilibrium or a Hopf point"),
+           applies="except beside a degenerate equilibrium or a Hopf point"),
     Output("rotations_minus", "number of isolated rotation cycles with w < 0", integer=True, when=_PORTRAIT,
-           applies="but beside a degenerate equilibrium or a Hopf point"),
+           applies="except beside a degenerate equilibrium or a Hopf point"),
     Output("librations", "number of isolated libration cycles", integer=True, when=_PORTRAIT,
-           applies="but beside a degenerate equilibrium or a Hopf point"),
+           applies="except beside a degenerate equilibrium or a Hopf point"),
     Output("equilibrium_phi", "angle of the equilibrium, ascending in [0, 2 pi)", r"\varphi_e", units="rad",
            when=_PORTRAIT, dims=("equilibrium",), applies="for as many entries as there are equilibria"),
     Output("equilibrium_type", "type of the equilibrium", flags={name: i for i, name in enumerate(_TYPES)},
@@ -244,8 +244,8 @@ OUTPUTS = (
            dims=("cycle",), applies="to librations"),
     Output("branch_end", "where the branch of the saddle goes: the unstable ones for t -> +inf, the stable ones for "
            "t -> -inf", flags=_BRANCH_ENDS, when=_PORTRAIT, dims=("equilibrium", "branch"), fill=0,
-           applies="to saddles, of as many entries as there are equilibria; infinities are those of w"),
-    Output("branch_limit", "number of the equilibrium, or of the cycle, where the branch goes", integer=True, fill=0,
+           applies="to saddles, among as many entries as there are equilibria; infinity means w"),
+    Output("branch_limit", "number of the equilibrium, or of the cycle, to which the branch goes", integer=True, fill=0,
            when=_PORTRAIT, dims=("equilibrium", "branch"), applies="where the branch goes to one of the two"),
     Output("verdict", "is the portrait structurally stable?", when=_PORTRAIT,
            flags={"undecided": -1, "degenerate": 0, "structurally_stable": 1}),

@@ -20,21 +20,22 @@ other axes (8e-15 of its largest entry). Off the set there is no reduced flow, a
 `off_set`.
 
 A fate of the reduced flow can be seen in the whole body only if deviations from the set do not grow. `reduced_stable`
-tells whether the limit is stable on the set, `observable` whether it is beside it: by the eigenvalues of the linearised
-equations at an equilibrium, by the multipliers along a cycle. Those that belong to the integrals k (7) and |nu| (8)
-are trivial and taken out; two remain in case B, three in case A, where k varies along the set, four about the vertical.
+says whether the limit is stable on the set, `observable` whether it is beside it: by the
+eigenvalues of the linearised equations at an equilibrium, by the multipliers along a cycle. Those
+that belong to the integrals k (7) and |nu| (8) are trivial and taken out; two remain in case B,
+three in case A, where k varies along the set, four about the vertical.
 
 Model: all six equations; fates on the invariant set by its flow on the cylinder, and beside it by
-the linear equations of deviations, exact to first order. Not for finite deviations, but by the
-question `trajectory`.
+the linear equations of deviations, exact to first order. Not for finite deviations, except by
+the question `trajectory`.
 
 What is known. In case B the divergence of deviations is (B12, B31) S^-1 (-cos phi, sin phi), S =
 (A22 A23; A23 A33), whatever the other parameters. If S = a 1 it is -(A11 / a) f, f that of the
 scene `gyrostat`: where the reduced flow contracts, deviations from the set grow, so that no
 attracting equilibrium or cycle of a body with A22 = A33, A23 = 0 is observable. Where B12 = B31 = 0
-it is 0, and what does not grow does not decay either: such limits count as observable where the
-exponents are purely imaginary. A spin-up is not observable if axis 1 is that of the middle moment
-of inertia; else it is left open.
+it is 0, and deviations that do not grow do not decay either: such limits count as observable where
+the exponents are purely imaginary. A spin-up is not observable if axis 1 is that of the middle
+moment of inertia; else it is left open.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected
 in `gyrostat.md`; `gyrostat_body.md` beside this file derives the conditions again, and the
@@ -106,8 +107,8 @@ PARAMETERS = (
 )
 OPTIONS = (Option("question", _QUESTIONS, "what is asked of the body"),)
 STATUS = {
-    "invalid_parameters": "the parameters lie outside the domain: A is positive definite, gamma is not 0, and more in "
-    "`survey scenes gyrostat_body`",
+    "invalid_parameters": "the parameters lie outside the domain: A must be positive definite, and "
+    "gamma must not be 0; all conditions: `survey scenes gyrostat_body`",
     "off_set": "the body does not rotate about a fixed axis on the invariant set of the paper: residual says which "
     "conditions it misses, and by how much",
     **{
@@ -187,7 +188,7 @@ OUTPUTS = (
     *(Output(f"rest_exponent_{end}", f"{words} part of the exponents at rest: the two of k and |nu|, 0, are left out",
              when=_PORTRAIT, dims=("rest", "exponent"), applies="for as many entries as there are positions of rest")
       for end, words in (("re", "real"), ("im", "imaginary"))),
-    Output("rest_stable", "do deviations from the position of rest fall?", flags=_THREE, when=_PORTRAIT,
+    Output("rest_stable", "do deviations from the position of rest decay?", flags=_THREE, when=_PORTRAIT,
            dims=("rest",), applies="for as many entries as there are positions of rest"),
     *(_as_reduced(name, applies=f"{_HELD}; {_CYCLES[name].applies}") for name in (
         "equilibria", "rotations_plus", "rotations_minus", "librations", "equilibrium_phi", "equilibrium_type")),

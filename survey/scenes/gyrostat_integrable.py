@@ -14,24 +14,24 @@ conditions on the constants give closed forms. Without these conditions: `gyrost
 Parameters, in order: A11; B12, B31; theta0, the angle between the axis of rotation and the
 vertical; n, or instead of it k, the constant of (7), which with lambda1 gives n = k / cos theta0 -
 lambda1; C22, C33, C23; S2, S3; the quartic's a0, a1, a2, a3, a4; phi0; w0, where the energy leaves
-it free; t. At phi0 the constants give phi' but, where its square is given (a0 to a4), for its sign:
-option direction.
+it free; t. At phi0 the constants give phi', but only up to its sign where its square is given (a0
+to a4): option direction.
 
 Of the two solutions (61), `root` takes mu >= 1/2 (upper) or mu <= 1/2 (lower). It exists where A11
 C23 / (B12 B31) <= 1/4, and it demands C22 - C33 = C23 (B12^2 - B31^2) / (B12 B31) and S3 = S2 B31 /
 B12, which are outputs here.
 
 What is known. In the first two cases phi' depends on phi alone: with Delta^2 = n^2 - P^2 - Q^2 > 0
-the body turns with the period 2 pi A11 / Delta, else it comes to rest at an angle. In the others
-phi is an elliptic function of t with the invariants g2, g3; the discriminant of P4 is 256 G. G < 0:
-two real roots; G > 0: none (rotation) or four; G = 0 is a separatrix, or a degenerate rest. Where
-the constants make G exactly 0 (all a0 to a4, or the others at phi0 = 0) the solution is that on the
-separatrix, (66), exactly.
+the body turns with the period 2 pi A11 / Delta; otherwise it comes to rest at an angle. In the
+others phi is an elliptic function of t with the invariants g2, g3; the discriminant of P4 is 256 G.
+G < 0: two real roots; G > 0: none (rotation) or four; G = 0 is a separatrix, or a degenerate rest.
+Where the constants make G exactly 0 (all a0 to a4, or the others at phi0 = 0) the solution is that
+on the separatrix, (66), exactly.
 
 Source: M. E. Lesina, Ya. V. Zinovyeva, "The gyrostat with Barnett-London effect" (2004), corrected in `gyrostat.md`;
 `gyrostat_integrable.md` beside this file.
-The conditions under which a body moves so are checked by the scene `gyrostat_body`; the scene `gyrostat` takes the
-outputs reduced_NAME. All error bars cover the rounding of the reduction.
+The conditions under which a body moves like this are checked by the scene `gyrostat_body`; the
+scene `gyrostat` takes the outputs reduced_NAME. All error bars cover the rounding of the reduction.
 """
 
 import math

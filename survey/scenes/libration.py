@@ -7,7 +7,7 @@ is the normal form at L4 (or L5: the same numbers) to order 6 in the coordinates
 actions of the motions in the plane of the primaries, r3 that across it.
 
 Model: the spatial restricted three-body problem, six-dimensional, as a formal series in three
-actions. Not where its remainder counts (`workflows/libration_effective.py`), and no proof of
+actions. Not where its remainder counts (`workflows/libration_effective.py`), and not a proof of
 Lyapunov stability.
 
 Parameter: mu (mass of the smaller primary over that of both, 1e-100 <= mu <= 1/2), taken as the
@@ -30,7 +30,7 @@ Lie series to 90 digits; they are not derived symbolically. Formal stability is 
 
 The discriminant of (3.11) is positive and Arnold's bordered determinant not 0 for every mu < mu_R:
 by KAM theory most motions near L4 stay on tori, on every level of energy. In three degrees of
-freedom tori do not separate the others, so that this is no proof of Lyapunov stability. With the
+freedom tori do not separate the others, so this does not prove Lyapunov stability. With the
 option `order` = 8 or 10 the coefficients go further (Lie series), and `effective_radius` says
 within which distance motions stay for `periods` periods of the primaries.
 
@@ -63,7 +63,8 @@ OPTIONS = (
     ),
 )
 STATUS = {
-    "overflow": "the method lost every digit, so near a resonance or an end of the interval: try rational_double",
+    "overflow": "no digit is certain so close to a resonance or to an end of the interval: try the "
+    "method rational_double",
 }
 REFERENCES = (
     "A. P. Markeev (1978): Libration Points in Celestial Mechanics and Cosmodynamics (Nauka), chapter 8",
@@ -96,7 +97,7 @@ OUTPUTS = (
     Output("omega1", "greater frequency in the plane", r"\omega_1", applies=_BELOW),
     Output("omega2", "smaller frequency in the plane (of negative energy)", r"\omega_2", applies=_BELOW),
     Output("c", "coefficient of r1^i r2^j r3^k, monomial ijk, in the normal form", "c_{ijk}", dims=("monomial",),
-           applies=_BELOW + "; analytic in mu but for poles: not the whole normal form at a resonance"),
+           applies=_BELOW + "; analytic in mu except for poles: not the whole normal form at a resonance"),
     Output("a20", "coefficient of r1^2 in N where L = 0", "a_{20}", applies=_BELOW),
     Output("a11", "coefficient of r1 r2 in N where L = 0", "a_{11}", applies=_BELOW),
     Output("a02", "coefficient of r2^2 in N where L = 0", "a_{02}", applies=_BELOW),
@@ -116,7 +117,7 @@ OUTPUTS = (
            applies=_BELOW + "; on ray 1 not where a20 may be 0 (mu** = 0.0027834757...)"),
     Output("beta", "r3 / r2 on these rays", r"\beta_j", dims=("ray",), applies=_BELOW + ", as alpha"),
     Output("det_N", "determinant of N'', the second derivatives by the actions", r"\det N''",
-           applies=_BELOW + "; not 0 but at mu = 0.0215391147..."),
+           applies=_BELOW + "; not 0 except at mu = 0.0215391147..."),
     Output("det_bordered", "determinant of N'' bordered by the frequencies (Arnold)",
            r"\det N''_\omega",
            applies=_BELOW + "; never 0: by KAM theory most motions near L4 stay on tori on every level of energy, "

@@ -19,18 +19,19 @@ Outputs: a and b, the coefficients of the monodromy's characteristic polynomial 
 mu = 0.04699080701821065, where A and KC are tangent. On A and B two multipliers meet at -1, on KC
 two pairs of unlike Krein sign meet on the circle.
 
-`collision` says how stability is lost nearest. Where it is lost: 1 if a pair of multipliers is real
-and negative, 2 if the four are complex and off the circle, 0 (none of the two) if real positive
-ones alone are off it, or at mu = 0. At a stable point the multipliers exp(+-i theta1), exp(+-i
-theta2), theta1 < theta2, lose it by the meeting whose arc is the shorter: 2 (pi - theta2), at -1,
-or theta2 - theta1, between the pairs; pairs of like Krein sign (B D > 0) may meet without harm, so
-there it is 1. It is -1 where the error bars leave it open.
+`collision` says how stability is lost, or would be lost first. Where it is lost: 1 if a pair of
+multipliers is real and negative, 2 if the four are complex and off the circle, 0 (neither of the
+two) if only real positive ones are off it, or at mu = 0. At a stable point the multipliers exp(+-i
+theta1), exp(+-i theta2), theta1 < theta2, lose it by the meeting whose arc is the shorter: 2 (pi -
+theta2), at -1, or theta2 - theta1, between the pairs; pairs of like Krein sign (B D > 0) may meet
+without harm, so there it is 1. It is -1 where the error bars leave it open.
 
 What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1
 - mu) < 1 (Routh). mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are
 even in e, and the same at 1 - mu. As e -> 1 the multipliers grow like (1 - e)^-5 and more: values
-are given, as accurate as asked, to about 1 - e = 1e-13 (then `overflow`, as their bars leave the
-range of float32). For mu below about 1e-26, e > 0, all is too near Kepler's problem for a verdict.
+are given, as accurate as requested, to about 1 - e = 1e-13 (then `overflow`, as their bars leave
+the range of float32). For mu below about 1e-26, e > 0, all is too near Kepler's problem for a
+verdict.
 
 `auto` takes Taylor series in float64 and, where these leave the verdict or `collision` open or miss
 `rtol`, in double-double; the other methods are float64 alone.

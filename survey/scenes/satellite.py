@@ -10,9 +10,9 @@ obey Hill's equation, in u = omega_p t, omega_p^2 = 3 omega_0^2 |I - Iz| / I, wi
 
 Model: the body's rotation in three dimensions. Without spin the plane of the orbit is invariant,
 and linear motion across it is this equation, exactly. Not for spin, finite tilts, eccentric orbits,
-bodies without axis of symmetry.
+bodies without an axis of symmetry.
 
-Parameters, in order: k >= 0, where k = 1 has the outputs separatrix_* alone; or one_minus_k = 1 - k <= 1 where that is
+Parameters, in order: k >= 0, where k = 1 has only the outputs separatrix_*; or one_minus_k = 1 - k <= 1 where that is
 small (negative: rotations); or amplitude = asin k (rad), a libration's. rho, any sign: rho^2 = 1 / (3 |1 - alpha|), so
 rho >= 1/sqrt(3) is a body; rho < 0 is a retrograde rotation. Or, instead of rho and the body, inertia_ratio = alpha:
 0 a thin rod, 2 a disc.

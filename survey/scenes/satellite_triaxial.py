@@ -51,8 +51,8 @@ from survey.scene import Option, Output, Parameter, Trajectory, named
 TITLE = "Out-of-plane stability of planar motions of a satellite with three unequal moments"
 FAMILY = "floquet"
 STATUS = {
-    "invalid_parameters": "the parameters lie outside the domain: A < B, that is, roll_ratio > yaw_ratio, and no "
-    "moment of inertia is larger than the sum of the others",
+    "invalid_parameters": "the parameters lie outside the domain: A must be less than B "
+    "(roll_ratio > yaw_ratio), and no moment of inertia may exceed the sum of the others",
 }
 AUDIT = ("dop853",)
 RATIOS = ("roll_ratio", "yaw_ratio", "k", "one_minus_k")

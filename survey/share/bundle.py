@@ -174,7 +174,7 @@ def _readme(name, ds, pictures):
         f"Computed by survey {said('version_survey')} with Python {said('version_python')}, {said('date_created')}. "
         "Every value has an error bar.", "",
         f"- `{name}`: the data, netCDF 4 (`xarray.open_dataset`), and its digest",
-        "- `workflow.toml`: what was asked", "- `requirements.txt`: the versions that answered",
+        "- `workflow.toml`: the workflow", "- `requirements.txt`: the versions that computed the data",
         *[f"- `{picture}`: a picture" for picture in pictures],
         f"- `{CRATE}`: this description for machines (RO-Crate 1.1), with the sha256 of each file", "",
         "Verify all of it: `survey verify FOLDER` (or the .zip). Compute the data again, to the same bits with the "
@@ -237,7 +237,7 @@ def _described(folder, files, ds, data, author, license_url):
 
 
 def _zipped(folder, files, file):
-    """Write the folder as a zip; the same survey gives the same bytes but for pictures."""
+    """Write the folder as a zip; the same survey gives the same bytes, except for pictures."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name in files:
             member = zipfile.ZipInfo(f"{folder.name}/{name}", (1980, 1, 1, 0, 0, 0))
@@ -293,7 +293,7 @@ def _extract(archive, folder, path):
 
 
 def complaints(folder):
-    """(sentences on what is wrong with the bundle, the path of its data); raises Damaged without a
+    """(sentences on the faults of the bundle, the path of its data); raises Damaged where it has no
     description.
     """
     folder, described = Path(folder), folder / CRATE

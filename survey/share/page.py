@@ -63,7 +63,7 @@ OTHER_EDGES = {  # by rule, in the order of `edgesOf` in engine.js
 STYLES = (("#000000", False), ("#000000", True), ("#707070", False))
 HINT = (
     "Point at the map for its values. Wheel, pinch or double click: zoom; drag: move. Keyboard: arrows, + and -, 0; "
-    "the cross is read."
+    "the values are those at the cross."
 )
 
 
@@ -254,7 +254,7 @@ def _of_points(ds, axes):
 
 
 def _separated(ds, axes):
-    """With a variable for each place of one more dimension: "period (well 2)"."""
+    """With a variable for each index of an extra dimension: "period (well 2)"."""
     more = {}
     for name, variable in ds.data_vars.items():
         others = [dim for dim in variable.dims if dim not in axes]

@@ -223,7 +223,7 @@ def clipped(shown, low, high):
 
 
 def _positive(shown):
-    """The ends of the positive values, but for 1 % at either end."""
+    """The ends of the positive values, except 1 % at either end."""
     values = shown.compressed()
     values = values[values > 0.0]
     return np.percentile(values, [1, 99]) if values.size else (0.0, 0.0)

@@ -118,7 +118,7 @@ def options_in_words(ds):
 
 
 def _is_default(fixed):
-    """Is it an orbit's number by which the last is meant, or the only one?"""
+    """Is it an orbit's number that means the last orbit, or the only one?"""
     return fixed.name == "branch" and float(fixed) < 0
 
 

@@ -86,7 +86,7 @@ def along(scene, options, name, ends, fixed):
 
 
 def plan(workflow, cost):
-    """({what is known beforehand: rows, bytes per edge}, estimated seconds on one thread).
+    """({rows, bytes per edge, if known beforehand}, estimated seconds on one thread).
 
     `cost` is the scene's estimate for a point, in seconds.
     """

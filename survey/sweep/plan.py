@@ -15,7 +15,7 @@ from survey.wording import counted
 START, PICTURE = 1.2, 1.0  # seconds of a process's start, and of drawing a picture
 WRITTEN = 5e7  # bytes a second
 LEARNT = "runs on this machine"
-GUESSED = "a usual machine; the next plan knows what this run took"
+GUESSED = "a typical machine; the next plan will use the time that this run takes"
 
 
 def estimates(workflow):

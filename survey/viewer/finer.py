@@ -39,7 +39,8 @@ def of_window(shown, view):
         sizes = np.floor(sizes * np.sqrt(SECONDS / seconds)).astype(int)
         if (sizes < LEAST).any():
             raise BadInput(
-                f"{sizes.prod():,} points take {SECONDS:g} s, too few to show more than the map does"
+                f"in {SECONDS:g} s only {sizes.prod():,} points can be solved, too few to show more "
+                "than the map does"
             )
         checked = _checked(shown, view, ends, sizes)
     return _solved(checked)

@@ -76,7 +76,7 @@ def test_what_belongs_to_the_parts_is_left_out_with_a_word(tmp_path, monkeypatch
         survey.run({"scene": "mathieu", "axes": axes, "boundaries": {}}, output=f"{name}.nc")
     with pytest.warns(
         UserWarning,
-        match=r"concat: what \[boundaries\] found belongs to the parts, and is left out",
+        match=r"concat: the results of \[boundaries\] belong to the parts, and are left out",
     ):
         joined = survey.concat(["low.nc", "high.nc"])
     assert "curve_count" not in joined and joined.sizes["a"] == 8
@@ -103,14 +103,14 @@ def test_what_does_not_fit_is_refused():
             survey.concat([one, *others])
 
     refused("two or more")
-    refused("have another scene: 'mathieu' and 'libration'", survey.evaluate("libration", mu=0.01))
-    refused("have another rtol", survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, rtol=1e-6))
+    refused("differ in scene: 'mathieu' and 'libration'", survey.evaluate("libration", mu=0.01))
+    refused("differ in rtol", survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, rtol=1e-6))
     refused(
         "only one of the surveys has",
         survey.evaluate("mathieu", a=[0.2, 1.5], q=0.5, variables=["verdict"]),
     )
     refused("these differ in a, q", survey.evaluate("mathieu", a=[0.3, 1.5], q=0.5))
-    refused("in none: they are of the same points", one)
+    refused("in none: they have the same points", one)
     other = survey.evaluate("mathieu", a=[1.5, 1.6], q=0.4)
     refused(
         "different values at common points, such as a = 1.5",

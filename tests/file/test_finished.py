@@ -52,7 +52,7 @@ def test_another_workflow_is_refused_and_nothing_is_lost(ran, small, monkeypatch
     with pytest.raises(BadInput) as refused:
         engine.run(workflow.read(small, [override]))
     assert str(refused.value) == (
-        f"small.nc is a finished survey of 24 points of another workflow ({told}); write another file with -o, "
+        f"small.nc is a finished survey of 24 points of another workflow ({told}); write to another file with -o, "
         "replace it with --fresh, or extend it with --reuse small.nc (in Python output=, fresh=True, reuse=)"
     )
     assert ran.read_bytes() == before and not ran.with_name("small.nc.lock").exists()
@@ -92,7 +92,7 @@ def test_files_of_other_programs_are_not_lost(small, tmp_path, monkeypatch):
     xr.Dataset({"x": ("t", np.arange(3.0))}).to_netcdf("small.nc")
     with pytest.raises(
         BadInput,
-        match=r"small\.nc: this netCDF file was not written by survey; write another with -o",
+        match=r"small\.nc: this netCDF file was not written by survey; write to another with -o",
     ):
         survey.run(small)
     assert list(xr.load_dataset("small.nc")) == ["x"]

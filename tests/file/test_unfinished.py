@@ -93,8 +93,8 @@ def test_drift_names_the_keys_and_the_ways_on(left, small):
     answer = refusal(small, "solver.rtol=1e-6")
     assert answer == (
         "small.nc.blocks contains 3 finished blocks from another workflow (solver.rtol 1e-09 -> 1e-06); go back to "
-        "that workflow (survey run small.nc.blocks/workflow.toml -o small.nc), or write another file with -o, or start "
-        "again with --fresh, which deletes 3 finished blocks"
+        "that workflow (survey run small.nc.blocks/workflow.toml -o small.nc), or write to another file with -o, or "
+        "start again with --fresh, which deletes 3 finished blocks"
     )
     answer = refusal(small, "axes.w0.num=7", "axes.t=1.5", "title='other'")
     assert "(axes.t {'start': 0.0, 'stop': 3.0, 'num': 4} -> 1.5, axes.w0.num 6 -> 7)" in answer

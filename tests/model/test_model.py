@@ -459,7 +459,7 @@ def test_the_same_map_has_the_same_bytes(folder):
             "brun",
             {"l": (0.0, 1.0), "alpha": (0.0, 1.0)},
             {"beta": 0.5},
-            "is not answered by series",
+            "no series are available for the scene",
         ),
         (
             "satellite_triaxial",

@@ -91,7 +91,7 @@ def test_a_strange_survey_whose_points_are_taken_over_runs_nothing(strange, monk
     own = workflow.check({"scene": "evil.py", "axes": axes}, output="new.nc")
     strange.file.write_text(text)
     held, told = earlier.find(own, strange.path)
-    assert held is None and "another text of your own scene" in told and not strange.ran
+    assert held is None and "a different text of your own scene" in told and not strange.ran
 
 
 def test_verify_checks_what_needs_no_scene_and_says_how_to_go_on(strange):

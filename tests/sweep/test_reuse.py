@@ -86,7 +86,7 @@ def test_it_is_told_why_nothing_is_taken(brun, override, why):
     assert held is None and re.search(why, told)
     over_it = workflow.read(brun, [override], "old.nc")
     with pytest.raises(
-        BadInput, match=f"{why}.*; write another file with -o, or replace it with --fresh"
+        BadInput, match=f"{why}.*; write to another file with -o, or replace it with --fresh"
     ):
         earlier.find(over_it, "old.nc")
     assert earlier.find(over_it, "old.nc", fresh=True) == (None, told)
@@ -150,7 +150,7 @@ def test_points_of_your_own_equation_are_taken_over_until_its_text_changes(tmp_p
     assert held.points == 4, told
     (tmp_path / "own.py").write_text(text.replace("sin(4", "sin(6"))
     held, told = earlier.find(workflow.check(given, output="new.nc"), "old.nc")
-    assert held is None and "another text of your own scene" in told
+    assert held is None and "a different text of your own scene" in told
 
 
 def test_a_trajectory_needs_the_same_times(ran, small, monkeypatch):

@@ -332,7 +332,9 @@ def test_proofs_and_orbits_have_none(workflow):
     scene = survey.orbit(
         f, states=("x", "v"), period=2 * math.pi, parameters=("a", "q", "c"), start=(0.0, 0.0)
     )
-    with pytest.raises(BadInput, match="periodic orbits, and surfaces are drawn of linear systems"):
+    with pytest.raises(
+        BadInput, match="periodic orbits, and surfaces are available only for linear systems"
+    ):
         check({"scene": scene, "axes": AXES, "boundaries": {"surfaces": True}})
 
 

@@ -5,10 +5,10 @@ import numpy as np
 from survey.failures.plane import Plane, few, logarithmic, plain, two_sided
 from survey.truth import brun
 
-ABOUT = """Beside a separatrix the period grows as a logarithm of the distance, and what rounds of the integrals do
-to it as its inverse; where the axis passes a pole closely, precession and spin turn by half a turn in no time;
-beside a regular precession two roots merge; in a tiny field all is a small difference. `auto` takes arithmetic-
-geometric means, and double-double where rtol is missed or a verdict is open."""
+ABOUT = """Beside a separatrix the period grows as a logarithm of the distance, and the effect on it of rounding in the
+integrals as its inverse; where the axis passes close to a pole, precession and spin turn by half a turn in no time;
+beside a regular precession two roots merge; in a tiny field every result is a small difference. `auto` takes
+arithmetic-geometric means, and double-double where rtol is missed or a verdict is open."""
 SOURCE = "Truth: trapezoidal sums in double-double; beside separatrices elliptic integrals to 120 digits."
 
 

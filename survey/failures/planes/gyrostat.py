@@ -11,9 +11,9 @@ from survey.truth import gyrostat_flow
 
 ABOUT = """Parameters, where not said otherwise: d = 1.1, c23 = 0.3, s2 = 0.5, s3 = -0.2. `auto` takes a closed form
 where one applies and its bar meets rtol: with b = 0 its cost is free of t, but next to a separatrix two roots of
-w^2 merge, and it loses its digits first; (61) holds for parameters to their rounding only. Else `taylor` is asked,
-and taken if its bar is no wider. Near enough to a stable separatrix or a turning point every method in binary64
-fails, as the solutions themselves part; there `auto` solves in double-double."""
+w^2 merge, and it loses its digits first; (61) holds for parameters to their rounding only. Otherwise
+`taylor` solves it, and is taken if its bar is no wider. Close enough to a stable separatrix or a turning point every
+method in binary64 fails, as the solutions themselves separate; there `auto` solves in double-double."""
 SOURCE = (
     "Truth: Taylor series of order 26 in double-double, solved twice where a bar seems to miss it."
 )

@@ -6,7 +6,7 @@ from survey.failures.plane import Plane, few, logarithmic, named, two_sided
 from survey.truth.libration import truth
 
 ABOUT = """The coefficients have poles at mu1 (omega1 = 2 omega2), mu2 (omega1 = 3 omega2) and mu_R, where sums of
-Lie series lose digits that the closed forms keep; the verdict hangs on a zero at mu_c, mu_d and mu** (a20 = 0).
+Lie series lose digits that the closed forms keep; the verdict depends on a zero at mu_c, mu_d and mu** (a20 = 0).
 `auto` takes closed forms in float64, and in double-double where rtol is missed or a verdict is left open."""
 SOURCE = (
     "Truth: 60 digits of the closed forms (checked against Lie series of 90 digits in the tests)."

@@ -6,8 +6,8 @@ from survey.failures.plane import Plane, few, logarithmic, plain
 from survey.request.user_scene import hill
 from survey.truth import own
 
-ABOUT = """z is known by its samples alone: a spike that is narrower than the samples are dense (T/128) may only be
-refused, or found where its place is named as a break; a break beside an end leaves a piece of no length; a stiff z
+ABOUT = """z is known only from its samples: a spike that is narrower than their spacing (T/128) can only be refused, or
+found where its position is named as a break; a break beside an end leaves a piece of no length; a stiff z
 takes thousands of steps. `auto` takes 16th-order Taylor steps, and double-double (z run once more with mpmath's
 functions) where float64 leaves a verdict open."""
 

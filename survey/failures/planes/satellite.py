@@ -9,7 +9,7 @@ from survey.failures.plane import Plane, few, logarithmic, plain, two_sided
 from survey.truth.hill import satellite
 
 ABOUT = """The discriminant is the trace of a product of matrices whose entries grow with rho and with the period,
-so that digits go where rho is large, and beside the separatrix (k = 1) with it; in a tongue the verdict hangs on a
+so that digits are lost where rho is large, and beside the separatrix (k = 1); in a tongue the verdict depends on a
 difference that is as small as the tongue is wide. `auto` takes 16th-order Taylor steps (series over dense rows),
 and double-double where float64 leaves a verdict open."""
 SOURCE = (

@@ -31,14 +31,16 @@ LINES = 129
 
 
 def serves(scene):
-    """Are curves known of the scene? Of whole gyrostats they are not."""
+    """Are curves known for the scene? For whole gyrostats they are not."""
     return "Omega" in {p.name for p in scene.PARAMETERS}
 
 
 def refusal(axes, scene, options=None):
     """Why there are no curves on a map of these axes, in words; None if there are."""
     if options and options["question"] not in AXES:
-        return f"question = {options['question']} has no verdict ({' and '.join(AXES)} have)"
+        return (
+            f"question = {options['question']} has no verdict (only {' and '.join(AXES)} have one)"
+        )
     if len(axes) in (1, 2, 3) and any(set(axes) <= set(own) for own in AXES.values()):
         return None
     known = " or of ".join(

@@ -1,9 +1,9 @@
-"""What the invariant set of a whole body holds, and whether it can be observed there: limits of
-motions, and portraits.
+"""The limits of motions and the portraits on the invariant set of a whole body, and whether they
+can be observed there.
 
 A limit of the reduced flow is stable on the set where the flow attracts (or, in an integrable
-stratum, keeps what is beside it); it is observable where deviations from the set do not grow along
-it either.
+stratum, keeps neighbouring motions); it is observable where deviations from the set do not grow
+along it either.
 """
 
 import math
@@ -151,7 +151,9 @@ def of_portrait(method, placed, rtol):
 
 
 def at_rests(placed):
-    """[(nu, bar, Beside)] of the positions of rest, in the frame of `placed`; None if they cannot be told."""
+    """[(nu, bar, Beside)] of the positions of rest, in the frame of `placed`; None if they cannot
+    be found.
+    """
     found = rests.find(placed.system)
     if found is None:
         return None

@@ -2,16 +2,16 @@
 branch of a saddle.
 
 Two kinds are looked for: those on which w keeps its sign, over at most a turn, and those with one
-turning point (a loop, or a way back to another saddle). Of either a function of the parameters says
-by how much both branches miss each other: the difference of w where they pass the same equilibrium,
-or of their turning points. It is continuous, and beyond the angle that a branch does not reach it
-is continued by how far from it the branch turns. Its zeros are found as those of
+turning point (a loop, or a way back to another saddle). For either, a function of the parameters
+says by how much both branches miss each other: the difference of w where they pass the same
+equilibrium, or of their turning points. It is continuous, and beyond the angle that a branch does
+not reach it is continued by how far from it the branch turns. Its zeros are found as those of
 `survey.measures.contours`, and followed on from where the lattice loses them, as where folds and
 points of codimension two are near (`survey.measures.tips`); connections with more turning points
 are not looked for.
 
-Saddles are told apart by their V; where two have the same the labels change, and a jump there is no
-zero.
+Saddles are told apart by their V; where two have the same the labels change, and a jump there is
+not a zero.
 """
 
 from collections.abc import Callable
@@ -81,8 +81,8 @@ def curves(plane):
 
 
 def _continuous(function, pieces):
-    """The pieces [(positions (m, 2), errors (m))] of curves without what is a jump of the function,
-    and no zero.
+    """The pieces [(positions (m, 2), errors (m))] of curves without points where the function jumps
+    rather than vanishes.
     """
     return [
         (x[part], error[part])

@@ -42,7 +42,10 @@ def refusal(axes, scene, options=None):
     if scene.FAMILY == "abel":
         return _refusal_of_own(axes, scene)
     if not {p.name for p in scene.PARAMETERS}.issuperset(SYSTEM):
-        return "curves are known of the scene gyrostat, whose parameters the outputs reduced_NAME are; ask there"
+        return (
+            "curves are available for the scene gyrostat; its parameters are the outputs "
+            "reduced_NAME: use that scene"
+        )
     own = set(axes[:2])
     if (
         len(axes) in (2, 3)

@@ -75,7 +75,7 @@ class Maps:
 
     @staticmethod
     def _end(eqs, place):
-        """The equilibrium to the right of the angle, if the one to its left is no saddle."""
+        """The equilibrium to the right of the angle, if the one to its left is not a saddle."""
         if not len(eqs):
             return None
         away = (eqs[:, eq.ANGLE] - place) % TWO_PI

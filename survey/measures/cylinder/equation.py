@@ -65,7 +65,7 @@ class Angle:
 
     def _refused(self, *_others):
         raise Unsupported(
-            "it compares phi, or an expression in phi: what it branches to is not analytic"
+            "it compares phi, or an expression in phi, and a branch in phi is not analytic"
         )
 
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = _refused

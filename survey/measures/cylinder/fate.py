@@ -39,7 +39,7 @@ MOST = 2_000_000  # steps in all
 BATCH = 50  # fates per kernel call, so that a call stays below a second
 # times, in those of the system, at which float64 takes over again
 HANDED_OVER = np.geomspace(0.5, 2000.0, 28)
-SELDOM = 3  # every third time, where what is told at all of them was not enough
+SELDOM = 3  # every third time only, where looking the fate up at every time did not settle it
 MIRROR = np.array([1.0, -1.0, 1.0, -1.0, -1.0, 1.0])  # S2, see `solution`
 MOST_OF_PROGRAM = 16  # equilibria
 UNKNOWN, NO_ENDS = 21, 22  # as in the STATUS of scenes/gyrostat.py and of request/abel_scene.py
@@ -132,7 +132,7 @@ def _handed_over(method, s, start, tolerance, out, told=None):
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[rc.START_W]))
     row, done = np.concatenate([s.p[: rc.SIX], start])[None], 0
     ways = ([told] if told else []) + [lambda state: fates(method, s, state[None], tolerance)[0]]
-    for later_of in ways:  # what is told costs nothing, so it is asked at all times first
+    for later_of in ways:  # looking the fate up costs nothing, so that comes first, at every time
         for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
             floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
             states = list(zip(floats[0], turnings[0], status[0], strict=True))[done:]

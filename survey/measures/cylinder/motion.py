@@ -1,6 +1,7 @@
 """The motion at one point of a survey, among some of its neighbours, as a picture shows it.
 
-On the cylinder also what parts the motions: equilibria, cycles, and the branches of the saddles.
+On the cylinder, also what separates the motions: equilibria, cycles, and the branches of the
+saddles.
 """
 
 import numpy as np

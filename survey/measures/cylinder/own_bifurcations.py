@@ -114,7 +114,7 @@ def _extrema(plane, position):
 
 
 def _rests(plane, position):
-    """The equilibria that are no saddles: [(label, None, angle, f)]."""
+    """The equilibria that are not saddles: [(label, None, angle, f)]."""
     row = plane.flow(position)
     if row is None:
         return []

@@ -53,23 +53,23 @@ def refusal(scene, point):
     None if there are.
     """
     if scene.FAMILY == "orbit":
-        return "cells are known of linear systems, not of periodic orbits, which end at folds"
+        return "cells are available for linear systems, not for periodic orbits, which end at folds"
     if not hasattr(scene, "conserved"):
-        return "cells are not known, but only of systems whose matrix A(t, p) is given"
+        return "cells are available only for systems whose matrix A(t, p) is given"
     n = len(scene.states)
     if n > dense.LARGEST:
-        return f"cells are known of systems of up to {dense.LARGEST} states, not of {n}"
+        return f"cells are available for systems of up to {dense.LARGEST} states, not of {n}"
     if scene.conserved is not None:
-        return "cells are not known of systems with CONSERVED, where a multiplier is 1 everywhere"
+        return "no cells are available for systems with CONSERVED: a multiplier is 1 everywhere"
     if scene.structure != "none" and n % 2:
-        return f"cells are not known of {scene.structure} systems of an odd number of states"
+        return f"no cells are available for {scene.structure} systems of an odd number of states"
     if not scene.is_analytic(point):
         return "cells need multipliers that are analytic in the parameters, but a branch of the code depends on one"
     return None
 
 
 def keywords(scene):
-    """What `find` is told of the scene."""
+    """Further arguments of `find` for the scene."""
     return {"structure": scene.structure}
 
 

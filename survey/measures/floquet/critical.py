@@ -17,7 +17,7 @@ which are each other's mirror images. There time is counted in half periods, and
 for a sign of v.
 
 Besides, y obeys linear conditions: v (and w) have a given size along themselves, x stays in a plane
-across the motion where T is unknown (v too, at a fold), and something is told of p.
+across the motion where T is unknown (v too, at a fold), and a condition is imposed on p.
 
 The derivatives of these equations, which Newton's method and proofs need, are those of the recorded
 operations.

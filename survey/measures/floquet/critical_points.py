@@ -4,8 +4,9 @@
 With y = (x, v, ...) of `critical` and G(y) the differences of y(1) and y(0), and what its linear conditions leave, such
 an orbit is a simple zero of G. If |1 - B G'| <= q < 1 for all y of a ball about the computed one, B nearly the inverse
 of G', and |B G| <= (1 - q) r there, r the ball's radius, it exists, and is alone in the ball (Krawczyk). Its distance
-from the computed one is at most |B G| + |1 - B G'| r in each component, those of the parameters among them. What is no
-strict bound is told in `existence`, whose series and bounds are used.
+from the computed one is at most |B G| + |1 - B G'| r in each component, those of the parameters
+among them. `existence`, whose series and bounds are used, says which of these bounds are not
+strict.
 """
 
 from dataclasses import dataclass

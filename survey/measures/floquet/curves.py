@@ -62,11 +62,14 @@ def refusal(axes, scene, options=None):
             return f"curves are those of {whose}: let `branch` be a number, not an axis"
         alone = len([name for name in axes if name]) == 1
         if scene.symmetry is not None and along not in axes[:2] and not alone:
-            return f"curves are drawn along one parameter, or on maps of {along}, that of CONTINUATION, and another one"
+            return (
+                f"curves are drawn along one parameter, or on maps of {along}, the parameter of "
+                "CONTINUATION, and another one"
+            )
     return (
         None
         if len(axes) in (1, 2, 3)
-        else f"curves are drawn on two axes, or three, not on {len(axes)}"
+        else f"curves are drawn on two or three axes, not on {len(axes)}"
     )
 
 

@@ -4,13 +4,14 @@ or two parameters.
 Where A is analytic in the parameters so is the polynomial. Its coefficients are series on panels of the map, solved at
 their nodes; panels on which they converge slowly, or vary by more orders than the accuracy allows, are halved. A point
 is answered from the series alone (`kernels.floquet.characteristic`); one whose verdict or accuracy these leave open,
-or whose Krein signs, is solved on its own. Of symplectic and reversible systems the polynomial is that of the
-s = l + 1 / l, and Krein signs come from the traces of J times polynomials of M: with adj(l - M) = sum_k l^(n-1-k) B_k
-and v the eigenvector of l, |v|^2 / (v* i J v) = tr(adj(l - M) i J) / p'(l).
+or whose Krein signs, is solved on its own. For symplectic and reversible systems the polynomial is
+that of the s = l + 1 / l, and Krein signs come from the traces of J times polynomials of M: with
+adj(l - M) = sum_k l^(n-1-k) B_k and v the eigenvector of l, |v|^2 / (v* i J v) = tr(adj(l - M) i J)
+/ p'(l).
 
 The bound of a coefficient: those at the nodes times the largest magnitudes that their Lagrange
-polynomials have in a part of the panel, the tails of the series, and rounding; at a few points that
-are no nodes it is tried. All depends on the axes of the map, never on the block.
+polynomials have in a part of the panel, the tails of the series, and rounding; it is
+tested at a few points that are not nodes. All depends on the axes of the map, never on the block.
 
 Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013), chapters 4, 8 and
 15; F. R. Gantmacher, The Theory of Matrices (1959), IV.4 (B_k).

@@ -115,7 +115,7 @@ class Equation:
         programs = compiled(graph, x, rows)
         if self.free and trace.TIME in programs.A.order:
             raise Unsupported(
-                "f(t, x, p, out) depends on t, so that PERIOD must be given",
+                "f(t, x, p, out) depends on t, so PERIOD must be given",
                 "give the period of f in t",
             )
         return programs

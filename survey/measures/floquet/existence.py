@@ -9,7 +9,7 @@ the second-order terms. A = df/dx changes within the tube by no more than `noise
 the tube's width as the error of the states. So the bounds of M, which include `noise`, hold for all of them, and for
 the orbit: verdicts need nothing else.
 
-What is no strict bound: samples at NODES stand for all times (taken SAMPLED times), widths of the
+Not strict: samples at NODES stand for all times (taken SAMPLED times), widths of the
 tube enter to first order (taken WIDER), and the series of A is cut off as in
 `kernels.floquet.steps`.
 

@@ -189,7 +189,7 @@ class Waves:
 
 def _multiples(c, d, low, high):
     """(sign, off) (2, waves, N): (-1)^k and bounds of c (low + high) + 2 d - k pi, then of c (high
-    - low) / 2 - k pi; 0 where it is no multiple of pi.
+    - low) / 2 - k pi; 0 where it is not a multiple of pi.
 
     c and d (2, waves, N) are values and error bounds. Products and sums are taken in two parts,
     which is nearly exact.

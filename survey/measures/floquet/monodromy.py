@@ -3,7 +3,7 @@
 The period is cut at the breaks, and each piece into steps of equal length: as many as the norm of
 A, in units of the states that balance it, and the rate at which A varies ask for; points whose
 bounds miss the accuracy climb a ladder of more steps, and have their errors carried sharply
-(`stability`). Of a piece that a symmetry in t makes up of equal parts, the steps of the first alone
+(`stability`). Where a symmetry in t makes up a piece of equal parts, only the steps of the first
 are computed (`halves`).
 """
 
@@ -49,7 +49,7 @@ class Group:
 class Points:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
-    `halves`: is no more integrated than symmetries of A ask for? `growth` (2, N): the integral of
+    `halves`: is no more integrated than symmetries of A require? `growth` (2, N): the integral of
     A's trace over the period, the logarithm of det M, and its error bound; infinite where the trace
     depends on t. If `paired`, with l also 1 / l is said to be a multiplier: points whose growth is
     certainly not 0 are not valid.

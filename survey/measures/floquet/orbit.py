@@ -198,7 +198,7 @@ def _show(found, equation, points, orbits, good, method, reach, finer=False):
 
 
 def _reach(rtol):
-    """That of the Taylor series, by which orbits are found for all methods."""
+    """The reach of the Taylor series, with which orbits are found for all methods."""
     return monodromy.method_of("auto").floquet_reach(rtol)
 
 

@@ -10,8 +10,8 @@ their conditions at both ends, a box of deviations is mapped into itself if
 
 and so holds an orbit (Brouwer; Krawczyk). Errors travel no farther than a shot before G, which
 bounds the deviations at all times, carries them: a growth by thousands over the period counts as
-little as it matters. What is no strict bound is told in `existence`, whose series and bounds are
-used.
+little as it matters. `existence`, whose series and bounds are used, says which of these
+bounds are not strict.
 
 Sources: R. Krawczyk, Computing 4 (1969) 187; H. B. Keller, Numerical Methods for Two-Point
 Boundary-Value Problems (1968), 2.

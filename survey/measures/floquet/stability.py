@@ -48,7 +48,7 @@ OUTPUTS = (
     Output("period", "period of the coefficients", "T"),
     Output("krein", "Krein sign of a multiplier on the unit circle: that of i v* J v, v its eigenvector", flags=SIGNS,
            dims=("multiplier",)),
-    Output("crossing", "where multipliers leave, or have left, the unit circle first", flags=CROSSINGS),
+    Output("crossing", "where multipliers would first leave, or have first left, the unit circle", flags=CROSSINGS),
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
     *maslov.OUTPUTS,
 )  # fmt: skip

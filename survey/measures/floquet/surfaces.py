@@ -15,7 +15,7 @@ RTOL, ROUGH = 1e-11, 1e-9  # of M for corners of triangles, and to see where the
 def refusal(scene):
     """Why there are no surfaces, in words; None if there are."""
     if scene.FAMILY == "orbit":
-        return "has periodic orbits, and surfaces are drawn of linear systems"
+        return "has periodic orbits, and surfaces are available only for linear systems"
     return None
 
 

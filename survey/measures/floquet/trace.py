@@ -387,7 +387,7 @@ class Graph:
             return self.lift(x)
         except Unsupported as error:
             raise Unsupported(
-                f"an entry that {call} fills in is no number: {error}", "give one number each"
+                f"{call} fills in an entry that is not a number: {error}", "give one number each"
             ) from None
 
     def sum(self, x, y):

@@ -1,7 +1,7 @@
 """Which method where: a constant coefficient by its closed form, everything else by midpoint
 Taylor, and points that it leaves undecided in double-double arithmetic, or by the adaptive DOP853
-where a problem has no such kernel. So are the few whose D, if asked for, depends on an ulp of the
-parameters, where rtol is below what float64 can reach.
+where a problem has no such kernel. So are the few whose D, if requested, depends on an ulp of the
+parameters, where float64 cannot reach rtol.
 
 Measured (`survey precision satellite`): midpoint Taylor is the fastest at every accuracy and has
 the sharpest bounds.

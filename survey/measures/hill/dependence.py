@@ -48,7 +48,7 @@ class StandIn:
     __pos__ = __neg__
 
     def _refused(self, *_):
-        raise Unknown("it decides by a parameter")
+        raise Unknown("it branches on a parameter")
 
     __lt__ = __le__ = __gt__ = __ge__ = __eq__ = __ne__ = __bool__ = __int__ = __float__ = (
         __index__
@@ -144,7 +144,7 @@ def degrees(function, fixed, at=()):
                 if isinstance(part, Degrees):
                     found = tuple(map(max, found, part.of))
                 elif not isinstance(part, (bool, int, float)):
-                    raise Unknown("it returns what is no number")
+                    raise Unknown("it returns something that is not a number")
     except Exception as error:  # a user's code may raise anything
         raise Unknown(f"{type(error).__name__}: {error}") from None
     known = dict(zip(free, found, strict=True))

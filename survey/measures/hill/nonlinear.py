@@ -19,7 +19,7 @@ from survey.scene import Output
 
 LARGEST = 1e3  # of |rho| and k: motions are followed, step by step
 FLAGS = {"undecided": -1, "unstable": 0, "orbitally_stable": 1, "resonance": 2}
-_APPLIES = "where the verdict is stable, k > 0, |rho| and k are at most 1000, and float64 leaves digits of it"
+_APPLIES = "where the verdict is stable, k > 0, |rho| and k are at most 1000, and float64 leaves some digits certain"
 OUTPUTS = (
     Output("twist", "twist at constant energy: angle per period by action", r"\tau", on_request=True,
            applies=f"{_APPLIES}: the action is that across the plane, over I omega_p"),

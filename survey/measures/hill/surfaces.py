@@ -32,7 +32,7 @@ class Functions:
         return self._factors(x, self.rtol, [FACTORS[kind]])[kind]
 
     def passing(self, x, kind):
-        """All zeros are edges, and nothing else is told of them."""
+        """All zeros are edges, and nothing else is known of them."""
         return np.ones(len(x), bool), {}
 
     def _factors(self, x, rtol, names):

@@ -8,8 +8,8 @@ Without damping the monodromy matrix over one period T has determinant 1, so tha
 Of the edges of tongues, which have D = 2 or -2, one has t = r, the other one t = -r. Where a tongue
 is narrow t - r and t + r have simple zeros, as t changes sign inside it, but D lies beyond 2 or -2
 by r^2 only; where a band between tongues is narrow D - 2 and D + 2 have them, but t exceeds r only
-a little. Of both together an edge is a simple zero wherever it is, with a sign by the number of
-edges that have been passed, which verdict and rotation number tell.
+a little. Taken together, an edge is a simple zero of one of them wherever it is, with a sign given
+by the number of edges that have been passed, which follows from verdict and rotation number.
 
 In y'' + 2 c y' + z y = 0 a multiplier is 1 or -1 where the trace is plus or minus 1 + e^(-2 c T).
 All these zeros are searched for as those of linear periodic systems are: see

@@ -29,7 +29,7 @@ def refusal(axes, scene, options=None):
         return (
             None
             if list(axes) == ["mu"]
-            else f"boundaries are known along mu alone, not on {', '.join(axes)}"
+            else f"boundaries are known only along mu, not on {', '.join(axes)}"
         )
     if set(axes) == set(AXES) and len(axes) == 2:
         return None

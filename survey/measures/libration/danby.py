@@ -42,7 +42,7 @@ OUTPUTS = (
     Output("a", "trace of the monodromy matrix over one period, the sum of its multipliers", "a"),
     Output("b", "sum of the products of two multipliers", "b"),
     Output("verdict", "stability of the linear motion", flags=VERDICTS),
-    Output("collision", "how stability is lost nearest, or has been lost: multipliers meet at -1, or two pairs meet",
+    Output("collision", "how stability is lost, or would be lost first: multipliers meet at -1, or two pairs meet",
            flags=COLLISIONS),
 )  # fmt: skip
 # Numbers of steps; a point climbs to 1.7 times as many. Of adaptive methods: tolerances of a step.

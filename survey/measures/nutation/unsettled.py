@@ -17,7 +17,7 @@ def settle(out, points, solver, valid, request, known=False):
     """Solve the points (parameters, n) again in place, as `solver` of `multiprecision` does, where
     that is needed.
 
-    known: only motions whose period is known already. Of methods other than `auto` only distances
+    known: only motions whose period is known already. For methods other than `auto`, only distances
     from a separatrix whose existence is in doubt.
     """
     doubt = np.isinf(out[f"{DISTANCE}_error"]) if DISTANCE in out else np.zeros(valid.size, bool)

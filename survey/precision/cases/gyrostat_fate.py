@@ -2,7 +2,7 @@
 roots in 40 digits.
 
 Peers integrate every motion to t = 200, by which time those of the references have settled, and
-tell the fate from the state there. Undecided verdicts are not wrong, and have no error.
+infer the fate from the state there. Undecided verdicts are not wrong, and have no error.
 """
 
 import json
