@@ -186,9 +186,9 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     from survey.sweep import engine
 
     checked = read(workflow, overrides, output)
-    held, told = earlier.find(checked, reuse, fresh) if reuse else (None, "")
-    if told and not quiet:
-        err.print(plain(told), markup=False)
+    held, note = earlier.find(checked, reuse, fresh) if reuse else (None, "")
+    if note and not quiet:
+        err.print(plain(note), markup=False)
 
     def start(progress, resume_command):
         return engine.run(
@@ -498,11 +498,13 @@ def share(path, output, at, trust_scene):
     ds = api.open(path, trust_scene=trust_scene)
     target = output or f"{path.removesuffix('.nc')}.html"
     with Progress(err, SimpleNamespace(name=Path(path).stem, scene=None)) as progress:
-        told = page.write(ds, target, dict(part.partition("=")[::2] for part in at), progress)
+        written = page.write(ds, target, dict(part.partition("=")[::2] for part in at), progress)
     how = (
-        "drawn from series, sharp at every scale" if told["series"] else f"of points: {told['why']}"
+        "drawn from series, sharp at every scale"
+        if written["series"]
+        else f"of points: {written['why']}"
     )
-    err.print(plain(f"{target}: {told['bytes']:,} bytes, {how}"), markup=False)
+    err.print(plain(f"{target}: {written['bytes']:,} bytes, {how}"), markup=False)
     out.print(plain(target), markup=False)
 
 

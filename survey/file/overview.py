@@ -38,8 +38,8 @@ class Points:
         self.flagged = "flag_values" in variable.attrs
         self.flags = flag_codes(variable.attrs) if self.flagged else {}
         self.fill = np.nan if self.flagged or fill_of(variable) is None else fill_of(variable)
-        told = "undecided" in self.flags or (with_statuses and not self.flagged)
-        self.statuses = statuses if told else {}
+        wanted = "undecided" in self.flags or (with_statuses and not self.flagged)
+        self.statuses = statuses if wanted else {}
         self.kinds = [*self.flags, *self.statuses, *NO_ANSWER, UNREAD]
         self.dtype = next(
             (dtype for dtype in MASKS if len(self.kinds) <= np.iinfo(dtype).bits), None

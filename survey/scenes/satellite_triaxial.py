@@ -206,7 +206,7 @@ def _lines(names, columns, request):
     ends = (lines[i][1:] if i in lines else values.flat[:1] for i, values in enumerate(columns))
     corners = np.meshgrid(*(np.array(one, float) for one in ends), indexing="ij")
     k = moduli({names[3]: corners[3]})[0]
-    # what is possible is told by inequalities that are linear in each parameter: corners suffice
+    # what is possible follows from inequalities that are linear in each parameter: corners suffice
     one_kind = (k > 1).all() or (k < 1).all()
     return (
         (lines, bool((k > 1).all()))

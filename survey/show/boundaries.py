@@ -124,7 +124,7 @@ def draw_edges(axes, ds, x):
     """
     if "edge_count" not in ds or ds.edge_count.ndim or ds.attrs.get("boundaries") != x.name:
         return
-    names, told = {code: name for name, code in flag_codes(ds.edge_class.attrs).items()}, set()
+    names, labelled = {code: name for name, code in flag_codes(ds.edge_class.attrs).items()}, set()
     for position, code in zip(ds.edge_position.values, ds.edge_class.values, strict=True):
         name = names.get(int(code), "boundary")
         label, properties = CURVES.get(name, (spaced(name), _THIN))
@@ -133,8 +133,8 @@ def draw_edges(axes, ds, x):
             axes.annotate(f"{label} ", (position, 1.0), xycoords=axes.get_xaxis_transform(), rotation=90, fontsize=7,
                           ha="right", va="top")  # fmt: skip
             continue
-        axes.axvline(position, zorder=1, label=None if label in told else label, **properties)
-        told.add(label)
+        axes.axvline(position, zorder=1, label=None if label in labelled else label, **properties)
+        labelled.add(label)
 
 
 def draw_boundaries(axes, ds, x, y, gaps=None):

@@ -31,8 +31,8 @@ COARSE, FINE = 96, 384  # cells of a turn, about
 FEW = 20_000  # pieces: as few are found again in fine cells
 TOLERANCE = 1e-16  # truncation of one step
 PIECES = 16_000, 96_000  # of one curve: the least and the greatest number at which it is cut off
-LOOSE = 1e-3  # bar of a cycle, in the same units, beyond which only starts far from it are told
-NARROWEST = 1e-9  # gaps, relative, in which fates are told
+LOOSE = 1e-3  # bar of a cycle, in the same units, beyond which fates are known only far from it
+NARROWEST = 1e-9  # gaps, relative, in which fates are known
 BACK = np.array([-1.0, -1.0, 1.0, 1.0, 1.0, 1.0])  # S1, see `solution`
 SHARP = 1e-13  # error of a state that is no more than rounding beside the least bar of a piece
 FEWEST = 1_000  # starts of one system: fewer are followed
@@ -68,7 +68,7 @@ class Basins:
         out[finite, rc.NET_TURNS] += turned[finite]
         return out, known
 
-    def told(self, state):
+    def fate_of(self, state):
         """The fate of a state (PHI to W_BAR of `records`) if it is known far better than the
         curves; else None.
         """
@@ -128,7 +128,7 @@ def followed(method, six, s, starts, rtol, whole=None):
         return fate.followed(method, s, starts, rtol)
     out, known = basins.of(starts)
     if not known.all():
-        out[~known] = fate.followed(method, s, starts[~known], rtol, basins.told)
+        out[~known] = fate.followed(method, s, starts[~known], rtol, basins.fate_of)
     return out
 
 

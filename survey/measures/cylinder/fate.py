@@ -105,11 +105,11 @@ def wind(s, out, angles, result, where):
     result["net_turns"][where[known]] = turns[known]
 
 
-def followed(method, s, starts, rtol, told=None):
+def followed(method, s, starts, rtol, fate_of=None):
     """`fates` of the skeleton s, solved again with a greater budget or finer steps where they are
     not decided.
 
-    `told` (see `basins`) gives the fate of a later state of the same motion, or None.
+    `fate_of` (see `basins`) gives the fate of a later state of the same motion, or None.
     """
     first, second = tolerances(method, min(rtol, COARSEST))
     out = fates(method, s, starts, first)
@@ -121,23 +121,25 @@ def followed(method, s, starts, rtol, told=None):
         s.stratum not in (I0, I1) and starts.shape[1] == rc.EXACT_START and len(s.p) == COLUMNS
     ):  # no better than the bars of a start can its fate be
         for i in np.flatnonzero(out[:, rc.STATUS] == SEPARATRIX):
-            _handed_over(method, s, starts[i], first, out[i], told)
+            _handed_over(method, s, starts[i], first, out[i], fate_of)
     return out
 
 
-def _handed_over(method, s, start, tolerance, out, told=None):
+def _handed_over(method, s, start, tolerance, out, fate_of=None):
     """Follow one start in double-double past what float64 cannot decide, until its fate from there
     on is decided.
     """
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[rc.START_W]))
     row, done = np.concatenate([s.p[: rc.SIX], start])[None], 0
-    ways = ([told] if told else []) + [lambda state: fates(method, s, state[None], tolerance)[0]]
+    ways = ([fate_of] if fate_of else []) + [
+        lambda state: fates(method, s, state[None], tolerance)[0]
+    ]
     for later_of in ways:  # looking the fate up costs nothing, so that comes first, at every time
         for last in (10, 19, len(times)):  # most are decided early, and what comes later costs most
             floats, turnings, status = trajectories(taylor_double, row, times[None, :last], 0.0)
             states = list(zip(floats[0], turnings[0], status[0], strict=True))[done:]
             for state, turned, code in (
-                states[SELDOM - 1 :: SELDOM] if told and later_of is not told else states
+                states[SELDOM - 1 :: SELDOM] if fate_of and later_of is not fate_of else states
             ):
                 later = later_of(state) if code == OK else None
                 if later is not None and later[rc.VERDICT] != kf.UNDECIDED:
