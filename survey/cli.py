@@ -213,7 +213,7 @@ def run(workflow, output, overrides, workers, scheduler, block_timeout, fresh, r
     metavar="KEY=VALUE",
     help="Replace a key: refine.width=0.01.",
 )
-@click.option("--fresh", is_flag=True, help="Delete what an earlier, interrupted run has proved.")
+@click.option("--fresh", is_flag=True, help="Delete the results of an earlier, interrupted run.")
 @click.option("--quiet", is_flag=True, help="No progress and no closing lines.")
 def prove(workflow, output, overrides, fresh, quiet):
     """Prove the cells of a map, or the edges along one axis; OUT.cert is what `survey-check`
@@ -300,8 +300,8 @@ def model(workflow, output, overrides, proof):
 )
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def plan(workflow, overrides, output, as_json):
-    """Points, blocks, size, method, and the time estimated from earlier runs on this machine;
-    nothing is solved.
+    """Points, blocks, size, method and estimated time, by the runs on this machine so far; nothing
+    is solved.
     """
     from survey.request.workflow import read
     from survey.sweep import plan

@@ -267,7 +267,7 @@ PYTHON = [
     (lambda ds: ds.survey.margin(k=5, rho=1.0), "lies outside the map"),
     (
         lambda ds: survey.edge("satellite", along="amplitude", amplitude=1.0, inertia_ratio=0.2),
-        "give (low, high)",
+        "give a range (low, high)",
     ),
     (
         lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio=[0.2, 0.3]),

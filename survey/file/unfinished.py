@@ -96,7 +96,7 @@ def drift(path, old, new, changed, workflow):
         causes.append(f"from another version of the code ({_code(old, new)})")
         ways_back.append("that version")
     if "scene_hash" in changed:
-        causes.append("from a different z(u, p), or different f and g")
+        causes.append("from a different z(u, p) (or f and g)")
         ways_back.append("those functions")
     changes = _differences(folder, workflow)
     if not causes and not changes:

@@ -258,7 +258,7 @@ class FloquetScene(TracedScene):
             if other is not None and not (abs(own - np.array(other)) <= SAME * size + bar).all():
                 self._refuse(
                     f"A(t, p, out) gives different values when its operations are recorded, at {self._where(point)}",
-                    "use + - * / ** and functions of math or numpy alone",
+                    "use only + - * / ** and functions of math or numpy",
                 )
         self._check_structure(np.concatenate(recorded), size, point)
         if self.structure == "reversible":

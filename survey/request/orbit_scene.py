@@ -285,7 +285,7 @@ class OrbitScene(TracedScene):
         if not (abs(plain - f) <= SAME * size).all():
             self._refuse(
                 f"f(t, x, p, out) gives different values when its operations are recorded, at {here}",
-                "use + - * / ** and functions of math or numpy alone",
+                "use only + - * / ** and functions of math or numpy",
             )
         if self.period is not None:
             later = np.array([self._at(time + T, x, point) for time in t])

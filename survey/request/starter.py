@@ -54,7 +54,7 @@ def workflow(scene):
     lines += [f"# {p.name} instead of {p.instead_of}: {_about(p)}" for p in module.PARAMETERS
               if p.instead_of in used]  # fmt: skip
     lines += ["", "[solver]", 'method = "auto"  # or one that `survey scenes` lists for this scene',
-              "rtol = 1e-10  # the accuracy asked for: |error| <= rtol (1 + |value|)", "", "[output]",
+              "rtol = 1e-10  # the requested accuracy: |error| <= rtol (1 + |value|)", "", "[output]",
               f'path = "{name.removesuffix(".py").replace("/", "_")}.nc"']  # fmt: skip
     drawn = [o.name for o in module.OUTPUTS if exists(o, options) and not o.dims]
     figure = given.get("figures", "verdict" if "verdict" in drawn else drawn[0])

@@ -80,7 +80,7 @@ def test_what_belongs_to_the_parts_is_left_out_with_a_word(tmp_path, monkeypatch
     ):
         joined = survey.concat(["low.nc", "high.nc"])
     assert "curve_count" not in joined and joined.sizes["a"] == 8
-    assert join.merge(["low.nc", "high.nc"], "both.nc")[1].startswith("what [boundaries] found")
+    assert join.merge(["low.nc", "high.nc"], "both.nc")[1].startswith("the results of [boundaries]")
     with pytest.raises(BadInput, match="merge: surveys are joined along one axis"):
         join.merge(["low.nc", "low.nc"], "x.nc")
 

@@ -465,7 +465,7 @@ def test_the_same_map_has_the_same_bytes(folder):
             "satellite_triaxial",
             {"roll_ratio": (0.1, 0.5), "C": (1.0, 2.0)},
             {"k": 0.5, "yaw_ratio": 0.1},
-            "by series",
+            "no series are available",
         ),
         ("mathieu", {"a": (0.0, 5.0)}, {"q": 1.0}, "a model needs two"),
     ],

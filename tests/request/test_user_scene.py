@@ -85,7 +85,7 @@ def test_finished_blocks_are_not_used_again_after_the_file_has_changed(folder):
     with blocks.Blocks(first.path, fingerprint.fingerprint(first)) as kept:
         kept.save(0, solve.solve_block(first.scene, first.request, first.grid, block))
     (folder / "below/mine.py").write_text(SCENE.replace("- 2 *", "- 2.000001 *"))
-    with pytest.raises(BadInput, match=r"another z\(u, p\).*--fresh"):
+    with pytest.raises(BadInput, match=r"a different z\(u, p\).*--fresh"):
         engine.run(workflow.read("below/mine.toml", output="o.nc"))
     (folder / "below/mine.py").write_text(SCENE)
     engine.run(workflow.read("below/mine.toml", output="o.nc"))

@@ -241,7 +241,9 @@ def test_boundaries_of_a_question_without_a_verdict_are_refused_before_any_point
         "boundaries": {},
         "axes": axes | {"t": 1},
     }
-    with pytest.raises(BadInput, match="of brun_triaxial question = trajectory has no verdict"):
+    with pytest.raises(
+        BadInput, match="boundaries: brun_triaxial: question = trajectory has no verdict"
+    ):
         survey.run(asked)
     assert not list(tmp_path.iterdir())
     with pytest.raises(

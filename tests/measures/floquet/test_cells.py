@@ -166,7 +166,7 @@ def test_where_there_are_none():
             survey.floquet(K=branching, **given | {"states": "x"}),
             "a branch of the code depends on one",
         ),
-        (survey.floquet(A, **given, conserved=(0.0, 1.0)), "CONSERVED, where a multiplier is 1"),
+        (survey.floquet(A, **given, conserved=(0.0, 1.0)), "CONSERVED: a multiplier is 1"),
         (
             survey.floquet(A, **given | {"states": tuple(f"x{k}" for k in range(13))}),
             "up to 12 states, not of 13",

@@ -281,7 +281,7 @@ def test_maps_without_the_amplitude_have_no_curves():
         "A": 1.0,
     }
     with pytest.raises(
-        survey.BadInput, match="on maps of A, that of CONTINUATION, and another one"
+        survey.BadInput, match="on maps of A, the parameter of CONTINUATION, and another one"
     ):
         check({"scene": beams(continuation=("A", 0.1, 3.0)), "axes": axes, "boundaries": {}})
 
