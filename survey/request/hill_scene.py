@@ -9,6 +9,7 @@ import numpy as np
 
 from survey import status
 from survey.errors import BadInput
+from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import (
     dependence,
@@ -520,9 +521,7 @@ def _dependence(scene, fixed):
         of_ranges = [max(degrees) for degrees in zip(*ranges, strict=True)] or [0] * len(fixed)
         _, edges, _ = scene._ranges(example)
         ends = np.stack([edges[0, :-1], edges[0, 1:]], axis=1)
-        u = ends[:, :1] + np.diff(ends, axis=1) * user_equation.chebyshev_points(
-            user_equation.SIZES[0]
-        )
+        u = ends[:, :1] + np.diff(ends, axis=1) * chebyshev.with_ends(user_equation.SIZES[0])
         return dependence.degrees(scene.z, fixed, u[:, 1:-1].ravel().tolist()), of_ranges
     except dependence.Unknown:
         return nothing, nothing

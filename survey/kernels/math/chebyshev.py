@@ -1,8 +1,9 @@
 """Chebyshev series: nodes, coefficients from values there, what a series may be wrong by, and its
 sums.
 
-The n nodes are those of the first kind. Bits of what is kept rest on how each caller rounds cos(k
-theta_i), theta_i the angle of node i: so `to_coefficients` takes these cosines.
+The n nodes are those of the first kind, where nothing else is said. Bits of what is kept rest on
+how each caller rounds cos(k theta_i), theta_i the angle of node i: so `to_coefficients` takes these
+cosines.
 
 Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clenshaw's recurrence),
 4.6 (discrete orthogonality); L. N. Trefethen, Approximation Theory and Approximation Practice
@@ -25,6 +26,16 @@ def angles(n):
 def nodes(n):
     """The n nodes, from 1 to -1."""
     return np.cos(angles(n))
+
+
+def shares(n):
+    """The nodes as shares of a range, from its beginning to its end."""
+    return 0.5 - 0.5 * nodes(n)
+
+
+def between(n):
+    """The points half way from each node to the next, by angle; the last one twice (n)."""
+    return np.cos(np.pi * np.minimum(np.arange(1, n + 1), n - 1) / n)
 
 
 @cache
@@ -61,6 +72,22 @@ def odd_columns(half):
     """
     theta, k = np.pi * (2 * np.arange(half) + 1) / (4 * half), 2 * np.arange(half) + 1
     return 2 / half * np.cos(theta[:, None] * k)
+
+
+@cache
+def with_ends(n):
+    """The n points of the second kind as shares of a range, both ends among them."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(n) / (n - 1))
+
+
+@cache
+def by_columns_with_ends(n):
+    """As `by_columns`, from values at points of the second kind; the first coefficient and the last
+    are twice as large.
+    """
+    i, k = np.arange(n)[:, None], np.arange(n)
+    weight = np.where((i == 0) | (i == n - 1), 1.0, 2.0)
+    return weight * np.cos(np.pi * ((i * k) % (2 * n - 2)) / (n - 1)) / (n - 1)
 
 
 def lebesgue(degree):

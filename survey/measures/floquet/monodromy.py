@@ -15,17 +15,16 @@ import numpy as np
 from survey import measures
 from survey.kernels import jit
 from survey.kernels.floquet import sizes, steps
+from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.floquet import probing
 from survey.measures.floquet.halves import Images
 
 # Times at which A is looked at, as shares of a piece.
-TIMES = 0.5 - 0.5 * np.cos(np.pi * (np.arange(12) + 0.5) / 12)
+TIMES = chebyshev.shares(12)
 # of entries, in a sum that stands for all: no special ones
 WEIGHTS = np.cos(1.0 + 7.0 * np.arange(64)) + 1.5
-TRANSFORM = np.array(
-    [[np.cos(np.pi * j * (k + 0.5) / 12) / 6 for k in range(12)] for j in range(12)]
-)
+TRANSFORM = chebyshev.cosines(12) / 6
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
 BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 DIGITS = 48  # bits of the ends of steps

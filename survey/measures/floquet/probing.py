@@ -9,6 +9,7 @@ and cosines of lines cannot.
 import numpy as np
 
 from survey.kernels.floquet import program as pg
+from survey.kernels.math import chebyshev
 
 # The width at half height, as a share of the period, from which a spike is seen; Chebyshev points
 # of each piece, which lie closer than that; and those when a scene is checked.
@@ -62,7 +63,7 @@ def _rates(program, places, numbers, low, high, scale, number):
     """`rates` of some points."""
     if (low == low[0]).all() and (high == high[0]).all():  # what depends on t alone is sampled once
         low, high = low[:1], high[:1]
-    t = low + (high - low) * (0.5 - 0.5 * np.cos(np.pi * (np.arange(number) + 0.5) / number))
+    t = low + (high - low) * chebyshev.shares(number)
     found = np.zeros((len(places), len(scale)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, places)):
         c = (

@@ -26,6 +26,7 @@ import numpy as np
 
 from survey.kernels.floquet import program as pg
 from survey.kernels.jit import fresh
+from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures.floquet.halves import Waves
 
@@ -34,7 +35,7 @@ MOST = 4000  # numbers, or basis functions
 EXPANDED = 9  # products of sums of more terms are not multiplied out
 ONE, TIME = 0, 1  # the first two basis functions
 # Where guards are tested, as shares of a piece, and the number of them.
-TRIED = 0.5 - 0.5 * np.cos(np.pi * (np.arange(33) + 0.5) / 33)
+TRIED = chebyshev.shares(33)
 DISPATCHER = type(fresh(lambda: None))
 
 

@@ -398,7 +398,7 @@ class Nodal:
         """Bounds (R, n) half way from each node to the next."""
         n = self.bars.shape[1]
         return self.doubts[:, None] + chebyshev.combined(
-            self.bars, chebyshev.lagrange(_half_way(n), n)
+            self.bars, chebyshev.lagrange(chebyshev.between(n), n)
         )
 
     def across(self, x, doubt):
@@ -408,10 +408,6 @@ class Nodal:
             chebyshev.combined(values, weights) for values in (self.doubts[None], self.bars.T)
         )
         return Nodal(doubt + doubts[0], bars.T)
-
-
-def _half_way(n):
-    return np.cos(np.pi * np.minimum(np.arange(1, n + 1), n - 1) / n)
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
@@ -533,7 +529,7 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
         doubts = tails + chebyshev.lebesgue(n) * bars.max(axis=1)
         served = _served(values, doubts[:, None, None], rtol).mean(axis=(1, 2)).min()
         if nodal is not None and served < MOST:
-            between = nodal.across(_half_way(n), tails[0]).between()
+            between = nodal.across(chebyshev.between(n), tails[0]).between()
             served = _served(values[0], between, rtol).mean()
         if served >= MOST:
             return (np.array(surfaces), doubts, turns, (tails, bars), nodal), spent

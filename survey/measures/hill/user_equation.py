@@ -24,6 +24,7 @@ import numpy as np
 from survey.kernels.hill import dop853, sampled_double
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
+from survey.kernels.math import chebyshev
 from survey.measures.hill import bands, monodromy, multiprecision, pointwise
 
 SIZES = (65, 513, 4097)
@@ -283,7 +284,7 @@ def measured(z, points, edges, period, slack, probes=PROBES):
 
     def values(pieces, number, mirrored=False):
         own, ends = owner[pieces], slack[owner[pieces], None]
-        u = left[pieces] + (right - left)[pieces] * chebyshev_points(number)
+        u = left[pieces] + (right - left)[pieces] * chebyshev.with_ends(number)
         u = np.clip(u, left[pieces] + ends, right[pieces] - ends) if ends.any() else u
         return at(z, points[own], period[own, None] - u if mirrored else u)
 
@@ -363,7 +364,7 @@ def unlike(z, points, ends, known, size, number):
             ends,
             known,
             size,
-            chebyshev_points(known.shape[1]),
+            chebyshev.with_ends(known.shape[1]),
             number,
             out,
         )
@@ -396,7 +397,7 @@ def evenly(number):
 @cache
 def to_probes(number):
     """(SIZES[0], number): from values at Chebyshev points to the interpolant's at evenly spread ones."""
-    away = evenly(number) - chebyshev_points(SIZES[0])[:, None]
+    away = evenly(number) - chebyshev.with_ends(SIZES[0])[:, None]
     weight = (-1.0) ** np.arange(SIZES[0])
     weight[[0, -1]] *= 0.5
     terms = weight[:, None] / np.where(away == 0, 1, away)
@@ -426,7 +427,7 @@ def spectrum(values):
     else:
         series = abs(np.fft.rfft(np.concatenate([values, values[:, -2:0:-1]], axis=1), axis=1).real)
         series /= values.shape[1] - 1
-    fall(values, series, cosines(SIZES[0]), size, rate, noise, last)
+    fall(values, series, chebyshev.by_columns_with_ends(SIZES[0]), size, rate, noise, last)
     return size, rate, noise, last
 
 
@@ -461,18 +462,3 @@ def fall(values, series, transform, size, rate, noise, last):
                 rate[i] = max(rate[i], k / (1.0 + log(top / max(own[k], 1e-300))))
         if not isfinite(size[i] + total):
             size[i] = rate[i] = noise[i] = last[i] = np.nan
-
-
-@cache
-def cosines(number):
-    """(M, M): values at Chebyshev points (first index) to coefficients."""
-    n = number - 1
-    j, k = np.arange(number)[:, None], np.arange(number)
-    weight = np.where((j == 0) | (j == n), 1.0, 2.0)
-    return weight * np.cos(np.pi * ((j * k) % (2 * n)) / n) / n
-
-
-@cache
-def chebyshev_points(number):
-    """Chebyshev points of the second kind on [0, 1], both ends among them."""
-    return 0.5 - 0.5 * np.cos(np.pi * np.arange(number) / (number - 1))

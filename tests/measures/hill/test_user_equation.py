@@ -289,7 +289,9 @@ def test_what_is_not_smooth_or_not_even_or_no_number_costs_one_point():
     bad = status.INVALID_PARAMETERS
     assert own.status.values.tolist() == [0, status.NO_CONVERGENCE, 0, bad, 0, bad, 0, 0, 0]
     assert np.isnan(own.discriminant.values).tolist() == (own.status.values != 0).tolist()
-    assert "breaks" in own.status.attrs["comment"] and "not even" in own.status.attrs["comment"]
+    assert (
+        "breaks" in own.status.attrs["comment"] and "even but is not" in own.status.attrs["comment"]
+    )
 
 
 def test_bits_do_not_depend_on_the_block(monkeypatch):
