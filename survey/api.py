@@ -534,5 +534,7 @@ def _method_line(module: Any, name: str) -> str:
         inspect.cleandoc(method.__doc__),
         condition(module, getattr(method, "WHEN", {})),
     )
-    first = getattr(method, "ABOUT", {}).get(module.FAMILY, docstring.splitlines()[0])
+    first = getattr(method, "ABOUT", {}).get(
+        module.FAMILY, docstring.split("\n\n")[0].replace("\n", " ")
+    )
     return first.removesuffix(".") + when if when else first

@@ -158,6 +158,12 @@ def extremes(scene, options, seed, points=60):
     return point
 
 
+@pytest.mark.parametrize("name", modules.names(survey.scenes))
+def test_what_is_said_of_a_method_is_a_whole_sentence(name):
+    for method, words in survey.describe(name)["methods"].items():
+        assert method == "auto" or words.endswith(".") or "; only when " in words, words
+
+
 @each_but("brun", "gyrostat-fate", "gyrostat_integrable-elliptic")
 @seeds
 def test_every_point_has_outputs_bars_and_a_status(scene, options, seed):

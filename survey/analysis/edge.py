@@ -17,6 +17,7 @@ from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
 from survey.sweep import boundaries
+from survey.sweep.line import second_axis
 from survey.sweep.progress import watched
 from survey.wording import shown
 
@@ -342,6 +343,24 @@ def is_quick(ds):
     module = user_scene.find(user_scene.of_dataset(ds))[1]
     measure = measures.curves(module)
     return measure is not None and _seconds(measure, parameters(ds)) < 1.0
+
+
+def is_slow(ds):
+    """Are there margins of a point that take more than about a second?"""
+    module = user_scene.find(user_scene.of_dataset(ds))[1]
+    measure, here = measures.curves(module), parameters(ds)
+    if measure is None or is_quick(ds):
+        return False
+    if not hasattr(measure, "closed"):
+        return True
+    fixed = {key: value for key, value in here.items() if np.isfinite(value)}
+    for name in fixed:
+        try:
+            second_axis(measure, module, name, fixed, options_at(ds, module))
+        except BadInput:
+            continue
+        return True
+    return False
 
 
 def _seconds(measure, names):

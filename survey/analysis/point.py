@@ -275,6 +275,12 @@ class Point:
             yield "status", "ok", ""
             if self.margin:
                 yield "nearest boundaries", self.margin, ""
+            elif edge.is_slow(ds):
+                yield (
+                    "nearest boundaries",
+                    "by ds.survey.margin() of this point, in some seconds",
+                    "",
+                )
         settings = [f"{key} = {value}" for key, value in options_of(ds).items()]
         settings += [
             f"method {ds.attrs.get('method', 'auto')}",

@@ -47,6 +47,8 @@ def resolved(scene, given):
                 found[angle].coords[key].attrs.update(about)
         else:
             found[key] = value
+    if not _of_this_package(scene):  # the same names may mean anything
+        return found
     if "mu" in names and "body" in found:
         found |= _put(found, _of_body(found.pop("body"), "e" in names and "e" not in found))
     if "mu" in names and "m1" not in names and set(MASSES) & set(found):
@@ -54,6 +56,10 @@ def resolved(scene, given):
     if "inertia_ratio" in names and not set(MOMENTS) & set(names) and set(MOMENTS) & set(found):
         found |= _put(found, {"inertia_ratio": _axial(*_taken(found, MOMENTS))})
     return found
+
+
+def _of_this_package(scene):
+    return getattr(scene, "__name__", "").startswith("survey.scenes.")
 
 
 def _put(given, new):
@@ -159,6 +165,8 @@ def described(scene):
     names = {p.name: p for p in scene.PARAMETERS}
     angles = {f"{key}{DEGREES}": f"{p.long_name} in degrees, instead of {key}" for key, p in names.items()
               if p.units == "rad"}  # fmt: skip
+    if not _of_this_package(scene):
+        return angles
     if "mu" in names:
         angles |= {
             "body": f"instead of mu{' and e' if 'e' in names else ''}: {listed(ECCENTRICITY)}"

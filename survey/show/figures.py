@@ -151,11 +151,8 @@ def _chosen(ds, across):
     if x is None:
         # with two other axes or more, curves lie in planes of this one and the first
         along = ds.attrs.get("boundaries")
-        return (
-            [known[0], along]
-            if len(known) > 2 and "edge_count" in ds and along in known[2:]
-            else None
-        )
+        drawn = len(known) > 2 and "edge_count" in ds and along in known[2:]
+        return [known[0], along] if drawn and min(ds.sizes[known[0]], ds.sizes[along]) > 1 else None
     return [x, *[name for name in known if name != x][:1]]
 
 

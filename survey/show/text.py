@@ -61,7 +61,7 @@ def label_of(variable, width=40):
     # repeat it
     text = (
         "$$"
-        if shown and text in (symbol, symbol.lstrip("\\"))
+        if shown and text in (symbol, symbol.lstrip("\\"), _spelt(symbol))
         else f"{text},\N{NO-BREAK SPACE}$$"
         if shown
         else text
@@ -69,6 +69,11 @@ def label_of(variable, width=40):
     text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({_with_powers(units)})"
     wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
+
+
+def _spelt(symbol):
+    """The name in a symbol that is upright text, as those of a user's parameters are."""
+    return symbol.removeprefix(r"\mathrm{").removesuffix("}").replace(r"\_", "_")
 
 
 def _with_powers(units):

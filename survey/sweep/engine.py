@@ -184,9 +184,13 @@ def run(
     writing = time.perf_counter() - computed - finding - compiling_further
     computing = max(0.0, computed - began - (compiling - compiling_further))
     if not (reused or earlier or workers or scheduler or workflow.proves):
-        measured.note(
-            workflow, estimates(workflow)[0], {"kernels": computing, "further": finding}, compiling
+        taken = {"kernels": computing, "further": finding}
+        counts = assembly.tally.counts["status"]
+        lost = sum(
+            counts.get(name, 0) for name, c in status.CODES.items() if c in status.UNANSWERED
         )
+        unanswered = lost / max(1, sum(counts.values()))
+        measured.note(workflow, estimates(workflow)[0], taken, compiling, unanswered)
     return Finished(
         written, assembly.tally.counts, compiling, computing, finding if further else 0.0, writing
     )

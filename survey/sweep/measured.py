@@ -22,14 +22,17 @@ MOST = 400  # records that are kept
 # seconds: a shorter run has spent them on beginning, and would tell a longer one a multiple of its
 # time
 SHORT = 1.0
+MOST_UNANSWERED = 0.5
 LITTLE = 1e-3  # seconds of an estimate: beside the beginning of a run they cannot be measured
 # [seconds estimated, measured] of the points; of edges, curves and cells
 PARTS = ("kernels", "further")
 
 
-def note(workflow, estimated, measured, compiling):
-    """Keep what a complete run has taken: `estimated` and `measured` are {part: seconds of wall time}."""
-    if numba.config.DISABLE_JIT:
+def note(workflow, estimated, measured, compiling, unanswered=0.0):
+    """Keep what a complete run has taken: `estimated` and `measured` are {part: seconds of wall
+    time}; `unanswered`: the share of its points that have no answer, which take less than others.
+    """
+    if numba.config.DISABLE_JIT or unanswered > MOST_UNANSWERED:
         return
     record = _about(workflow) | {"hash": jit.KERNEL_HASH, "compiling": round(compiling, 2)}
     for part in PARTS:

@@ -15,7 +15,9 @@ from survey.wording import counted
 START, PICTURE = 1.2, 1.0  # seconds of a process's start, and of drawing a picture
 WRITTEN = 5e7  # bytes a second
 LEARNT = "runs on this machine"
-GUESSED = "a typical machine; the next plan will use the time that this run takes"
+GUESSED = (
+    "a typical machine; the next plan will use the time that this run takes, if it is over a second"
+)
 
 
 def estimates(workflow):

@@ -261,7 +261,7 @@ def test_what_has_no_boundaries_is_told():
         ("unknown parameter 'kk'", {"along": "kk", "rho": 1.0}),
         ("give near= a value of rho, or a range", {"along": "rho", "k": 0.5}),
         ("rho is missing", {"along": "k", "near": 0.3}),
-        (r"so give \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
+        (r"so give a range \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
         ("it must be one number in its domain", {"along": "rho", "near": 1.0, "k": [0.1, 0.2]}),
     ):
         with pytest.raises(BadInput, match=match):
@@ -448,3 +448,8 @@ def test_the_exact_edge_of_a_gyrostats_ends_is_found_whatever_the_signs(along):
             found.edge_class.values == found.edge_class.attrs["flag_values"][names.index("ends")]
         ]
         assert abs(ends - at).min(initial=np.inf) < 1e-12
+
+
+def test_a_point_says_how_its_margins_are_found_where_that_takes_seconds():
+    point = survey.evaluate("gyrostat", phi0=0.3, w0=0.5, b12=0.7, b31=-0.4, d=1.1, s2=0.5)
+    assert "ds.survey.margin()" in repr(point.survey.point())

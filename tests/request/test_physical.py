@@ -122,3 +122,12 @@ def test_masses_are_those_of_the_ephemeris():
         assert value == pytest.approx(KERNEL[body], rel=2e-9), body
     with_moon = 4.0350323562548019e05  # BODY3, the Earth and the Moon
     assert physical.GM["Earth"] + physical.GM["Moon"] == pytest.approx(with_moon, rel=1e-9)
+
+
+def test_names_of_bodies_and_masses_are_those_of_this_packages_scenes():
+    scene = survey.hill(lambda u, p: p[0] + 0.0 * p[1], parameters=("mu", "body"), period=1.0)
+    ds = survey.evaluate(scene, mu=1.0, body=2.0)
+    assert float(ds.mu) == 1.0 and float(ds.body) == 2.0
+    assert list(survey.describe(scene)["parameters"]) == ["mu", "body"]
+    with pytest.raises(survey.BadInput, match="m1"):
+        survey.evaluate(scene, m1=1.0, m2=2.0, body=1.0)

@@ -67,6 +67,17 @@ def test_a_map_wholly_outside_the_domain(toy, style):
     plt.close("all")
 
 
+def test_a_plane_across_that_of_the_curves_is_drawn_on_its_two_axes():
+    of = [
+        xr.DataArray(np.linspace(0.0, 1.0, n), dims=dim)
+        for dim, n in zip("kmr", (3, 4, 5), strict=True)
+    ]
+    ds = xr.Dataset({"status": sum(of), "edge_count": sum(of[:2])}, attrs={"boundaries": "r"})
+    assert figures._chosen(ds, (None, None)) == ["k", "r"]
+    for at in ("r", "k"):  # fixed, it has one value: the map is over the two others
+        assert figures._chosen(ds.isel({at: slice(1)}), (None, None)) is None
+
+
 @pytest.fixture
 def bare(toy):
     """The toy map where 50 points are undefined, as the scene says."""

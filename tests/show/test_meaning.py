@@ -24,6 +24,9 @@ def test_a_symbol_stands_once_and_the_unit_on_its_line():
         0.0, name="delta", attrs={"long_name": "delta", "symbol": r"\delta", "units": "1"}
     )
     assert label_of(named) == r"$\delta$"
+    for parameter in survey.hill(lambda u, p: p[0], parameters=("delta", "c_1"), period=1.0).own:
+        about = {"long_name": parameter.long_name, "symbol": parameter.symbol, "units": "1"}
+        assert label_of(xr.DataArray(0.0, attrs=about)) == f"${parameter.symbol}$"
     long = xr.DataArray(
         0.0,
         name="x",

@@ -54,6 +54,14 @@ def test_the_next_plan_is_what_the_last_run_took(mapped, slower):
     assert found - before == pytest.approx(expected - larger["kernels"], rel=0.06)
 
 
+def test_a_run_without_answers_tells_nothing(mapped):
+    usual, _ = plan.estimates(mapped)
+    measured.note(mapped, usual, {"kernels": 100.0}, 3.0, unanswered=0.9)
+    assert not measured.knows(mapped)
+    measured.note(mapped, usual, {"kernels": 100.0}, 3.0, unanswered=0.1)
+    assert measured.knows(mapped)
+
+
 def test_a_short_run_tells_nothing_of_a_long_one(mapped):
     """A first try of 30 points takes some tenths of a second to begin, which are no measure of a point."""
     tried, larger = with_axes(mapped, k=5, rho=6), with_axes(mapped, k=20000, rho=12000)
