@@ -23,11 +23,12 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours, tips
-from survey.measures.floquet import bifurcations, narrow, row_count
+from survey.measures.floquet import bifurcations, counted_edges, narrow, row_count
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
+from survey.measures.segments import UNKNOWN
 from survey.scene import Output, Request
 
 CLASSES = {
@@ -121,8 +122,17 @@ def searched(scene, square, axes, fixed, options):
             pieces = _sharpened(sharp, pieces, square.grain)
         for x, error in pieces:
             draw(kind, x, error)
-    if square.across is not None:
+    if square.across is not None and scene.FAMILY == "orbit":  # whose family may end in between
         return joined(found, [output.name for output in ALONG])
+    if square.across is not None:
+        names = _indices(scene, square, axes) if structure == "symplectic" else {}
+        of_axis = _solved(
+            scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()]
+        )
+        indices = {
+            kind: lambda x, name=name: of_axis(x, ROUGH)[name] for kind, name in names.items()
+        }
+        return _on_border(square, matrices, indices, structure, on_lattice, found)
     drawn, passed = (
         [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found],
         {},
@@ -148,6 +158,49 @@ def searched(scene, square, axes, fixed, options):
     curves = joined(found, [output.name for output in ALONG])
     counts = row_count.outside(*on_lattice[:2], structure).reshape(number, number)
     curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
+    return curves
+
+
+def _on_border(square, matrices, indices, structure, on_lattice, found):
+    """The Curves at the border that alone is asked for, with the edges that the number of
+    multipliers outside the unit circle and the `indices` {kind: function of positions} show
+    besides.
+    """
+
+    def places(x):
+        x = np.atleast_1d(x)
+        return np.stack([x, np.full(x.size, square.across)], axis=1)
+
+    def outside(x):
+        number = row_count.outside(*matrices(places(x), RTOL)[:2], structure)
+        return np.where(number >= 0, number, UNKNOWN)[0]
+
+    def kind_of(x):
+        return counted_edges.kind(matrices(places(x), RTOL)[0][0], structure)
+
+    own = [
+        (kind, x)
+        for kind, parameters, _error, _known in found
+        for x in square.positions(parameters)[:, 0]
+    ]
+    number = row_count.outside(*on_lattice[:2], structure)
+    ticks = np.linspace(0.0, 1.0, number.size)
+    counted = [(outside, kind_of, np.where(number >= 0, number, UNKNOWN), CLASSES.values())]
+    counted += [
+        (lambda x, f=f: f(places(x))[0], lambda x, kind=kind: kind, f(places(ticks)), (kind,))
+        for kind, f in indices.items()
+    ]
+    unknown = {output.name: (np.array([np.nan]), np.array([np.nan])) for output in ALONG}
+    lost = 0
+    for count, kind, values, kinds in counted:
+        some = [one for one in own if one[0] in kinds]
+        missing, left = counted_edges.edges(count, kind, values, ticks, some, square.grain)
+        lost += left
+        for name, x, error in missing:
+            own.append((name, x))
+            found.append((name, square.parameters(places(x)), np.array([error]), unknown))
+    curves = joined(found, [output.name for output in ALONG])
+    curves.complete = False if lost else None
     return curves
 
 

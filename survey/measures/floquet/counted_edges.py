@@ -1,0 +1,87 @@
+"""Edges along one axis that no function of `bifurcations` shows, from numbers that are counted: of
+the multipliers outside the unit circle and, of symplectic systems, the Maslov index.
+
+Where two multipliers, or two pairs, pass the circle together, as those of two equal oscillators do,
+the functions touch zero without a change of sign; so they do not at an edge that they pass twice
+between two points of the lattice. Between points at which a number is certain and the edges found
+do not explain its change, the axis is halved until the number is certain no nearer: an edge lies in
+what is left.
+"""
+
+import numpy as np
+
+from survey.measures.floquet import row_count
+from survey.measures.floquet.multipliers import COLLISION, MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
+from survey.measures.segments import NEAR, UNKNOWN, along
+
+SHARES = (0.5, 0.31, 0.69)  # of a part: where it is cut, the first at which the number is known
+HALVINGS = 60
+REAL = 1e-3  # rad: arguments of multipliers that count as real
+
+
+def edges(count, kind_of, values, ticks, found, grain):
+    """[(kind, position, its error)] of edges that are missing among those `found` [(kind,
+    position)], and along how many parts of the axis the number is still unexplained.
+
+    `count(position)` is the number, or UNKNOWN, `values` that at the `ticks`, `kind_of(position)`
+    the kind of an edge; no position is known better than to within `grain`.
+    """
+    missing = []
+    for first, last in _lost(values, ticks, found):
+        parts = [(ticks[first], values[first], ticks[last], values[last])]
+        while parts:
+            low, below, high, above = parts.pop()
+            at, value = _cut(count, low, high) if high - low > grain else (low, UNKNOWN)
+            if value != UNKNOWN:
+                parts += [(low, below, at, value)] if value != below else []
+                parts += [(at, value, high, above)] if value != above else []
+                continue
+            low, high = _shrunk(count, below, low, at), _shrunk(count, above, high, at)
+            middle = 0.5 * (low + high)
+            missing.append((kind_of(middle), middle, 0.5 * (high - low) + grain))
+    everything = found + [(kind, x) for kind, x, _error in missing for _ in range(2)]
+    return missing, len(_lost(values, ticks, everything))
+
+
+def _lost(values, ticks, found):
+    """The segments (first, last) whose change the edges do not explain."""
+    places = np.array([place for _, place in found])
+    weights = np.array([row_count.WEIGHTS.get(kind, 1) for kind, _ in found], int)
+    twice = [
+        sum(k == kind and abs(p - place) < NEAR for k, p in found) > 1 for kind, place in found
+    ]
+    explained = along(values, ticks, places, weights, np.array(twice, bool))
+    return [segment for segment, good in explained.items() if not good]
+
+
+def _cut(count, low, high):
+    """(a position between, the number there), known at one of SHARES if possible."""
+    for share in SHARES:
+        at = low + share * (high - low)
+        if (value := count(at)) != UNKNOWN:
+            return at, value
+    return low + SHARES[0] * (high - low), UNKNOWN
+
+
+def _shrunk(count, value, known, unknown):
+    """The position nearest to `unknown`, from `known` on, up to which the number has this value."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (known + unknown)
+        if middle in (known, unknown):
+            break
+        if count(middle) == value:
+            known = middle
+        else:
+            unknown = middle
+    return known
+
+
+def kind(M, structure):
+    """How the multipliers nearest to the unit circle pass it."""
+    multipliers = np.linalg.eigvals(M)
+    angle = abs(np.angle(multipliers[abs(abs(multipliers) - 1.0).argmin()]))
+    if angle < REAL:
+        return PLUS_ONE
+    if angle > np.pi - REAL:
+        return MINUS_ONE
+    return NEIMARK_SACKER if structure == "none" else COLLISION
