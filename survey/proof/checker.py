@@ -392,11 +392,11 @@ class Certificate:
     def __init__(self, text):
         data = json.loads(text)
         need(data["format"] == FORMAT, f"the format is not {FORMAT!r}")
-        need(digest(data) == data["sha256"], "it was changed: its digest is another")
+        need(digest(data) == data["sha256"], "it was changed: its digest differs")
         ctx.prec = whole(data["bits"], 53, 4096, "the number of bits")
         self.names = names = [str(name) for name in data["parameters"]]
         good = all(name.isidentifier() and name not in {"u", "pi", *FUNCTIONS} for name in names)
-        need(good and len(names) == len(set(names)) in (1, 2), "there must be one or two parameters, with own names")
+        need(good and len(names) == len(set(names)) in (1, 2), "there must be one or two distinct parameter names")
         self.equation = Equation(data["equation"]["kind"], data["equation"]["pieces"], names)
         self.sides = [(rational(low), rational(high)) for low, high in data["rectangle"]]
         good = len(self.sides) == len(names) and all(low < high for low, high in self.sides)
