@@ -5,7 +5,7 @@ import numpy as np
 from survey import status
 from survey.file.labels import flag_codes, words_of
 from survey.grid import logarithmic
-from survey.show.boundaries import draw_edges
+from survey.show.boundaries import draw_edges, limits_of
 from survey.show.layout import add_legend
 from survey.show.maps import IN_WORDS
 from survey.show.palette import kinds_of
@@ -78,9 +78,8 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
                     ms=4,
                     label=text,
                 )
-        if variable.name == "discriminant":
-            for edge in (-2.0, 2.0):
-                axes.axhline(edge, color="black", lw=0.6, ls=(0, (5, 2)))
+        for limit in limits_of(variable):
+            axes.axhline(limit, color="black", lw=0.6, ls=(0, (5, 2)))
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel(
             {d: 0 for d in ds[variable.name].dims if d not in variable.dims}

@@ -2,6 +2,8 @@
 ensembles, error bars.
 """
 
+import math
+
 import matplotlib
 import numpy as np
 import pytest
@@ -102,6 +104,37 @@ def test_the_discriminant_has_lines_at_2_and_a_diverging_map(ds):
         -2.0,
         2.0,
     ]
+
+
+def contours(axes):
+    return [c for c in axes.collections if type(c).__name__ == "QuadContourSet"]
+
+
+def test_the_coarse_lines_at_2_are_left_out_where_exact_edges_are_drawn(tmp_path):
+    axes = {"a": {"start": 0.5, "stop": 5.0, "num": 12}, "q": {"start": 0.1, "stop": 1.0, "num": 9}}
+    asked = {"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}
+    made = survey.run(asked, output=tmp_path / "tongues.nc")
+    exact = made.survey.map("discriminant")
+    assert exact.lines and not contours(exact)
+    assert contours(made.survey.map("discriminant", boundaries=False))
+
+
+def test_lines_at_2_are_drawn_only_where_stability_ends_there():
+    damped = survey.hill(
+        lambda u, p: p[0] - 2 * p[1] * math.cos(2 * u),
+        period=math.pi,
+        parameters=("a", "q"),
+        damping=0.2,
+    )
+    made = survey.evaluate(damped, a=np.linspace(0.0, 2.0, 9), q=np.linspace(0.5, 2.0, 8))
+    assert abs(made.discriminant).max() > 2.0 and not contours(made.survey.map("discriminant"))
+    assert not level_lines(made.survey.slice(q=2.0).survey.map("discriminant"))
+    other = survey.evaluate("libration", mu=np.linspace(0.002, 0.01, 9))
+    assert not level_lines(other.survey.map("discriminant"))
+
+
+def level_lines(axes):
+    return [line for line in axes.lines if len(set(line.get_ydata())) == 1]
 
 
 def test_error_bars_are_drawn(ds):
