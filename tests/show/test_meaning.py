@@ -157,6 +157,46 @@ def test_ensembles_are_scattered_over_their_parameters():
     assert made.survey.map("discriminant").collections[0].get_offsets().shape == (40, 2)
 
 
+def drawn_a(number=40):
+    return xr.DataArray(np.random.default_rng(2).uniform(0.0, 4.0, number), dims="draw")
+
+
+def test_draws_of_one_parameter_are_a_profile_over_it():
+    made = survey.evaluate("mathieu", a=drawn_a(), q=[0.5])
+    for ds in (made, made.isel(q=0)):
+        axes = ds.survey.map()
+        heights = [text.get_text() for text in axes.get_yticklabels()]
+        shown = {x: heights[int(y)] for line in axes.lines for x, y in line.get_xydata()}
+        words = ds.survey.names().values.ravel().tolist()
+        assert axes.get_xlabel().endswith("$a$") and shown == dict(
+            zip(made.a.values, words, strict=True)
+        )
+        axes = ds.survey.map("discriminant")
+        order = np.argsort(made.a.values)
+        x, y = axes.lines[0].get_xydata().T
+        assert x.tolist() == made.a.values[order].tolist() and axes.get_xlabel().endswith("$a$")
+        assert y.tolist() == made.discriminant.values[order, 0].tolist()
+
+
+def test_draws_of_one_parameter_and_an_axis_are_scattered_over_both():
+    made = survey.evaluate("mathieu", a=drawn_a(), q=[0.5, 1.0])
+    pairs = sorted((a, q) for a in made.a.values for q in made.q.values)
+    for name in ("verdict", "discriminant"):
+        axes = made.survey.map(name)
+        assert axes.get_xlabel().endswith("$a$") and axes.get_ylabel().endswith("$q$")
+        offsets = np.concatenate(
+            [c.get_offsets() for c in axes.collections if len(c.get_offsets())]
+        )
+        assert sorted(map(tuple, offsets)) == pairs
+    assert made.survey.map("discriminant", x="q").get_ylabel().endswith("$a$")
+
+
+def test_an_ensemble_of_a_variable_with_a_further_dimension_shows_its_first_place():
+    mu = xr.DataArray(np.linspace(0.002, 0.01, 5), dims="draw")
+    made = survey.evaluate("libration", mu=mu).assign_coords(other=("draw", np.arange(5.0)))
+    assert "monomial 200" in made.survey.map("c").get_title()
+
+
 def test_narrow_tongues_are_lines_in_the_colour_of_instability(tmp_path):
     """Edges of tongues narrower than the grid coincide: between their dashes the tongue itself is
     seen, undotted.
