@@ -1,9 +1,10 @@
 """A variable along one axis: its curve with the error band, or its flags."""
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from survey import status
-from survey.file.labels import flag_codes, words_of
+from survey.file.labels import fill_of, flag_codes, words_of
 from survey.grid import logarithmic
 from survey.show.boundaries import draw_edges, limits_of
 from survey.show.layout import add_legend
@@ -61,7 +62,11 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
         after, linear = _poles(shown.astype(float))
         poles = [0.5 * (x.values[i - 1] + x.values[i]) for i in after]
         places, shown = _gapped(x, after, poles), _gapped(shown, after, np.nan)
-        axes.plot(places, shown, "o" if named else "-", ms=5, lw=1.2, color="#0072B2", label=label)
+        counts = fill_of(variable) is not None
+        looks = {"drawstyle": "steps-mid" if counts else "default", "lw": 1.2, "color": "#0072B2"}
+        axes.plot(places, shown, "o" if named else "-", ms=5, label=label, **looks)
+        if counts:
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         if linear:
             axes.set_yscale("symlog", linthresh=linear)
         for i, pole in enumerate(poles):

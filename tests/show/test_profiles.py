@@ -100,6 +100,17 @@ def test_noise_and_coarse_oscillations_have_no_poles():
         assert [line for line in profile(x, y=(y, {})).lines if line.get_label() == "pole"] == []
 
 
+@pytest.mark.parametrize("values", [[0, 0, 1, 2, 1], [3, 3, 3, 3, 3], [0, 1, np.nan, 1, 40]])
+def test_counts_are_steps_with_integer_ticks(values):
+    comment = {"comment": "-2 where it does not apply"}
+    axes = profile(X, y=(np.array(values), comment))
+    low, high = axes.get_ylim()
+    ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
+    assert ticks and all(tick == round(tick) for tick in ticks)
+    assert axes.lines[0].get_drawstyle() == "steps-mid"
+    assert profile(X, y=(X, {})).lines[0].get_drawstyle() == "default"
+
+
 def test_boundaries_on_the_only_axis_are_lines_by_kind():
     """Edges of tongues look as on maps and share an entry of the legend; others are dotted and bear
     their names.
