@@ -89,12 +89,14 @@ class Survey:
             ds, var = verdicts.combined(ds, var), "combined"
         colours = {"cmap": cmap, "vmin": vmin, "vmax": vmax, "robust": robust}
         with _settings(style):
-            ax = (
-                _new_axes(figure_size(style, width), figures.projection_of(var))
-                if ax is None
-                else ax
-            )
-            figures.onto(ax, ds, var, boundaries, style, (x, y), colours)
+            own = ax is None
+            ax = _new_axes(figure_size(style, width), figures.projection_of(var)) if own else ax
+            try:
+                figures.onto(ax, ds, var, boundaries, style, (x, y), colours)
+            except BaseException:
+                if own:  # a notebook would show it, empty
+                    _close(ax.figure)
+                raise
         return ax
 
     def counts(self):
@@ -245,6 +247,12 @@ def _new_axes(size, projection=None):
     return plt.figure(figsize=size, layout="constrained").subplots(
         subplot_kw={"projection": projection}
     )
+
+
+def _close(figure):
+    import matplotlib.pyplot as plt
+
+    plt.close(figure)
 
 
 def _new_figure():

@@ -76,6 +76,19 @@ def test_figures_leave_the_backend_of_a_notebook_alone():
     subprocess.run([sys.executable, "-c", code], check=True, env=os.environ | {"MPLBACKEND": "svg"})
 
 
+@pytest.mark.parametrize("wrong", [{"var": "nonsense"}, {"x": "nonsense"}, {"cmap": "nonsense"}])
+def test_a_refused_map_leaves_no_figure_and_closes_no_other(toy, wrong):
+    import matplotlib.pyplot as plt
+
+    own = plt.figure().subplots()
+    before = plt.get_fignums()
+    for ax in (None, own):
+        with pytest.raises(BadInput):
+            toy.survey.map(ax=ax, **wrong)
+    assert plt.get_fignums() == before
+    plt.close(own.figure)
+
+
 def test_a_map_marks_what_is_undecided_or_failed_on_any_axes(toy):
     own = toy.survey.map()
     legend = [text.get_text() for text in own.figure.legends[0].get_texts()]

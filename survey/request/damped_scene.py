@@ -21,7 +21,7 @@ from survey.scene import Output, named
 
 KEPT = ("discriminant", "rotation_number", "period", "verdict")
 WORDS = {
-    "discriminant": "trace of the monodromy matrix over one period T",
+    "discriminant": "trace of the damped monodromy matrix over one period T",
     "rotation_number": "rotation number per period",
     "verdict": "stability of the damped motion; stable with c > 0: all motions decay",
 }

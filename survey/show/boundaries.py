@@ -10,6 +10,7 @@ from survey.show.marks import widened
 from survey.show.text import spaced
 
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
+_LIMITS = (-2.0, 2.0)  # of the trace D of Hill's equation: the edges of stability
 _RIM = withStroke(linewidth=2.0, foreground="#444444")
 _PALE = {"color": "#FFFFFF", "lw": 1.2, "path_effects": [_RIM]}
 _THIN = {"color": "#000000", "ls": ":", "lw": 0.8}
@@ -83,6 +84,15 @@ CURVES = {
         {"marker": "o", "ms": 6, "mfc": "#D55E00"} | _POINT,
     ),
 }
+
+
+def limits_of(variable):
+    """The values of a variable at which stability ends everywhere: of the trace D of Hill's equation.
+
+    With damping they are 1 + e^(-2cT) and its negative, which differ from point to point.
+    """
+    is_trace = variable.name == "discriminant" and variable.attrs.get("symbol") == "D"
+    return _LIMITS if is_trace and "damp" not in variable.attrs.get("long_name", "") else ()
 
 
 def in_plane(ds, variable):

@@ -13,25 +13,40 @@ from survey.show.palette import kinds_of
 from survey.show.text import WIDE, label_of, spaced
 
 SIZE = 14.0  # of a mark, in points^2
+NUMBER = "point"  # the dimension of points of two axes
+
+
+def over_parameters(ds):
+    """(the survey, names): the only parameter that varies along points without a coordinate is
+    their axis, one of the names; two parameters or more are no axis.
+    """
+    along = {dim: _parameters(ds, dim) for dim in ds.status.dims if dim not in ds.coords}
+    axes = {dim: names[0] for dim, names in along.items() if len(names) == 1}
+    return ds.swap_dims(axes), set(axes.values())
+
+
+def points_of(ds):
+    """The survey on its first two axes, others at their first value, as points along one dimension."""
+    ds = ds.isel(dict.fromkeys(ds.status.dims[2:], 0))
+    return ds.stack({NUMBER: ds.status.dims}, create_index=False)
 
 
 def is_ensemble(ds):
     """Are these points along one dimension without a coordinate, along which two parameters or more vary?"""
-    return (
-        len(ds.status.dims) == 1 and ds.status.dims[0] not in ds.coords and len(_parameters(ds)) > 1
-    )
+    dims = ds.status.dims
+    return len(dims) == 1 and dims[0] not in ds.coords and len(_parameters(ds, dims[0])) > 1
 
 
-def _parameters(ds):
-    """The coordinates of numbers along the points."""
-    return [c for c in ds.coords.values() if c.dims == ds.status.dims and c.dtype.kind in "iuf"]
+def _parameters(ds, dim):
+    """The names of the coordinates of numbers along the points."""
+    return [c.name for c in ds.coords.values() if c.dims == (dim,) and c.dtype.kind in "iuf"]
 
 
 def draw_ensemble(axes, ds, name, paper, asked):
     """Scatter a variable over two parameters: a colour for each verdict, or a colour bar; `asked`
     as in `draw_map`.
     """
-    x, y = _parameters(ds)[:2]
+    x, y = (ds[key] for key in _parameters(ds, ds.status.dims[0])[:2])
     variable, state = masked(ds[name].load()), ds.status.load()
     if "flag_values" in variable.attrs:
         shown, table, palette = kinds_of(ds, variable, state)

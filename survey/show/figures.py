@@ -14,7 +14,7 @@ from survey import modules
 from survey.errors import BadInput
 from survey.file.labels import masked
 from survey.show import family, surfaces
-from survey.show.ensemble import draw_ensemble, is_ensemble
+from survey.show.ensemble import draw_ensemble, is_ensemble, over_parameters, points_of
 from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
 from survey.show.profiles import draw_profile
@@ -74,13 +74,17 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
         raise BadInput(modules.unknown("variable", name, drawable))
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on
         text.set_usetex(False)
+    ds, sampled = over_parameters(ds)
+    ds = _without_single(ds, across)
+    if across == (None, None) and ds.status.ndim > 1 and sampled & set(ds.status.dims[:2]):
+        ds = points_of(ds)
     if is_ensemble(ds):
+        ds = ds.isel({dim: 0 for dim in ds[name].dims if dim not in ds.status.dims})
         draw_ensemble(axes, ds, name, paper, colours or {})
         if not paper:
             axes.set_title(title_of(ds, ds[name]), fontsize=10 if alone(axes) else 8)
         fit(axes)
         return
-    ds = _without_single(ds, across)
     chosen = _chosen(ds, across)
     drawn = chosen or ds.status.dims[:2]
     labels = {dim: [str(label) for label in ds[dim].values] for dim in drawn

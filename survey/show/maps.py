@@ -10,7 +10,7 @@ from survey import status
 from survey.file.labels import fill_of, flag_codes, scene_statuses, words_of
 from survey.file.overview import Overview, Points
 from survey.grid import logarithmic
-from survey.show.boundaries import draw_boundaries, in_plane
+from survey.show.boundaries import draw_boundaries, in_plane, limits_of
 from survey.show.cells import draw_cells
 from survey.show.layout import add_legend
 from survey.show.marks import hatched, marks, marks_without_answer
@@ -23,7 +23,6 @@ from survey.show.text import WIDE, label_of, spaced
 MAX_DRAWN = 2000
 MOST_COUNTS = 10  # that have a colour each
 MAX_CELLS = 1000  # along an axis of such a picture: each costs a hundred bytes
-EDGED, EDGES = "discriminant", (-2.0, 2.0)  # whose lines at these values are the edges of stability
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"  # of values of one sign, and about 0
 IN_WORDS = "#CC79A7"  # numbers that stand for words, such as infinitely many
 CELLS_PER_PIXEL = 0.8  # of the axes, before legend and labels take their share
@@ -42,6 +41,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         axes, ds, variable, state, style_named("paper" if paper else None).dpi
     )
     x, y = (variable[dim] for dim in variable.dims)
+    plane = _plane(ds, variable) if boundaries else None
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
     if variable.name == "verdict" and "cell_verdict" in ds:
@@ -64,8 +64,9 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
             axes.figure.colorbar(
                 drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend
             )
-        if variable.name == EDGED and min(shown.shape) > 1 and shown.count():
-            axes.contour(x, y, shown.T, levels=EDGES, colors="black", linewidths=0.6)
+        exact = plane is not None and plane.sizes["curve"] > 0
+        if limits_of(variable) and not exact and min(shown.shape) > 1 and shown.count():
+            axes.contour(x, y, shown.T, levels=limits_of(variable), colors="black", linewidths=0.6)
         axes.set_facecolor("#dddddd")
         missing = np.isnan(values) & ~(failed | outside)
         handles = []
@@ -75,13 +76,12 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         handles += marks_without_answer(axes, x, y, failed, outside, number, paper)
         missing &= ~np.isin(state.values, list(scene_statuses(ds).values()))
         handles += [Patch(color="#dddddd", label="does not apply")] if missing.any() else []
-    if boundaries and ("curve_count" in ds or "surface_vertices" in ds):
+    if plane is not None:
         gaps = (
             colours_of(flag_codes(variable.attrs)).get("unstable")
             if "flag_values" in variable.attrs
             else None
         )
-        plane = in_plane(ds, variable) if "curve_count" in ds else section(ds, variable)
         handles += draw_boundaries(axes, plane, x, y, gaps)
     if handles:
         add_legend(axes, handles)
@@ -89,6 +89,13 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
     for setting, scale in zip((axes.set_xscale, axes.set_yscale), scales, strict=True):
         if scale == "log":
             setting(scale)
+
+
+def _plane(ds, variable):
+    """The survey with the exact curves that lie in the plane of the map, or None if it has none."""
+    if "curve_count" in ds:
+        return in_plane(ds, variable)
+    return section(ds, variable) if "surface_vertices" in ds else None
 
 
 def _shown(axes, ds, variable, state, dpi):

@@ -1,11 +1,12 @@
 """A variable along one axis: its curve with the error band, or its flags."""
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from survey import status
-from survey.file.labels import flag_codes, words_of
+from survey.file.labels import fill_of, flag_codes, words_of
 from survey.grid import logarithmic
-from survey.show.boundaries import draw_edges
+from survey.show.boundaries import draw_edges, limits_of
 from survey.show.layout import add_legend
 from survey.show.maps import IN_WORDS
 from survey.show.palette import kinds_of
@@ -14,9 +15,11 @@ from survey.show.text import WIDE, formula, label_of, spaced
 RING = "#D40000"
 # isolated points that are ringed; points from which on one among them is hard to see
 MOST_RINGS, RARE = 12, 50
-STEEP = 30.0  # times the median: where a quantity that changes sign has a pole, not a zero
+# at a pole, not a zero, the neighbours exceed the median this many times, and their own neighbours
+# by this factor: 1 / x at least doubles from one step to the last one before 0
+STEEP, RISE = 5.0, 1.5
 # of a quantity with poles from which on its axis is linear about 0 and logarithmic beyond
-WIDE_RANGE = 1e3
+WIDE_RANGE = 30.0
 
 
 def draw_profile(axes, ds, variable, state, paper, named=False):
@@ -55,18 +58,19 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
     else:
         label = formula(variable.attrs.get("symbol") or variable.name, variable.name)
         words = words_of(variable)
-        drawn, poles, linear = _without_poles(variable.where(~variable.isin(list(words))))
-        axes.plot(x, drawn, "o" if named else "-", ms=5, lw=1.2, color="#0072B2", label=label)
+        shown = variable.where(~variable.isin(list(words))).values
+        after, linear = _poles(shown.astype(float))
+        poles = [0.5 * (x.values[i - 1] + x.values[i]) for i in after]
+        places, shown = _gapped(x, after, poles), _gapped(shown, after, np.nan)
+        counts = fill_of(variable) is not None
+        looks = {"drawstyle": "steps-mid" if counts else "default", "lw": 1.2, "color": "#0072B2"}
+        axes.plot(places, shown, "o" if named else "-", ms=5, label=label, **looks)
+        if counts:
+            axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         if linear:
             axes.set_yscale("symlog", linthresh=linear)
-        for i in poles:
-            axes.axvline(
-                0.5 * float(x[i] + x[i + 1]),
-                color="grey",
-                lw=0.8,
-                ls="--",
-                label="pole" if i == poles[0] else None,
-            )
+        for i, pole in enumerate(poles):
+            axes.axvline(pole, color="grey", lw=0.8, ls="--", label=None if i else "pole")
         for code, text in words.items():
             here = x.values[variable.values == code]
             if here.size:
@@ -78,9 +82,8 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
                     ms=4,
                     label=text,
                 )
-        if variable.name == "discriminant":
-            for edge in (-2.0, 2.0):
-                axes.axhline(edge, color="black", lw=0.6, ls=(0, (5, 2)))
+        for limit in limits_of(variable):
+            axes.axhline(limit, color="black", lw=0.6, ls=(0, (5, 2)))
     if f"{variable.name}_error" in ds:
         bar = ds[f"{variable.name}_error"].isel(
             {d: 0 for d in ds[variable.name].dims if d not in variable.dims}
@@ -90,10 +93,11 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
                 x, variable, bar, fmt="none", color="#56B4E9", capsize=4, label="error bar"
             )
         else:
+            bar = _gapped(bar, after, np.nan)
             axes.fill_between(
-                x,
-                variable - bar,
-                variable + bar,
+                places,
+                shown - bar,
+                shown + bar,
                 color="#56B4E9",
                 alpha=0.5,
                 lw=0,
@@ -125,22 +129,26 @@ def _isolated(where):
     return where & ~padded[:-2] & ~padded[2:]
 
 
-def _without_poles(variable):
-    """(the values with gaps at poles, the places i of poles between i and i + 1, where its axis is
-    linear, or None).
+def _gapped(values, after, gap):
+    """The values as floats, with these more before the places `after`."""
+    return np.insert(np.asarray(values, float), after, gap)
 
-    A pole is a change of sign between neighbours that are both large, and larger than theirs.
+
+def _poles(values):
+    """(the places i of poles between i - 1 and i, where the values' axis is linear, or None).
+
+    A pole is a change of sign between neighbours that are large, and larger than theirs of their
+    sign.
     """
-    values = np.asarray(variable.values, dtype=float)
     size = np.abs(values)
     some = size[np.isfinite(size) & (size > 0.0)]
     if values.size < 8 or not some.size:
-        return variable, [], None
+        return np.zeros(0, int), None
     middle = float(np.median(some))
-    big = size > STEEP * middle
-    poles = np.flatnonzero((values[1:] * values[:-1] < 0.0) & big[1:] & big[:-1])
-    if not len(poles) or some.max() < WIDE_RANGE * middle:
-        return variable, [], None
-    gapped = variable.astype(float).copy()
-    gapped[poles] = np.nan
-    return gapped, poles, 0.1 * middle
+    big, sign = size > STEEP * middle, np.sign(values)
+    same = sign[1:] == sign[:-1]
+    rises, falls = size[1:] > RISE * size[:-1], size[:-1] > RISE * size[1:]
+    crosses = (sign[2:-1] == -sign[1:-2]) & big[2:-1] & big[1:-2]
+    poles = 2 + np.flatnonzero((same & rises)[:-2] & crosses & (same & falls)[2:])
+    wide = len(poles) and some.max() > WIDE_RANGE * middle
+    return poles, 0.1 * middle if wide else None

@@ -2,6 +2,8 @@
 ensembles, error bars.
 """
 
+import math
+
 import matplotlib
 import numpy as np
 import pytest
@@ -107,6 +109,37 @@ def test_the_discriminant_has_lines_at_2_and_a_diverging_map(ds):
     ]
 
 
+def contours(axes):
+    return [c for c in axes.collections if type(c).__name__ == "QuadContourSet"]
+
+
+def test_the_coarse_lines_at_2_are_left_out_where_exact_edges_are_drawn(tmp_path):
+    axes = {"a": {"start": 0.5, "stop": 5.0, "num": 12}, "q": {"start": 0.1, "stop": 1.0, "num": 9}}
+    asked = {"scene": "mathieu", "axes": axes, "boundaries": {"axis": "a"}}
+    made = survey.run(asked, output=tmp_path / "tongues.nc")
+    exact = made.survey.map("discriminant")
+    assert exact.lines and not contours(exact)
+    assert contours(made.survey.map("discriminant", boundaries=False))
+
+
+def test_lines_at_2_are_drawn_only_where_stability_ends_there():
+    damped = survey.hill(
+        lambda u, p: p[0] - 2 * p[1] * math.cos(2 * u),
+        period=math.pi,
+        parameters=("a", "q"),
+        damping=0.2,
+    )
+    made = survey.evaluate(damped, a=np.linspace(0.0, 2.0, 9), q=np.linspace(0.5, 2.0, 8))
+    assert abs(made.discriminant).max() > 2.0 and not contours(made.survey.map("discriminant"))
+    assert not level_lines(made.survey.slice(q=2.0).survey.map("discriminant"))
+    other = survey.evaluate("libration", mu=np.linspace(0.002, 0.01, 9))
+    assert not level_lines(other.survey.map("discriminant"))
+
+
+def level_lines(axes):
+    return [line for line in axes.lines if len(set(line.get_ydata())) == 1]
+
+
 def test_error_bars_are_drawn(ds):
     drawn = ds.survey.map("discriminant_error").collections[0]
     np.testing.assert_allclose(np.nanmax(drawn.get_array()), float(ds.discriminant_error.max()))
@@ -125,6 +158,46 @@ def test_ensembles_are_scattered_over_their_parameters():
     offsets = np.concatenate([c.get_offsets() for c in axes.collections])
     assert sorted(map(tuple, offsets)) == sorted(zip(made.a.values, made.q.values, strict=True))
     assert made.survey.map("discriminant").collections[0].get_offsets().shape == (40, 2)
+
+
+def drawn_a(number=40):
+    return xr.DataArray(np.random.default_rng(2).uniform(0.0, 4.0, number), dims="draw")
+
+
+def test_draws_of_one_parameter_are_a_profile_over_it():
+    made = survey.evaluate("mathieu", a=drawn_a(), q=[0.5])
+    for ds in (made, made.isel(q=0)):
+        axes = ds.survey.map()
+        heights = [text.get_text() for text in axes.get_yticklabels()]
+        shown = {x: heights[int(y)] for line in axes.lines for x, y in line.get_xydata()}
+        words = ds.survey.names().values.ravel().tolist()
+        assert axes.get_xlabel().endswith("$a$") and shown == dict(
+            zip(made.a.values, words, strict=True)
+        )
+        axes = ds.survey.map("discriminant")
+        order = np.argsort(made.a.values)
+        x, y = axes.lines[0].get_xydata().T
+        assert x.tolist() == made.a.values[order].tolist() and axes.get_xlabel().endswith("$a$")
+        assert y.tolist() == made.discriminant.values[order, 0].tolist()
+
+
+def test_draws_of_one_parameter_and_an_axis_are_scattered_over_both():
+    made = survey.evaluate("mathieu", a=drawn_a(), q=[0.5, 1.0])
+    pairs = sorted((a, q) for a in made.a.values for q in made.q.values)
+    for name in ("verdict", "discriminant"):
+        axes = made.survey.map(name)
+        assert axes.get_xlabel().endswith("$a$") and axes.get_ylabel().endswith("$q$")
+        offsets = np.concatenate(
+            [c.get_offsets() for c in axes.collections if len(c.get_offsets())]
+        )
+        assert sorted(map(tuple, offsets)) == pairs
+    assert made.survey.map("discriminant", x="q").get_ylabel().endswith("$a$")
+
+
+def test_an_ensemble_of_a_variable_with_a_further_dimension_shows_its_first_place():
+    mu = xr.DataArray(np.linspace(0.002, 0.01, 5), dims="draw")
+    made = survey.evaluate("libration", mu=mu).assign_coords(other=("draw", np.arange(5.0)))
+    assert "monomial 200" in made.survey.map("c").get_title()
 
 
 def test_narrow_tongues_are_lines_in_the_colour_of_instability(tmp_path):

@@ -80,6 +80,37 @@ def test_poles_are_gaps_with_marks_on_a_symmetric_logarithmic_axis():
     assert profile(x, y=(1e4 * np.sin(20 * x), {})).get_yscale() == "linear"
 
 
+@pytest.mark.parametrize("number", [40, 60, 100, 1000])
+def test_a_pole_between_few_points_is_seen_and_no_point_lost(number):
+    """The neighbours need not be far from the median."""
+    x = np.linspace(0.001, 0.038, number)
+    y = 2.0 + 0.5 / (x - 0.0243) + 1e-4 / (0.0385 - x) ** 2
+    axes = profile(x, y=(y, {}), y_error=(np.full(number, 0.1), {}))
+    assert len(axes.collections[0].get_paths()) == 2  # the band has the gap too
+    (pole,) = (line for line in axes.lines if line.get_label() == "pole")
+    assert abs(pole.get_xdata()[0] - 0.0243) < x[1] - x[0]
+    shown = axes.lines[0].get_ydata()
+    assert np.isnan(shown).sum() == 1 and shown[np.isfinite(shown)].tolist() == y.tolist()
+
+
+def test_noise_and_coarse_oscillations_have_no_poles():
+    x, random = np.linspace(0.0, 1.0, 2001), np.random.default_rng(3)
+    waves = [np.sin(step * np.arange(2001)) for step in np.linspace(0.1, 3.1, 31)]
+    for y in (random.normal(size=2001), np.sign(x - 0.5), *waves):
+        assert [line for line in profile(x, y=(y, {})).lines if line.get_label() == "pole"] == []
+
+
+@pytest.mark.parametrize("values", [[0, 0, 1, 2, 1], [3, 3, 3, 3, 3], [0, 1, np.nan, 1, 40]])
+def test_counts_are_steps_with_integer_ticks(values):
+    comment = {"comment": "-2 where it does not apply"}
+    axes = profile(X, y=(np.array(values), comment))
+    low, high = axes.get_ylim()
+    ticks = [tick for tick in axes.get_yticks() if low <= tick <= high]
+    assert ticks and all(tick == round(tick) for tick in ticks)
+    assert axes.lines[0].get_drawstyle() == "steps-mid"
+    assert profile(X, y=(X, {})).lines[0].get_drawstyle() == "default"
+
+
 def test_boundaries_on_the_only_axis_are_lines_by_kind():
     """Edges of tongues look as on maps and share an entry of the legend; others are dotted and bear
     their names.
