@@ -261,7 +261,7 @@ def test_what_has_no_boundaries_is_told():
         ("unknown parameter 'kk'", {"along": "kk", "rho": 1.0}),
         ("give near= a value of rho, or a range", {"along": "rho", "k": 0.5}),
         ("rho is missing", {"along": "k", "near": 0.3}),
-        (r"so give \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
+        (r"so give a range \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
         ("it must be one number in its domain", {"along": "rho", "near": 1.0, "k": [0.1, 0.2]}),
     ):
         with pytest.raises(BadInput, match=match):
@@ -277,6 +277,21 @@ def test_what_has_no_boundaries_is_told():
         survey.edge(
             "gyrostat_integrable", along="w0", near=1.0, case="elliptic", C22=0.5, C33=0.3, S2=0.2
         )
+
+
+@pytest.mark.parametrize(
+    ("scene", "along", "match"),
+    [
+        ("satellite", "amplitude_deg", r"physical input, .*; search along amplitude \(rad\)$"),
+        ("satellite", "A", r"search along inertia_ratio \(no unit\)$"),
+        ("libration_elliptic", "m2", r"search along mu \(no unit\)$"),
+        ("libration_elliptic", "body", r"search along mu \(no unit\) or e \(no unit\)$"),
+        ("libration", "period", r"'period' \(allowed: mu\)$"),  # nothing is known along periods
+    ],
+)
+def test_what_can_be_searched_is_named(scene, along, match):
+    with pytest.raises(BadInput, match=match):
+        survey.edge(scene, along=along)
 
 
 def test_margins_of_own_linear_periodic_systems():
