@@ -85,7 +85,7 @@ def _edge(scene, along, near, parameters, alone=False):
     ends = given.pop(along, None)
     known = [p.name for p in module.PARAMETERS]
     if along not in known:
-        raise BadInput(f"along: {modules.unknown('parameter', along, known)}")
+        raise BadInput(f"along: {_not_searched(module, measure, along, known)}")
     # named bodies then give what is left
     named = physical.resolved(module, given | {along: np.nan})
     given = {key: _plain(value) for key, value in named.items() if key != along}
@@ -105,6 +105,23 @@ def _edge(scene, along, near, parameters, alone=False):
             scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options
         )
     return _described(module, measure, used, along, fixed, *found)
+
+
+def _not_searched(module, measure, along, known):
+    """One line for a name that is no parameter: physical input, or unknown."""
+    if physical.meant(module, along):
+        names = " or ".join(
+            f"{p.name} ({'no unit' if p.units == '1' else p.units})"
+            for p in physical.meant(module, along)
+        )
+        return f"{along} is physical input, along which nothing is searched; search along {names}"
+
+    def are_known(name):
+        pairs = ([name, other] for other in known if other != name)
+        return any(measure.refusal(axes, module) is None for axes in ([name], *pairs))
+
+    searched = [name for name in known if not hasattr(measure, "refusal") or are_known(name)]
+    return modules.unknown("parameter", along, searched or known)
 
 
 def _plain(value):

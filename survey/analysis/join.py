@@ -25,15 +25,7 @@ from survey.wording import counted, shown
 SAME = ("scene", "scene_hash", "options", "method", "rtol")
 OF_PARTS = {"boundaries": "[boundaries]", "surfaces": "[boundaries]", "refine": "[refine]"}
 SUMMED = ("wall_time_s", "compile_time_s")
-OF_RUN = (
-    "fingerprint",
-    "blocks_reused",
-    "points_reused",
-    "edge_left_out",
-    "edge_incomplete_rows",
-    "curves_lost",
-    "curves_unexplained",
-)
+OF_RUN = ("fingerprint", "blocks_reused", "points_reused")
 
 
 def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Dataset:
@@ -211,7 +203,8 @@ def _described(joined, parts, axis):
     attributes["history"] = (
         f"{now()}: {command()}: {counted(len(parts), 'survey')} joined along {axis}"
     )
-    joined = joined.assign_attrs(attributes)
+    joined = joined.copy()
+    joined.attrs = attributes  # in place of those of the first part
     total = tally(joined)
     for arrays in reading.pieces(joined):
         total.add(arrays)

@@ -29,7 +29,8 @@ NO_FORMULAS = "tex2jax_ignore mathjax_ignore"
 # Attributes that concern the file, not a point.
 OF_FILE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
-    "surfaces", "surfaces_left_out", "complete",
+    "surfaces", "surfaces_left_out", "edge_left_out", "edge_incomplete_rows", "curves_lost", "curves_unexplained",
+    "complete",
 )  # fmt: skip
 
 

@@ -160,6 +160,16 @@ def words(scene):
     return {name for names in described(scene) for name in names.split(", ")}
 
 
+def meant(scene, word):
+    """The scene's parameters in whose place this physical input stands; [] for any other word."""
+    if word not in words(scene):
+        return []
+    angle = word.removesuffix(DEGREES)
+    names = {"body": ("mu", "e")} | dict.fromkeys(MASSES, ("mu",))
+    names |= dict.fromkeys(MOMENTS, ("inertia_ratio",))
+    return [p for p in scene.PARAMETERS if p.name in names.get(word, (angle,))]
+
+
 def described(scene):
     """Sentences on what the scene takes in place of its parameters, {names: words}."""
     names = {p.name: p for p in scene.PARAMETERS}

@@ -127,7 +127,7 @@ class _Folder(ModuleType):
 
     def __call__(self):
         return {name: _title(name) for name in modules.names(self)} | {
-            name: load(name).TITLE for name in brought()
+            name: _title_brought(point) for name, point in brought().items()
         }
 
 
@@ -149,6 +149,16 @@ def _title(name):
         title = _constant(source, "TITLE")
         return title if title is not None else load(name).TITLE
     return load(name).TITLE
+
+
+def _title_brought(point):
+    """TITLE of a scene of another package, or why it has none: a broken one must not hide the others."""
+    try:
+        module = point.load()
+        _check(module)
+    except Exception as error:
+        return f"cannot be loaded: {_reason(error)}"
+    return module.TITLE
 
 
 def _constant(source, name):
@@ -178,8 +188,12 @@ def _loaded(name, point):
     except Exception as error:
         raise BadInput(
             f"the scene {name} of the package {point.dist.name if point.dist else point.value} cannot be loaded "
-            f"({type(error).__name__}: {short(error, 150)})"
+            f"({_reason(error)})"
         ) from None
+
+
+def _reason(error):
+    return f"{type(error).__name__}: {short(error, 150)}"
 
 
 @cache

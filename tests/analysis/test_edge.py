@@ -279,6 +279,21 @@ def test_what_has_no_boundaries_is_told():
         )
 
 
+@pytest.mark.parametrize(
+    ("scene", "along", "match"),
+    [
+        ("satellite", "amplitude_deg", r"physical input, .*; search along amplitude \(rad\)$"),
+        ("satellite", "A", r"search along inertia_ratio \(no unit\)$"),
+        ("libration_elliptic", "m2", r"search along mu \(no unit\)$"),
+        ("libration_elliptic", "body", r"search along mu \(no unit\) or e \(no unit\)$"),
+        ("libration", "period", r"'period' \(allowed: mu\)$"),  # nothing is known along periods
+    ],
+)
+def test_what_can_be_searched_is_named(scene, along, match):
+    with pytest.raises(BadInput, match=match):
+        survey.edge(scene, along=along)
+
+
 def test_margins_of_own_linear_periodic_systems():
     """The nearest change of the verdict, and none between; a rotor of twelve states too."""
     point = {"omega": 20.0, "damping": 4000.0, "lost": 1.0}

@@ -80,6 +80,9 @@ def test_what_belongs_to_the_parts_is_left_out_with_a_word(tmp_path, monkeypatch
     ):
         joined = survey.concat(["low.nc", "high.nc"])
     assert "curve_count" not in joined and joined.sizes["a"] == 8
+    counts = {"boundaries", "edge_incomplete_rows", "curves_lost"}
+    assert counts <= survey.open("low.nc").attrs.keys()
+    assert not (counts | {"fingerprint"}) & joined.attrs.keys()
     assert join.merge(["low.nc", "high.nc"], "both.nc")[1].startswith("the results of [boundaries]")
     with pytest.raises(BadInput, match="merge: surveys are joined along one axis"):
         join.merge(["low.nc", "low.nc"], "x.nc")

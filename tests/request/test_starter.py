@@ -110,6 +110,9 @@ def test_another_package_brings_a_scene(tmp_path, monkeypatch):
             survey.evaluate("broken", a=1.0)
         with pytest.raises(BadInput, match="did you mean 'brought'"):
             survey.evaluate("brougt", a=1.0)
+        titles = survey.scenes()
+        assert titles["brought"] == "Brought along" and "mathieu" in titles
+        assert titles["broken"].startswith("cannot be loaded: ModuleNotFoundError: No module named")
     finally:
         scenes.brought.cache_clear()
         sys.modules.pop("brought_scene", None)
