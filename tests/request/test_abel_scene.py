@@ -3,6 +3,7 @@ said in one line.
 """
 
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -171,3 +172,19 @@ def test_wrong_functions_are_one_line(given, words):
     with pytest.raises(BadInput, match=words) as refusal:
         survey.evaluate(scene(**given), mu=1.0, phi0=2.0, t=1.0, question="trajectory")
     assert "\n" not in str(refusal.value)
+
+
+def test_constants_may_stand_in_a_dict_or_be_fractions():
+    table, third = {"g": 2.0}, Fraction(1, 3)
+    given = {"parameters": "k", "period": 2 * math.pi}
+    own, plain = (
+        survey.evaluate(
+            survey.abel(lambda phi, p: -p[0], g, **given),
+            k=0.3, phi0=0.5, w0=0.2, t=1.0, question="trajectory",
+        )
+        for g in (
+            lambda phi, p: -table["g"] * third * math.sin(phi),
+            lambda phi, p: -2.0 * (1 / 3) * math.sin(phi),
+        )
+    )  # fmt: skip
+    assert own.w.values == plain.w.values

@@ -14,6 +14,7 @@ import math
 import threading
 from functools import cache
 from itertools import pairwise
+from numbers import Rational
 from operator import mul
 from types import CellType, CodeType, FunctionType, ModuleType
 
@@ -110,6 +111,10 @@ class _Refused:
     def __getattr__(self, name):
         raise Unsupported(self._words)
 
+    __getitem__ = __bool__ = __float__ = __neg__ = __abs__ = __call__
+    __add__ = __sub__ = __mul__ = __truediv__ = __pow__ = __lt__ = __le__ = __gt__ = __ge__ = __call__
+    __radd__ = __rsub__ = __rmul__ = __rtruediv__ = __rpow__ = __call__
+
 
 class _Module:
     """math or numpy, with mpmath's functions."""
@@ -132,6 +137,10 @@ def _lift(value, seen, mp):
         return value.item() if np.ndim(value) == 0 else value.tolist()
     if isinstance(value, (tuple, list)):
         return type(value)(_lift(item, seen, mp) for item in value)
+    if isinstance(value, dict):
+        return {key: _lift(item, seen, mp) for key, item in value.items()}
+    if isinstance(value, Rational):
+        return float(value)  # as Python takes it beside a float
     if isinstance(value, FunctionType):
         return _function(value, seen, mp)
     if value in (math, np):
