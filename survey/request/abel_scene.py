@@ -7,7 +7,7 @@ import numpy as np
 
 from survey import methods
 from survey.measures.cylinder import basins, blocks, equation, motion, solution
-from survey.measures.cylinder.ahead import of_functions
+from survey.measures.cylinder.compile_ahead import of_functions
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
 from survey.measures.hill.multiprecision import Unsupported
 from survey.modules import load

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
-from survey.measures.floquet.ahead import compile_ahead
+from survey.measures.floquet.compile_ahead import compile_ahead
 from survey.measures.floquet.halves import alike_or_opposite
 from survey.measures.floquet.system import System
 from survey.request.traced_scene import TracedScene, rebinds

@@ -101,7 +101,7 @@ from survey.measures.cylinder import (
     separatrix_fate,
     solution,
 )
-from survey.measures.cylinder.ahead import compile_ahead as compile_ahead
+from survey.measures.cylinder.compile_ahead import compile_ahead as compile_ahead
 from survey.measures.cylinder.fate import NO_TURNS
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, named, plus_minus

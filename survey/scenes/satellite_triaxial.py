@@ -42,7 +42,7 @@ from survey.kernels.hill.satellite import half_periods
 from survey.kernels.math.roundoff import EPS
 from survey.measures import linear_motion
 from survey.measures.floquet import motion, stability
-from survey.measures.floquet.ahead import compile_ahead as compile_ahead
+from survey.measures.floquet.compile_ahead import compile_ahead as compile_ahead
 from survey.measures.floquet.multipliers import MARGINAL, UNDECIDED
 from survey.measures.floquet.system import System
 from survey.measures.hill.satellite import moduli

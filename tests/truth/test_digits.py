@@ -5,7 +5,7 @@ import pytest
 from mpmath import mp, mpf
 
 import survey
-from survey.truth import digits, own
+from survey.truth import digits, user_equations
 
 POINTS = {
     "harmonics": [3.0, 1.0, -2.0, 0.0, 0.5, 0.3, 0.0, -1.0, 0.2, 0.7],
@@ -18,10 +18,10 @@ POINTS = {
 
 @pytest.mark.parametrize("name", POINTS)
 def test_it_agrees_with_the_other_truths(name):
-    z, parameters, _kind, more = own.OWN[name]
+    z, parameters, _kind, more = user_equations.OWN[name]
     scene = survey.hill(z, parameters=parameters, **more)
     p = np.array(POINTS[name])
-    known, seen = own.solved(name, p[None])[0], []
+    known, seen = user_equations.solved(name, p[None])[0], []
     original = digits._factors
 
     def watched(*arguments):

@@ -8,7 +8,7 @@ from attack import command, compare, floquet
 from mpmath import mp, mpf
 
 import survey
-from survey.truth import brun, brun_sums, danby, gyrostat_flow, hill, own
+from survey.truth import brun, brun_sums, danby, gyrostat_flow, hill, user_equations
 from survey.truth.brun_digits import truth as brun_in_full
 
 FAULTS = compare.FAULTS
@@ -273,7 +273,7 @@ def test_truth_of_own_equations(name):
 
         def z(u, piece):
             if name.startswith("harmonics"):
-                x = mpf(own.TWO_PI) * u / exact[9]
+                x = mpf(user_equations.TWO_PI) * u / exact[9]
                 waves = (
                     exact[n] * mp.cos(n * x) + exact[4 + n] * mp.sin(n * x) for n in range(1, 5)
                 )
@@ -289,7 +289,7 @@ def test_truth_of_own_equations(name):
             if start < stop:
                 x = mp.odefun(lambda u, x, n=piece: [x[1], -z(u, n) * x[0], x[3], -z(u, n) * x[2]], mpf(start), x,
                               tol=mpf(10) ** -13)(mpf(stop))  # fmt: skip
-        out = own.solved(name, p[None])[0]
+        out = user_equations.solved(name, p[None])[0]
         for i, true in zip((0, 2, 1, 3), x, strict=True):
             assert abs(in_full(out, i) - true) < 1e-11 * (1 + abs(true))
 
@@ -310,7 +310,9 @@ def test_the_command(tmp_path, capsys):
 def test_truth_of_a_spike():
     """A weak spike changes y1(T) by its first-order term (Picard), which mpmath integrates."""
     weak, at, wide, rate = 1e-9, 0.3, 1e-3, 5.0
-    out, rest = (own.solved("spike", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0))
+    out, rest = (
+        user_equations.solved("spike", np.array([[rate, b, at, wide]]))[0] for b in (weak, 0.0)
+    )
     root = mp.sqrt(mpf(rate))
 
     def term(u):

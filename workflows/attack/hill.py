@@ -9,11 +9,11 @@ import numpy as np
 
 import survey
 from attack.compare import Batch
-from survey.truth import own as own_truth
+from survey.truth import user_equations
 from survey.truth.hill import WAYS, mathieu_solved, satellite, solved
 from survey.truth.hill import mathieu as true_mathieu
 from survey.truth.hill_flow import INERTIA, RHO
-from survey.truth.own import OWN
+from survey.truth.user_equations import OWN
 
 METHODS = ("auto", "auto", "auto", "taylor16", "magnus6", "rk4", "dop853")
 SPECIAL_K = (
@@ -332,7 +332,7 @@ def own(random, size):
                 region, p[:] = "beside an edge", row
                 p[:, 0] = beside(random, x, number)
         given = dict(zip(OWN[name][1], p.T, strict=True))
-        yield Batch(f"own {name}", region, given, own_truth.true(name), own_scene(name), {}, method, rtol,
+        yield Batch(f"own {name}", region, given, user_equations.true(name), own_scene(name), {}, method, rtol,
                     f"own_scene({name!r})")  # fmt: skip
         used += number
 
@@ -401,7 +401,7 @@ def _draw_spikes(random, name, size):
 def _own_margin(name, x, row):
     p = np.tile(row, (len(x), 1))
     p[:, 0] = x
-    out = own_truth.solved(name, p)
+    out = user_equations.solved(name, p)
     if OWN[name][3].get("even"):
         return _factors(out)
     trace = out[:, 0] + out[:, 6]

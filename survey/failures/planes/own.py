@@ -4,7 +4,7 @@ import numpy as np
 
 from survey.failures.plane import Plane, few, logarithmic, plain
 from survey.request.user_scene import hill
-from survey.truth import own
+from survey.truth import user_equations
 
 ABOUT = """z is known only from its samples: a spike that is narrower than their spacing (T/128) can only be refused, or
 found where its position is named as a break; a break beside an end leaves a piece of no length; a stiff z
@@ -17,7 +17,7 @@ def planes(share):
 
 
 def _scene(name):
-    z, parameters, _kind, more = own.OWN[name]
+    z, parameters, _kind, more = user_equations.OWN[name]
     return hill(z, parameters=parameters, **more)
 
 
@@ -30,7 +30,7 @@ def _spikes(name, share):
     words = "whose place is\na break" if "named" in name else "that is not\nnamed"
     return Plane(
         f"a spike {words}", logarithmic("half width of the spike, of $T$", width), plain("$a$", a), _scene(name),
-        {"a": a[:, None], "b": 2.0 / d, "c": c, "d": d}, own.true(name),
+        {"a": a[:, None], "b": 2.0 / d, "c": c, "d": d}, user_equations.true(name),
         "z = a + 2 / (d + (u - 0.37)^2 / d). Truth: Taylor series of order 30 in double-double.", slow=("rk4",),
     )  # fmt: skip
 
@@ -39,7 +39,7 @@ def _breaks(share):
     gap, b = np.linspace(-15.0, -0.31, few(share, 20)), np.linspace(-200.0, 1000.0, few(share, 16))
     return Plane(
         "a break beside\nthe start", logarithmic("place of the break, of $T$", gap), plain("$b$ behind it", b),
-        _scene("meissner"), {"a": 3e4, "b": b[:, None], "c": 10.0 ** gap[None]}, own.true("meissner"),
+        _scene("meissner"), {"a": 3e4, "b": b[:, None], "c": 10.0 ** gap[None]}, user_equations.true("meissner"),
         "z = 3e4 before the break and b behind it. Truth: the closed form, 50 digits.",
     )  # fmt: skip
 
@@ -47,7 +47,7 @@ def _breaks(share):
 def _stiff(share):
     a, part = np.linspace(0.0, 7.0, few(share, 20)), np.linspace(-0.9, 1.1, few(share, 14))
     rate = 10.0 ** a[None]
-    given = {name: 0.0 for name in own.LONG_NAMES} | {
+    given = {name: 0.0 for name in user_equations.LONG_NAMES} | {
         "T": 1.0,
         "a": rate,
         "c1": rate * part[:, None],
@@ -55,6 +55,6 @@ def _stiff(share):
     }
     return Plane(
         "stiff z", logarithmic("size of $z$", a), plain("its first harmonic, over its mean", part),
-        _scene("harmonics"), given, own.true("harmonics"),
+        _scene("harmonics"), given, user_equations.true("harmonics"),
         "z = a (1 + c cos 2 pi u + 0.3 cos 4 pi u). Truth: Taylor series of order 30 in double-double.", slow=("rk4",),
     )  # fmt: skip

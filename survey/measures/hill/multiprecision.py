@@ -112,7 +112,9 @@ class _Refused:
         raise Unsupported(self._words)
 
     __getitem__ = __bool__ = __float__ = __neg__ = __abs__ = __call__
-    __add__ = __sub__ = __mul__ = __truediv__ = __pow__ = __lt__ = __le__ = __gt__ = __ge__ = __call__
+    __add__ = __sub__ = __mul__ = __truediv__ = __pow__ = __lt__ = __le__ = __gt__ = __ge__ = (
+        __call__
+    )
     __radd__ = __rsub__ = __rmul__ = __rtruediv__ = __rpow__ = __call__
 
 
