@@ -14,7 +14,7 @@ RTOL = 1e-10
 
 
 @dataclass(frozen=True)
-class Axis:
+class PlaneAxis:
     """An axis of a picture: its label, the number of its cells, and {cell: tick label}."""
 
     label: str
@@ -32,8 +32,8 @@ class Plane:
     """
 
     title: str
-    x: Axis
-    y: Axis
+    x: PlaneAxis
+    y: PlaneAxis
     scene: object
     given: Mapping[str, object]
     truth: Callable
@@ -80,7 +80,7 @@ def few(share, number, least=4):
 def plain(label, values):
     """An axis of even values."""
     some = np.unique(np.linspace(0, len(values) - 1, 5).round().astype(int))
-    return Axis(label, len(values), {i: f"{values[i]:.3g}" for i in some})
+    return PlaneAxis(label, len(values), {i: f"{values[i]:.3g}" for i in some})
 
 
 def logarithmic(label, exponents):
@@ -90,7 +90,9 @@ def logarithmic(label, exponents):
     whole = whole[:: max(1, len(whole) // 4)]
     order = np.argsort(exponents)
     at = np.interp(whole, np.asarray(exponents)[order], np.arange(len(exponents))[order])
-    return Axis(label, len(exponents), {i: f"$10^{{{k}}}$" for i, k in zip(at, whole, strict=True)})
+    return PlaneAxis(
+        label, len(exponents), {i: f"$10^{{{k}}}$" for i, k in zip(at, whole, strict=True)}
+    )
 
 
 def two_sided(label, exponents):
@@ -103,9 +105,9 @@ def two_sided(label, exponents):
         size - 0.5: "0"
     }
     ticks |= {size + i: f"$10^{{{k}}}$" for i, k in zip(at, marks, strict=True)}
-    return Axis(label, 2 * size, ticks), offsets
+    return PlaneAxis(label, 2 * size, ticks), offsets
 
 
 def named(label, names):
     """An axis of a few cells, each with its own name."""
-    return Axis(label, len(names), dict(enumerate(names)))
+    return PlaneAxis(label, len(names), dict(enumerate(names)))

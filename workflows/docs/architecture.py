@@ -25,7 +25,8 @@ already says, or lead to the small modules at the bottom, which everything may u
 ![The packages of survey in layers, with an arrow for every import between them; all arrows point down](imports.svg)
 
 A survey runs down the figure. A command (`cli`) or a call from Python (`api`) has its workflow
-checked (`request`); the grid is cut into blocks, and each block is solved (`sweep`). For that a
+checked (`request`); the grid is cut into blocks, and each block is solved (`sweep`; a package named
+`run` would hide the function `survey.run`). For that a
 *scene*, the physical system, hands its equations to a *measure*, the question; the measure calls a
 *method*, an integrator or a quadrature, whose inner loops are *kernels*. The results are labelled
 and stored (`file`) and drawn (`show`); what is asked of a finished survey is `analysis`.

@@ -4,6 +4,7 @@ both ends are known.
 Others differ in more than their function: `math.quartic.root` starts from parabolas and ends in
 double-double, `cylinder.returns.solved` stops at the image of another orbit, or one that is
 accurate enough, and keeps the last image; `nutation.wells.lowest` keeps its steps strictly inside.
+Polishing a zero that is known already, by a fixed number of steps, needs no bracket.
 """
 
 from survey.kernels.jit import inline

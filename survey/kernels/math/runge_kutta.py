@@ -1,9 +1,12 @@
 """The steps of explicit Runge-Kutta methods, once for all systems; the bits are those of the loops
 written out.
 
-Three stay apart: two that round in another order, rk4's step of Hill's equation and dop853's of the
-flow; and dop853's of Hill's equation, written out, which leaves out the zeros of the tableau and is
-faster.
+Others stay apart. Two round in another order: rk4's step of Hill's equation and dop853's of the
+flow. Dop853's of Hill's equation is written out, which leaves out the zeros of the tableau and is
+faster; that of the whole gyrostat keeps its stages in the table that its error estimate reads.
+Linear periodic systems (`kernels.floquet.classical` and
+`kernels.floquet.runge_kutta`) have matrices for slopes, of a size that is known when the kernel
+runs, and take the steps of many points side by side.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.1.
 """
