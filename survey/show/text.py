@@ -11,7 +11,14 @@ from survey.wording import plain
 
 MAX_TEXT, MAX_FORMULA = 300, 120  # characters of a text and of a formula in a file
 WIDE = 80  # characters of a line below axes, where `layout.fit` breaks what is wider
-OF_QUESTION = ("question", "branch")  # options that say nothing of the system
+OF_QUESTION = ("question", "branch", "motion")  # options that say nothing of the system
+# what the values of other options mean, where they do not say it themselves
+IN_WORDS = {
+    "axis": "rotation about the axis of {}",
+    "separatrix": "{} separatrix",
+    "side": "{} side",
+    "root": "{} root",
+}
 _RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
 MAX_DEPTH = 6  # of nested braces in a formula
 WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
@@ -113,7 +120,9 @@ def options_in_words(ds):
     """
     pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
     return ", ".join(
-        spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha()
+        IN_WORDS.get(key, "{}").format(spaced(value))
+        for key, value in pairs
+        if key not in OF_QUESTION and value[:1].isalpha()
     )
 
 
