@@ -30,8 +30,14 @@ def literal(text, most=MAX_TEXT):
 
 
 def formula(symbol, name):
-    """`symbol` as a formula, if it is TeX that matplotlib can draw; else the name as text."""
-    return f"${symbol}$" if _is_formula(symbol) else literal(name)
+    """`symbol` as a formula, if it is TeX that matplotlib can draw, and not the name, which would
+    become subscripts; else the name as text.
+    """
+    return f"${symbol}$" if _is_formula(symbol) and not _is_name(symbol, name) else literal(name)
+
+
+def _is_name(symbol, name):
+    return symbol == name and len(symbol) > 2
 
 
 @lru_cache(maxsize=512)
@@ -63,7 +69,7 @@ def label_of(variable, width=40):
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
-    shown = shown and not (symbol == variable.name and len(symbol) > 2)  # a name, not a formula
+    shown = shown and not _is_name(symbol, variable.name)
     # TeX is longer than what it shows: inserted last; a name that only spells its symbol would
     # repeat it
     text = (
