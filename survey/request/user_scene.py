@@ -674,7 +674,7 @@ def _hill(
             names.append(place)
     damped = c is not None or place is not None
     equation = f"y'' + 2 {place or 'c'} y' + z(u, p) y = 0" if damped else "y'' + z(u, p) y = 0"
-    about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(names)}).")
+    about, title = _told(name, about, title, equation, parameters)
     known = (z, period, breaks, parameters, even, *([damping] if damped else []))
     shared = dict(
         z=z, period=period, breaks=breaks, own=parameters,
@@ -705,8 +705,7 @@ def _abel(
     )
     if period is not None and not (is_number(period) and abs(period - 2 * np.pi) <= 1e-15 * period):
         refuse(f"PERIOD = {period!r}: it must be 2 pi, to which phi can be scaled, or None")
-    names = ", ".join(p.name for p in parameters)
-    about = inspect.cleandoc(about or f"w w' = f(phi, p) w + g(phi, p), p = ({names}).")
+    about, title = _told(name, about, title, "w w' = f(phi, p) w + g(phi, p)", parameters)
     known = (f, g, period, parameters)
     described = _described(name, text, title, about, references or ABEL_REFERENCES, known)
     return AbelScene(f=f, g=g, period=period, own=parameters, **described)
@@ -760,7 +759,7 @@ def _floquet(
     if conserved is not None and (structure != "none" or len(names) < 2):
         refuse("CONSERVED is for STRUCTURE = 'none', and two states at least")
     equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
-    about = inspect.cleandoc(about or f"{equation}, p = ({', '.join(p.name for p in parameters)}).")
+    about, title = _told(name, about, title, equation, parameters)
     known = (*matrices.items(), period, breaks, parameters, names, structure)
     known += () if conserved is None else (conserved,)
     return FloquetScene(
@@ -825,10 +824,8 @@ def _orbit(
             refuse(
                 f"START ends in {start[-1]:g}, the guess of the period, as PERIOD is None; it must be positive"
             )
-    about = inspect.cleandoc(
-        about
-        or f"Periodic orbits of x' = f(t, x, p), p = ({', '.join(p.name for p in parameters)})."
-    )
+    equation = "Periodic orbits of x' = f(t, x, p)"
+    about, title = _told(name, about, title, equation, parameters)
     known = (
         f,
         period,
@@ -846,8 +843,23 @@ def _orbit(
     )  # fmt: skip
 
 
+def _told(
+    name: str, about: str | None, title: str | None, equation: str, parameters: Iterable[Parameter]
+) -> tuple[str, str]:
+    """(docstring, title): where there is none, the equation, in the title with the name of the file
+    or of the functions, if that is more than a letter.
+    """
+    about = inspect.cleandoc(about or "")
+    if about:
+        return about, title or about.splitlines()[0].rstrip(".")
+    own = Path(name).stem if name.endswith(".py") else name.partition("(")[2].rstrip(")")
+    says = any(len(part) > 1 and part != "lambda" for part in own.split(", "))
+    names = ", ".join(p.name for p in parameters)
+    return f"{equation}, p = ({names}).", title or (f"{own}: {equation}" if says else equation)
+
+
 def _described(
-    name: str, text: str, title: str | None, about: str, references: Iterable[str], known: Any
+    name: str, text: str, title: str, about: str, references: Iterable[str], known: Any
 ) -> dict[str, Any]:
     """The fields that say what a scene is; `known` is what its hash is of, if there is no file."""
     bits = text.encode() if name.endswith(".py") else _bits(known)
@@ -855,7 +867,7 @@ def _described(
         "NAME": name,
         "TEXT": text,
         "HASH": hashlib.sha256(bits).hexdigest(),
-        "TITLE": title or about.splitlines()[0].rstrip("."),
+        "TITLE": title,
         "about": about,
         "REFERENCES": tuple(references),
     }

@@ -7,26 +7,39 @@ from math import inf
 from matplotlib.transforms import ScaledTranslation
 
 SAFE_PART = 0.95  # of the space for a text: fonts are a little wider at other resolutions
+SHORTEST = 10  # characters of a line
 OVERHANG = 1.2  # of the width of axes that have neighbours: texts may reach into the gap
 
 
+MOST_LINES, SMALLEST = (
+    3,
+    6.0,
+)  # of the label of a colour bar, before its letters shrink; and to which
 LAST = r"(?<=,) \$[^$]*\$( \([^)]*\))?$"  # the symbol and the unit of a label
+FORMULA, INTERVAL = r"\$[^$]*\$", r"\[[^][()]{1,12}[])]"  # stay whole, such as [0, 2 pi)
 
 
 def fit(axes):
-    """Wrap the title and the labels that would not fit, as the figure is laid out now."""
+    """Wrap the title and the labels that would not fit, as the figure is laid out now; a colour
+    bar's label is no longer than the bar.
+    """
     axes.figure.figure.draw_without_rendering()
-    for panel in [
-        axes,
-        *(other for other in axes.figure.axes if other.get_label() == "<colorbar>"),
-    ]:
-        width, height = _space(panel, inf if alone(axes) else OVERHANG)
-        for text, space in (
-            (panel.title, width),
-            (panel.xaxis.label, width),
-            (panel.yaxis.label, height),
-        ):
-            wrap(text, space)
+    width, height = _space(axes, inf if alone(axes) else OVERHANG)
+    wrap(axes.title, width)
+    wrap(axes.xaxis.label, width, joined=True)
+    wrap(axes.yaxis.label, height, joined=True)
+    for bar in axes.figure.axes:
+        if bar.get_label() == "<colorbar>":
+            _fit_beside(bar.yaxis.label, bar.get_window_extent().height)
+
+
+def _fit_beside(label, height):
+    """Wrap the label of a colour bar; where it takes many lines, in smaller letters."""
+    original = label.get_text()
+    wrap(label, height, joined=True)
+    while label.get_text().count("\n") >= MOST_LINES and label.get_fontsize() > SMALLEST:
+        label.set(text=original, fontsize=label.get_fontsize() - 0.5)
+        wrap(label, height, joined=True)
 
 
 def _space(axes, most):
@@ -39,24 +52,39 @@ def _space(axes, most):
     return min(width, most * own.width), min(height, most * own.height)
 
 
-def wrap(text, space):
-    """Break the lines of a matplotlib Text that are longer than `space` pixels.
+def wrap(text, space, joined=False):
+    """Break the lines of a matplotlib Text that are longer than `space` pixels, as evenly as their
+    number allows; `joined`: as one line.
 
     A formula stays whole, and at the end of a label beside its name and unit.
     """
     original = text.get_text()
-    for length in range(max(map(len, original.split("\n"))), 9, -3):
-        box = text.get_window_extent()
-        if (box.height if text.get_rotation() else box.width) <= SAFE_PART * space:
+    if _fits(text, space):
+        return
+    lines = [" ".join(original.split("\n"))] if joined else original.split("\n")
+    length = max(map(len, lines))
+    while length > SHORTEST and not _fits(text, space):
+        length -= 1
+        text.set_text(_broken(lines, length))
+    while length > SHORTEST:
+        length, last = length - 1, text.get_text()
+        text.set_text(_broken(lines, length))
+        if text.get_text().count("\n") > last.count("\n") or not _fits(text, space):
+            text.set_text(last)
             return
-        joined = re.sub(LAST, lambda end: end[0].replace(" ", "\0"), original)
-        joined = re.sub(r"\$[^$]*\$", lambda formula: formula[0].replace(" ", "\0"), joined)
-        lines = joined.split("\n")
-        wrapped = [
-            textwrap.fill(line, length, break_long_words=False, break_on_hyphens=False)
-            for line in lines
-        ]
-        text.set_text("\n".join(wrapped).replace("\0", " "))
+
+
+def _fits(text, space):
+    box = text.get_window_extent()
+    return (box.height if text.get_rotation() else box.width) <= SAFE_PART * space
+
+
+def _broken(lines, length):
+    """The text of lines of at most so many characters."""
+    short = {"break_long_words": False, "break_on_hyphens": False}
+    for part in (LAST, FORMULA, INTERVAL):
+        lines = [re.sub(part, lambda found: found[0].replace(" ", "\0"), line) for line in lines]
+    return "\n".join(textwrap.fill(line, length, **short) for line in lines).replace("\0", " ")
 
 
 def alone(axes):

@@ -11,7 +11,14 @@ from survey.wording import plain
 
 MAX_TEXT, MAX_FORMULA = 300, 120  # characters of a text and of a formula in a file
 WIDE = 80  # characters of a line below axes, where `layout.fit` breaks what is wider
-OF_QUESTION = ("question", "branch")  # options that say nothing of the system
+OF_QUESTION = ("question", "branch", "motion")  # options that say nothing of the system
+# what the values of other options mean, where they do not say it themselves
+IN_WORDS = {
+    "axis": "rotation about the axis of {}",
+    "separatrix": "{} separatrix",
+    "side": "{} side",
+    "root": "{} root",
+}
 _RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
 MAX_DEPTH = 6  # of nested braces in a formula
 WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
@@ -23,8 +30,14 @@ def literal(text, most=MAX_TEXT):
 
 
 def formula(symbol, name):
-    """`symbol` as a formula, if it is TeX that matplotlib can draw; else the name as text."""
-    return f"${symbol}$" if _is_formula(symbol) else literal(name)
+    """`symbol` as a formula, if it is TeX that matplotlib can draw, and not the name, which would
+    become subscripts; else the name as text.
+    """
+    return f"${symbol}$" if _is_formula(symbol) and not _is_name(symbol, name) else literal(name)
+
+
+def _is_name(symbol, name):
+    return symbol == name and len(symbol) > 2
 
 
 @lru_cache(maxsize=512)
@@ -56,7 +69,7 @@ def label_of(variable, width=40):
     symbol, units = variable.attrs.get("symbol", ""), variable.attrs.get("units", "1")
     text = literal(variable.attrs.get("long_name", variable.name))
     shown = _is_formula(symbol) and "flag_values" not in variable.attrs
-    shown = shown and not (symbol == variable.name and len(symbol) > 2)  # a name, not a formula
+    shown = shown and not _is_name(symbol, variable.name)
     # TeX is longer than what it shows: inserted last; a name that only spells its symbol would
     # repeat it
     text = (
@@ -118,7 +131,9 @@ def options_in_words(ds):
     """
     pairs = [part.partition("=")[::2] for part in str(ds.attrs.get("options", "")).split(", ")]
     return ", ".join(
-        spaced(value) for key, value in pairs if key not in OF_QUESTION and value[:1].isalpha()
+        IN_WORDS.get(key, "{}").format(spaced(value))
+        for key, value in pairs
+        if key not in OF_QUESTION and value[:1].isalpha()
     )
 
 

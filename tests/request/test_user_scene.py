@@ -2,6 +2,8 @@
 said in one line.
 """
 
+import math
+
 import dask.array as da
 import numpy as np
 import pytest
@@ -246,3 +248,23 @@ def test_an_equation_without_a_force_is_answered():
     ds = survey.evaluate(free, a=[0.0, 1e-3])
     assert (ds.status == 0).all() and ds.verdict[0] != 0  # y = 1 and y = u: D = 2, on an edge
     assert abs(ds.discriminant[0] - 2) <= ds.discriminant_error[0]
+
+
+def test_a_file_or_function_that_says_nothing_gives_its_name_to_the_title(tmp_path):
+    def pendulum(u, p):
+        return p[0] - 2 * p[1] * math.cos(2 * u)
+
+    text = "from math import cos, pi\nPERIOD, PARAMETERS = pi, ('a', 'q')\n\n\n"
+    text += "def z(u, p):\n    return p[0] - 2 * p[1] * cos(2 * u)\n"
+    file = tmp_path / "my_pendulum.py"
+    for docstring, title in (
+        ("", "my_pendulum: y'' + z(u, p) y = 0"),
+        ('""" """\n', "my_pendulum: y'' + z(u, p) y = 0"),
+        ('"""My pendulum."""\n', "My pendulum"),
+    ):
+        file.write_text(docstring + text)
+        assert survey.evaluate(str(file), a=1.0, q=0.5).attrs["title"] == title
+    made = {"period": math.pi, "parameters": ("a", "q")}
+    assert survey.hill(pendulum, **made).TITLE == "pendulum: y'' + z(u, p) y = 0"
+    assert survey.hill(lambda u, p: p[0] + p[1], **made).TITLE == "y'' + z(u, p) y = 0"
+    assert survey.hill(pendulum, title="Own", **made).TITLE == "Own"

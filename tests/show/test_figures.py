@@ -263,6 +263,29 @@ def test_nothing_is_clipped_in_narrow_axes(bare, columns, size, style):
     plt.close(figure)
 
 
+@pytest.mark.parametrize("style", [None, "paper"])
+@pytest.mark.parametrize(
+    "words",
+    [
+        "growth exponent of the amplitude per period, negative where all motions decay",
+        "equilibrium that is reached, in [0, 2 pi), or right turning point of the libration cycle",
+    ],
+)
+def test_labels_of_colour_bars_are_wrapped_evenly_within_the_bar(surveyed, words, style):
+    ds = survey.open(surveyed).load()
+    ds.w.attrs |= {"long_name": words, "symbol": r"\phi_\infty", "units": "rad"}
+    figure = figures.draw(ds, "w", style)
+    figure.draw_without_rendering()
+    (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
+    label = bar.yaxis.label
+    drawn, lines = label.get_window_extent(), label.get_text().split("\n")
+    assert 1 < len(lines) <= 4 and drawn.height <= bar.get_window_extent().height
+    assert drawn.x1 <= figure.bbox.x1 and " ".join(lines).startswith(words)
+    assert min(map(len, lines)) > 0.4 * max(map(len, lines)), lines
+    assert "[0, 2 pi)" in label.get_text() or "pi" not in words
+    plt.close(figure)
+
+
 def test_a_single_number_has_no_figure(surveyed):
     with pytest.raises(BadInput, match="at least one axis"):
         figures.draw(survey.open(surveyed).isel(t=0, w0=0), "w")

@@ -67,6 +67,19 @@ def test_titles_have_no_internals_and_repeat_nothing(ds):
     assert title_of(shown, shown.verdict) == "A map, stability of the linear motion (prolate)"
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ("question=rotation, axis=A", " (rotation about the axis of A)"),
+        ("separatrix=unstable, side=right", " (unstable separatrix, right side)"),
+        ("motion=at_t", ""),
+    ],
+)
+def test_titles_say_in_words_what_options_are(ds, options, words):
+    shown = ds.assign_attrs(title="Stability of the linear motion", options=options)
+    assert title_of(shown, shown.verdict) == f"Stability of the linear motion{words}"
+
+
 def test_orange_means_unstable_alone():
     assert (
         palette.colours_of({"undecided": -1, "unstable": 0, "stable": 1})["unstable"]

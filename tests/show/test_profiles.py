@@ -111,6 +111,13 @@ def test_counts_are_steps_with_integer_ticks(values):
     assert profile(X, y=(X, {})).lines[0].get_drawstyle() == "default"
 
 
+def test_a_name_without_a_symbol_is_no_formula():
+    x = np.arange(5.0)
+    for given in ({}, {"symbol": "resonance_order"}):
+        axes = profile(x, resonance_order=(x, given))
+        assert axes.lines[0].get_label() == "resonance_order"
+
+
 def test_boundaries_on_the_only_axis_are_lines_by_kind():
     """Edges of tongues look as on maps and share an entry of the legend; others are dotted and bear
     their names.
