@@ -674,7 +674,7 @@ def _hill(
             names.append(place)
     damped = c is not None or place is not None
     equation = f"y'' + 2 {place or 'c'} y' + z(u, p) y = 0" if damped else "y'' + z(u, p) y = 0"
-    about, title = _told(name, about, title, equation, parameters)
+    about, title = _titled(name, about, title, equation, parameters)
     known = (z, period, breaks, parameters, even, *([damping] if damped else []))
     shared = dict(
         z=z, period=period, breaks=breaks, own=parameters,
@@ -705,7 +705,7 @@ def _abel(
     )
     if period is not None and not (is_number(period) and abs(period - 2 * np.pi) <= 1e-15 * period):
         refuse(f"PERIOD = {period!r}: it must be 2 pi, to which phi can be scaled, or None")
-    about, title = _told(name, about, title, "w w' = f(phi, p) w + g(phi, p)", parameters)
+    about, title = _titled(name, about, title, "w w' = f(phi, p) w + g(phi, p)", parameters)
     known = (f, g, period, parameters)
     described = _described(name, text, title, about, references or ABEL_REFERENCES, known)
     return AbelScene(f=f, g=g, period=period, own=parameters, **described)
@@ -759,7 +759,7 @@ def _floquet(
     if conserved is not None and (structure != "none" or len(names) < 2):
         refuse("CONSERVED is for STRUCTURE = 'none', and two states at least")
     equation = "x' = A(t, p) x" if "A" in matrices else "M q'' + C q' + K q = 0"
-    about, title = _told(name, about, title, equation, parameters)
+    about, title = _titled(name, about, title, equation, parameters)
     known = (*matrices.items(), period, breaks, parameters, names, structure)
     known += () if conserved is None else (conserved,)
     return FloquetScene(
@@ -825,7 +825,7 @@ def _orbit(
                 f"START ends in {start[-1]:g}, the guess of the period, as PERIOD is None; it must be positive"
             )
     equation = "Periodic orbits of x' = f(t, x, p)"
-    about, title = _told(name, about, title, equation, parameters)
+    about, title = _titled(name, about, title, equation, parameters)
     known = (
         f,
         period,
@@ -843,7 +843,7 @@ def _orbit(
     )  # fmt: skip
 
 
-def _told(
+def _titled(
     name: str, about: str | None, title: str | None, equation: str, parameters: Iterable[Parameter]
 ) -> tuple[str, str]:
     """(docstring, title): where there is none, the equation, in the title with the name of the file
