@@ -33,7 +33,7 @@ from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
 from survey.sweep.progress import Progress, watched
-from survey.wording import counted, short, shown
+from survey.wording import counted, html_table, short, shown
 
 
 def run(
@@ -226,7 +226,7 @@ def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Datas
 
 
 def scenes() -> dict[str, str]:
-    """{name: title} of the scenes."""
+    """{name: title} of the scenes: a mapping, shown as a table."""
     return survey.scenes()  # a callable package
 
 
@@ -458,11 +458,9 @@ class Description(dict[str, Any]):
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from survey.show import notebook
-
         rows = [(heading, key, text) for heading in ("parameters", "options", "outputs", "status", "methods")
                 for key, text in self[heading].items()]  # fmt: skip
-        return str(notebook.table(f"{self['name']}: {self['title']}", rows))
+        return html_table(f"{self['name']}: {self['title']}", rows)
 
 
 def describe(scene: Any) -> Description:
