@@ -468,9 +468,15 @@ def describe(scene: Any) -> Description:
     """A scene's parameters, options, outputs, statuses and methods, shown as a table:
     `survey.describe("satellite")`.
 
-    `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under
-    "about".
+    `scene` is what `survey.evaluate` takes, or the dataset of a survey. The result is a mapping,
+    with the equations under "about".
     """
+    if isinstance(scene, (xr.Dataset, xr.DataArray)):
+        if "scene" not in scene.attrs:
+            raise BadInput(
+                "describe: this dataset was not written by survey: it has no attribute scene"
+            )
+        scene = user_scene.of_dataset(scene)
     return Description(globals()["scene"](scene))
 
 

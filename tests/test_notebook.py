@@ -66,6 +66,10 @@ def test_a_scene_is_described():
         and "<table>" in described._repr_html_()
     )
     assert "a" in survey.describe(OWN["hill"]())["parameters"]
+    ds = survey.evaluate("satellite", k=0.5, rho=1.0)
+    assert survey.describe(ds) == described == survey.describe(ds.verdict.assign_attrs(ds.attrs))
+    with pytest.raises(survey.BadInput, match="describe: this dataset was not written by survey"):
+        survey.describe(ds.verdict)
     with pytest.raises(survey.BadInput, match="did you mean 'satellite'"):
         survey.describe("satelite")
 
