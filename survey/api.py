@@ -33,7 +33,7 @@ from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
 from survey.sweep.progress import Progress, watched
-from survey.wording import counted, short, shown
+from survey.wording import counted, html_table, short, shown
 
 
 def run(
@@ -112,6 +112,7 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
         return []
     from survey.show import figures
 
+    ds = ds.assign_attrs(title=workflow.title)  # that of the file may be an earlier one
     first, suffix = workflow.figures[0], ".pdf" if workflow.style == "paper" else ".png"
     paths = {
         name: workflow.path.with_name(
@@ -226,7 +227,7 @@ def open(path: str | os.PathLike[str], *, trust_scene: bool = False) -> xr.Datas
 
 
 def scenes() -> dict[str, str]:
-    """{name: title} of the scenes."""
+    """{name: title} of the scenes: a mapping, shown as a table."""
     return survey.scenes()  # a callable package
 
 
@@ -458,20 +459,24 @@ class Description(dict[str, Any]):
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        from survey.show import notebook
-
         rows = [(heading, key, text) for heading in ("parameters", "options", "outputs", "status", "methods")
                 for key, text in self[heading].items()]  # fmt: skip
-        return str(notebook.table(f"{self['name']}: {self['title']}", rows))
+        return html_table(f"{self['name']}: {self['title']}", rows)
 
 
 def describe(scene: Any) -> Description:
     """A scene's parameters, options, outputs, statuses and methods, shown as a table:
     `survey.describe("satellite")`.
 
-    `scene` is what `survey.evaluate` takes. The result is a mapping, with the equations under
-    "about".
+    `scene` is what `survey.evaluate` takes, or the dataset of a survey. The result is a mapping,
+    with the equations under "about".
     """
+    if isinstance(scene, (xr.Dataset, xr.DataArray)):
+        if "scene" not in scene.attrs:
+            raise BadInput(
+                "describe: this dataset was not written by survey: it has no attribute scene"
+            )
+        scene = user_scene.of_dataset(scene)
     return Description(globals()["scene"](scene))
 
 

@@ -19,6 +19,7 @@ OTHER_WORDS = {  # that users of other programs know
     **dict.fromkeys(("min", "low", "begin"), "start"),
     **dict.fromkeys(("max", "high", "end"), "stop"),
     "scale": "spacing",
+    **dict.fromkeys(("file", "filename"), "path"),
     "eccentricity": "e",
     "mass_ratio": "mu",
     "modulus": "k",

@@ -1,10 +1,13 @@
 """Wording that messages share, and untrusted text made harmless."""
 
+import html
 import unicodedata
 
 SHOWN = 60  # characters of a value in a message
 LISTED = 200  # of a list of allowed names
 LINE = 1200  # of a message: some name several paths
+# Classes that Jupyter and Sphinx leave alone: dollars in untrusted text are not TeX.
+NO_FORMULAS = "tex2jax_ignore mathjax_ignore"
 
 
 def counted(number, noun):
@@ -62,6 +65,16 @@ def listed(names):
     return ", ".join(names[:first]) + (
         f" and {len(names) - first} more" if first < len(names) else ""
     )
+
+
+def html_table(title, rows):
+    """An HTML table of rows of text, which may be untrusted."""
+    body = "".join("<tr>" + "".join(_cell(text) for text in row) + "</tr>" for row in rows)
+    return f"<div class='{NO_FORMULAS}'><table><caption>{html.escape(plain(title))}</caption>{body}</table></div>"
+
+
+def _cell(text):
+    return f"<td style='text-align:left;vertical-align:top'>{html.escape(plain(str(text)))}</td>"
 
 
 def _is_seen(character):

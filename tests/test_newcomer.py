@@ -149,6 +149,10 @@ def fill(t, p, out):
     out[0, 1], out[1, 0] = 1.0, -p[0]
 
 
+def ensemble():
+    return survey.evaluate("satellite", k=xr.DataArray([0.1, 0.2], dims="draw"), rho=1.0)
+
+
 PYTHON = [
     (lambda ds: survey.evaluate("satelite", k=0.1, rho=1.0), "did you mean 'satellite'?"),
     (
@@ -206,6 +210,18 @@ PYTHON = [
     (lambda ds: ds.survey.map("exponent", cmap=3), "cmap = 3: give the name of a colour map"),
     (lambda ds: ds.survey.map("exponent", vmin="a"), "vmin = 'a': it must be a finite number"),
     (lambda ds: ds.survey.map("exponent", vmin=3, vmax=1), "vmin = 3 is not below vmax = 1"),
+    (lambda ds: ds.survey.map("exponent", robust="x"), "robust = 'x': it must be True or False"),
+    (lambda ds: ds.survey.map(vmin=3), "vmin does not apply to verdict, whose values are names"),
+    (lambda ds: ensemble().survey.zoom(draw=(0, 10)), "zoom: draw only counts points, of k"),
+    (lambda ds: survey.describe(xr.Dataset()), "describe: this dataset was not written by survey"),
+    (
+        lambda ds: survey.evaluate("mathieu", a=1.0, q=0.1, damping=0.1),
+        "survey.hill(damping=...) solves damped equations",
+    ),
+    (
+        lambda ds: survey.run({"scene": "mathieu", "axes": {"a": 1.0}, "output": {"file": "x.nc"}}),
+        "unknown key output.file; did you mean 'path'?",
+    ),
     (lambda ds: ds.survey.map(x="q"), "x: unknown axis 'q'"),
     (lambda ds: ds.survey.zoom(k=0.3), "give two numbers, the lower one first"),
     (lambda ds: ds.survey.where("stabel"), "did you mean 'stable'?"),

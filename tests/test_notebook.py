@@ -49,6 +49,14 @@ def test_a_survey_is_shown_as_a_table():
     assert "<script>" not in hostile.survey._repr_html_()
 
 
+def test_the_scenes_are_listed():
+    found = survey.scenes()
+    assert isinstance(found, dict) and found == dict(found)
+    lines = repr(found).splitlines()
+    assert len(lines) == len(found) and lines[0].split() == ["brun", *found["brun"].split()]
+    assert found._repr_html_().count("<tr>") == len(found)
+
+
 def test_a_scene_is_described():
     described = survey.describe("satellite")
     assert described["parameters"]["rho"] and described["methods"]["auto"]
@@ -58,6 +66,10 @@ def test_a_scene_is_described():
         and "<table>" in described._repr_html_()
     )
     assert "a" in survey.describe(OWN["hill"]())["parameters"]
+    ds = survey.evaluate("satellite", k=0.5, rho=1.0)
+    assert survey.describe(ds) == described == survey.describe(ds.verdict.assign_attrs(ds.attrs))
+    with pytest.raises(survey.BadInput, match="describe: this dataset was not written by survey"):
+        survey.describe(ds.verdict)
     with pytest.raises(survey.BadInput, match="did you mean 'satellite'"):
         survey.describe("satelite")
 

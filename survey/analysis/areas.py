@@ -50,7 +50,7 @@ def of_map(ds):
     return found
 
 
-def refuse_members(ds, what):
+def refuse_members(ds, what, remedy="use counts()"):
     """Raise BadInput where points lie along a dimension that is not a parameter, such as that of an
     ensemble.
     """
@@ -59,7 +59,7 @@ def refuse_members(ds, what):
         if dim not in ds.coords and along:
             raise BadInput(
                 f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: "
-                "they do not lie on a grid; use counts()"
+                f"they do not lie on a grid; {remedy}"
             )
 
 

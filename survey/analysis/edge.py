@@ -26,6 +26,7 @@ FIRST, WIDER, MOST = 0.05, 8.0, 5
 INSIDE = 1e-3  # of a range: how far from an end that does not belong to the domain
 WIDEST = 1e4  # of a domain that is searched as a whole
 _UNKNOWN = "no boundaries are known for the scene"
+_ONE_VALUE = "it must be one value of {0}; give a range as {0}=(low, high)"
 _INSTEAD = "run a line of points and see where the verdict changes: ds.survey.boundary()"
 
 
@@ -96,6 +97,8 @@ def _edge(scene, along, near, parameters, alone=False):
         key: _number(key, given.get(key, p.default), p) for key, p in used.items() if key != along
     }
     if near is not None:
+        if np.ndim(near):
+            raise BadInput(f"near = {shown(near)}: {_ONE_VALUE.format(along)}")
         near = _number("near", near, used[along])
     ends = _range(used[along], ends, near)
     user_scene.check(module)
@@ -163,9 +166,7 @@ def _range(parameter, ends, near):
     low, high = parameter.minimum, parameter.maximum
     if ends is None:
         if high - low > WIDEST:
-            raise BadInput(
-                f"edge: give near= a value of {name}, or a range, such as {name}=(0.5, 2.0)"
-            )
+            raise BadInput(f"edge: give near= a value of {name}, or a range as {name}=(low, high)")
         return low + INSIDE * (high - low) * parameter.open_minimum, high - INSIDE * (
             high - low
         ) * parameter.open_maximum

@@ -20,7 +20,7 @@ from survey.file.labels import FILL, as_stored, command, fill_of, now, tally
 from survey.file.map_file import TILE_POINTS, MapFile
 from survey.grid import halved
 from survey.request.output_path import check_path
-from survey.wording import counted, shown
+from survey.wording import counted, short, shown
 
 SAME = ("scene", "scene_hash", "options", "method", "rtol")
 OF_PARTS = {"boundaries": "[boundaries]", "surfaces": "[boundaries]", "refine": "[refine]"}
@@ -131,6 +131,9 @@ def _part(given):
 def _check_alike(one, other):
     for key in SAME:
         if one.attrs.get(key) != other.attrs.get(key):
+            if key == "scene":
+                both = " and ".join(short(ds.attrs["scene"]) for ds in (one, other))
+                raise BadInput(f"concat: the surveys are of different scenes: {both}")
             both = " and ".join(shown(ds.attrs.get(key)) for ds in (one, other))
             raise BadInput(f"concat: the surveys differ in {key}: {both}")
     names = [set(ds.data_vars) for ds in (one, other)]

@@ -21,11 +21,9 @@ from survey.file.labels import (
     words_of,
 )
 from survey.request import user_scene
-from survey.wording import plain
+from survey.wording import NO_FORMULAS, plain
 
 MAX_ROWS = 1000  # of one output
-# Classes that Jupyter and Sphinx leave alone: dollars in untrusted text are not TeX.
-NO_FORMULAS = "tex2jax_ignore mathjax_ignore"
 # Attributes that concern the file, not a point.
 OF_FILE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",

@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 
 from survey import api, modules
+from survey.analysis.areas import refuse_members
 from survey.analysis.given import options_at
 from survey.analysis.point import unknown_axis
 from survey.errors import BadInput, Damaged
@@ -75,6 +76,8 @@ def _ranges(ds, ranges):
         )
     for name, ends in ranges.items():
         if name not in axes:
+            if name in ds.status.dims:
+                refuse_members(ds, "zoom", "survey.evaluate solves further ones")
             raise BadInput(unknown_axis(ds, name, axes))
         if (
             np.shape(ends) != (2,)

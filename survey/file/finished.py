@@ -3,6 +3,7 @@ overwrite it.
 """
 
 import hashlib
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from survey.file import unfinished
 from survey.file.disk import digest_of
 from survey.file.labels import counts_in
 from survey.file.reading import attributes_of
+from survey.grid import coordinates
 
 # keys of a workflow that change no value of the file
-OF_PICTURES = ("output.path", "output.figures", "output.style")
+OF_PICTURES = ("title", "output.path", "output.figures", "output.style")
 AGAIN = ("worker_died", "pending")  # points for which a run is repeated
 
 
@@ -80,10 +82,38 @@ def refuse(path, found, workflow, code, scene_hash):
         causes.append(
             f"from another version of the code ({', '.join(other) or 'its sources differ'})"
         )
+    extend = (
+        f", or extend it with --reuse {path}" if _has_values_for(found, workflow, causes) else ""
+    )
     points = found.get("points")
     many = f" of {points:,} points" if isinstance(points, (int, np.integer)) else ""
     raise BadInput(
         f"{path} is a finished survey{many} {' and '.join(causes)}; write to another file with -o, "
-        f"replace it with --fresh, or extend it with --reuse {path} "
-        "(in Python output=, fresh=True, reuse=)"
+        f"{'' if extend else 'or '}replace it with --fresh{extend} "
+        f"(in Python output=, fresh=True{', reuse=' if extend else ''})"
     )
+
+
+def _has_values_for(found, workflow, causes):
+    """Could --reuse take values from the file? The other workflow differs in its axes alone, which
+    have common values, or asks for fewer variables.
+    """
+    if len(causes) != 1 or not changes(found, workflow):
+        return False  # the code, or the user's functions, are others
+    try:
+        old, new = tomllib.loads(found["workflow"]), tomllib.loads(workflow)
+        more = {key for key in ("scene", "options", "solver") if old.get(key) != new.get(key)}
+        before, now = (data.get("output", {}).get("variables") for data in (old, new))
+        fewer = before in (None, now) or set(now or ()) < set(before)
+        both = old["axes"].keys() & new["axes"].keys()
+        meet = (np.isin(_values(old["axes"][key]), _values(new["axes"][key])).any() for key in both)
+        return not more and fewer and all(meet)
+    except (KeyError, TypeError, ValueError, AttributeError):
+        return False
+
+
+def _values(axis):
+    """The values of an axis as a workflow gives it."""
+    if isinstance(axis, dict):
+        return axis["values"] if "values" in axis else coordinates(**axis)
+    return np.ravel(axis)

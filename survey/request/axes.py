@@ -37,8 +37,8 @@ def values_of(key, axis):
             values = coordinates(axis.start, axis.stop, axis.num, axis.spacing)
         except BadInput as error:
             raise BadInput(f"{key}: {error}") from None
-    elif isinstance(axis, Listed):
-        values = np.array(axis.values, dtype=float)
+    elif isinstance(axis, (Listed, list)):
+        values = np.array(getattr(axis, "values", axis), dtype=float)
     else:
         return np.float64(axis)
     check_axis(key, values)

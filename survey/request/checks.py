@@ -71,7 +71,10 @@ def check_parameters(scene, name, options, given, table=""):
                 raise BadInput(
                     f"{table}{key} {_why_excluded(scene, all_of[key].when, key, given, table)}"
                 )
-            raise BadInput(f"{table}{short(key, 40)}: {unknown_parameter(name, key, list(known))}")
+            damped = "; survey.hill(damping=...) solves damped equations"
+            hint = damped if key == "damping" and scene.FAMILY == "hill" else ""
+            unknown = unknown_parameter(name, key, list(known))
+            raise BadInput(f"{table}{short(key, 40)}: {unknown}{hint}")
         original = known[key].instead_of or key
         if original in replaced:
             raise BadInput(

@@ -60,15 +60,27 @@ def _unlike(workflow, attributes):
     except (KeyError, TypeError, ValueError) as error:  # BadInput is a ValueError
         return f"its workflow cannot be read ({short(error, 150)})"
     before, now = fingerprint(old), fingerprint(workflow)
-    for key in ("options", "method", "rtol"):
+    for key in ("method", "rtol"):
         if before[key] != now[key]:
-            return f"another {key} ({shown(before[key])}, not {shown(now[key])})"
+            return f"its {key} is {before[key]}, not {now[key]}"
+    options = [dict(checked.request.options) for checked in (old, workflow)]
+    if options[0] != options[1]:
+        return _other_option(*options)
     more = sorted(workflow.request.variables - old.request.variables)
     if more:
         return f"it has no {', '.join(more)}, and all values of a point are computed together"
     if attributes.get("fingerprint") != of_output(before):
         return "it is from another version of the code"
     return ""
+
+
+def _other_option(before, now):
+    """The first option that differs, in words."""
+    key = next(key for key in (before | now) if before.get(key) != now.get(key))
+    if key not in before:
+        return f"it has no option {key}, which is {now[key]} here"
+    here = f"not {now[key]}" if key in now else "which does not exist here"
+    return f"its option {key} is {before[key]}, {here}"
 
 
 def _checked(workflow, attributes):

@@ -31,13 +31,14 @@ class Listed(Table):
 def _axis_kind(value):
     if isinstance(value, dict):
         return "values" if set(value) == {"values"} else "spread"
-    return "number"
+    return "list" if isinstance(value, list) else "number"
 
 
 AxisEntry = Annotated[
     Annotated[Number, Tag("number")]
     | Annotated[Spread, Tag("spread")]
-    | Annotated[Listed, Tag("values")],
+    | Annotated[Listed, Tag("values")]
+    | Annotated[list[Number], Tag("list")],  # short for values
     Discriminator(_axis_kind),
 ]
 
@@ -109,8 +110,6 @@ def complaint(error):
         return f"unknown key {key}{remedy or _nearest(first['loc'])}{more}"
     if first["type"] == "missing":
         return f"{key} is missing; add it to the workflow{more}"
-    if key.startswith("axes.") and isinstance(first["input"], list):
-        return f"{key} is a list; write {key.removeprefix('axes.')} = {{ values = [...] }}{more}"
     if key.startswith("axes.body") and isinstance(first["input"], str):
         return f"{key}: bodies are named under [options], as in body = {shown(first['input'])}; several, in Python"
     if first["type"] in ("float_type", "int_type") and _is_number(first["input"]):

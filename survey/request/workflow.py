@@ -133,6 +133,8 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         raise BadInput(
             f"{shown(data)} is neither the path of a workflow file nor a mapping with its tables"
         )
+    if isinstance(data.get("axes"), Mapping):
+        data = {**data, "axes": {key: _without_numpy(axis) for key, axis in data["axes"].items()}}
     given_scene = data.get("scene")
     if isinstance(given_scene, FunctionScene):
         data = {**data, "scene": given_scene.NAME}
@@ -203,6 +205,17 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         proves=proves,
         style=file.output.style,
     )
+
+
+def _without_numpy(axis):
+    """An entry of [axes] from Python, whose numbers may be numpy's, as TOML would give it."""
+    if isinstance(axis, dict):
+        return {key: value.tolist() if _is_numpy(value) else value for key, value in axis.items()}
+    return axis.tolist() if _is_numpy(axis) else axis
+
+
+def _is_numpy(value):
+    return isinstance(value, (np.ndarray, np.generic))
 
 
 def _in_own_terms(scene, file):

@@ -36,7 +36,7 @@ from survey import contract, measures, methods, modules
 from survey.contract import Function, Value
 from survey.errors import BadInput
 from survey.scene import Option, Output, Parameter
-from survey.wording import short
+from survey.wording import html_table, short
 
 GROUP = "survey.scenes"  # of entry points
 
@@ -123,12 +123,22 @@ CONTRACT = {
 
 
 class _Folder(ModuleType):
-    """`survey.scenes` is this folder; called, it gives {name: title} of the scenes."""
+    """`survey.scenes` is this folder; called, it gives the Titles of the scenes."""
 
     def __call__(self):
-        return {name: _title(name) for name in modules.names(self)} | {
-            name: _title_brought(point) for name, point in brought().items()
-        }
+        others = {name: _title_brought(point) for name, point in brought().items()}
+        return Titles({name: _title(name) for name in modules.names(self)} | others)
+
+
+class Titles(dict):
+    """{name: title} of the scenes, shown as a table."""
+
+    def __repr__(self):
+        width = max(map(len, self), default=0)
+        return "\n".join(f"{name:<{width}}  {title}" for name, title in self.items())
+
+    def _repr_html_(self):
+        return html_table("scenes", self.items())
 
 
 def load(name):

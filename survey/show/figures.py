@@ -72,6 +72,11 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
         return
     if name not in drawable and name not in bars:
         raise BadInput(modules.unknown("variable", name, drawable))
+    of_numbers = [key for key, value in (colours or {}).items() if value is not None]
+    if of_numbers and "flag_values" in ds[name].attrs:
+        raise BadInput(
+            f"{of_numbers[0]} does not apply to {name}, whose values are names; leave it out"
+        )
     for text in axes.findobj(Text):  # perhaps made while the user had LaTeX on
         text.set_usetex(False)
     ds, sampled = over_parameters(ds)
@@ -122,6 +127,9 @@ def _check_colours(asked):
             raise BadInput(f"{key} = {shown(value)}: it must be a finite number")
     if len(limits) == 2 and not limits["vmin"] < limits["vmax"]:
         raise BadInput(f"vmin = {limits['vmin']:g} is not below vmax = {limits['vmax']:g}")
+    robust = asked.get("robust")
+    if not (robust is None or isinstance(robust, (bool, np.bool_))):
+        raise BadInput(f"robust = {shown(robust)}: it must be True or False")
     name = asked.get("cmap")
     if isinstance(name, str) and name not in matplotlib.colormaps:
         raise BadInput(f"cmap: {modules.unknown('colour map', name, list(matplotlib.colormaps))}")

@@ -292,27 +292,37 @@ def _curves(workflow, across, axis, other, edges, each):
     )
     found, square = [], square_of(workflow, across, axis)
     curve_of, curves_before = np.full(edges.row.size, -1), 0
-    for plane in _planes(workflow, further):
+    planes = _planes(workflow, further)
+
+    def on_plane(plane, each=in_turn):
         own = np.ones(edges.row.size, bool)
         for dim, value in plane.items():
             own &= np.asarray(grid.parameters[dim][1])[place[dim]] == value
         of_rows = np.asarray(grid.parameters[across][1])[place[across][own]]
         seeds = np.stack([of_rows, edges.position[own]], axis=1), edges.kind[own], edges.index[own]
-        curves, folds = _on_plane(workflow, square, across, axis, seeds, plane, each)
+        return own, *_on_plane(workflow, square, across, axis, seeds, plane, each)
+
+    # progress is told of one map by its parts, of several by the maps
+    solved = (
+        each(on_plane, planes, "maps of the curves")
+        if len(planes) > 1
+        else [on_plane(planes[0], each)]
+    )
+    for plane, (own, curves, folds) in zip(planes, solved, strict=True):
         found.append((plane, curves, folds, curves_before))
-        of_seed = curves.of_seed[: of_rows.size]
+        of_seed = curves.of_seed[: own.sum()]
         curve_of[own] = np.where(of_seed >= 0, of_seed + curves_before, of_seed)
         curves_before += curves.count.size
 
     def all_of(name):
         return np.concatenate([getattr(curves, name) for _, curves, _, _ in found])
 
-    planes = [
+    values = [
         [np.full((curves.error.size, 1), plane[dim]) for dim in further]
         for plane, curves, _, _ in found
     ]
     on_curves = np.column_stack([
-        square.parameters(all_of("x")), *(np.concatenate([part[i] for part in planes]) for i in range(len(further)))
+        square.parameters(all_of("x")), *(np.concatenate([part[i] for part in values]) for i in range(len(further)))
     ])  # fmt: skip
     names, where = (across, axis, *further), "on the edge of a tongue"
     kind = _class(workflow, all_of("kind"))

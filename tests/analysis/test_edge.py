@@ -259,7 +259,8 @@ def test_the_homoclinic_curve_of_an_own_abel_equation():
 def test_what_has_no_boundaries_is_told():
     for match, keywords in (
         ("unknown parameter 'kk'", {"along": "kk", "rho": 1.0}),
-        ("give near= a value of rho, or a range", {"along": "rho", "k": 0.5}),
+        (r"a value of rho, or a range as rho=\(low, high\)", {"along": "rho", "k": 0.5}),
+        (r"give a range as rho=\(low, high\)", {"along": "rho", "k": 0.5, "near": (0, 3)}),
         ("rho is missing", {"along": "k", "near": 0.3}),
         (r"so give a range \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
         ("it must be one number in its domain", {"along": "rho", "near": 1.0, "k": [0.1, 0.2]}),

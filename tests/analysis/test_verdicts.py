@@ -54,7 +54,7 @@ def test_combined_verdicts_are_drawn(two):
         assert [text.get_text() for text in other.figure.legends[0].get_texts()] == labels
     with pytest.raises(survey.BadInput, match="holds booleans"):
         two[0].survey.map(both.values[:3])
-    with pytest.raises(survey.BadInput, match="other coordinates"):
+    with pytest.raises(survey.BadInput, match="are not those of the survey"):
         two[0].survey.map(both.isel(a=slice(1, None)))
     with pytest.raises(survey.BadInput, match="holds booleans"):
         two[0].survey.map(two[0].exponent)

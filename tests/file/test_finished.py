@@ -29,6 +29,17 @@ def test_the_same_workflow_computes_nothing_and_draws_again(ran, small, monkeypa
     assert {file.name for file in ran.parent.glob("small.nc*")} == {"small.nc", "small.nc.sha256"}
 
 
+def test_a_title_changes_no_number(ran, small, monkeypatch):
+    from survey.show import figures
+
+    before, drawn = ran.read_bytes(), []
+    monkeypatch.chdir(ran.parent)
+    monkeypatch.setattr(figures, "save", lambda ds, *_: drawn.append(ds.attrs["title"]))
+    small.write_text(small.read_text().replace("A small survey", "Another title"))
+    survey.run(small)
+    assert ran.read_bytes() == before and drawn == ["Another title"]
+
+
 def test_the_command_says_so_and_exits_with_0(ran, small, program):
     done = program("run", small)
     assert (
@@ -38,22 +49,30 @@ def test_the_command_says_so_and_exits_with_0(ran, small, program):
 
 
 @pytest.mark.parametrize(
-    ("override", "told"),
+    ("override", "told", "serves"),
     [
-        ("solver.rtol=1e-6", "solver.rtol 1e-09 -> 1e-06"),
-        ("axes.w0.num=3", "axes.w0.num 6 -> 3"),
-        ("output.variables=['w']", "output.variables not given -> ['w']"),
-        ("title='other'", "title A small survey -> other"),
+        ("solver.rtol=1e-6", "solver.rtol 1e-09 -> 1e-06", False),
+        ("axes.w0.num=3", "axes.w0.num 6 -> 3", True),
+        ("axes.w0=0.7", "axes.w0 {START} -> 0.7", False),
+        ("output.variables=['w']", "output.variables not given -> ['w']", True),
     ],
 )
-def test_another_workflow_is_refused_and_nothing_is_lost(ran, small, monkeypatch, override, told):
+def test_another_workflow_is_refused_and_nothing_is_lost(
+    ran, small, monkeypatch, override, told, serves
+):
+    """--reuse is offered only where it can take values."""
+    told = told.replace("{START}", "{'start': 0.5, 'stop': 2.0, 'num': 6}")
     before = ran.read_bytes()
     monkeypatch.chdir(ran.parent)
     with pytest.raises(BadInput) as refused:
         engine.run(workflow.read(small, [override]))
     assert str(refused.value) == (
         f"small.nc is a finished survey of 24 points of another workflow ({told}); write to another file with -o, "
-        "replace it with --fresh, or extend it with --reuse small.nc (in Python output=, fresh=True, reuse=)"
+        + (
+            "replace it with --fresh, or extend it with --reuse small.nc (in Python output=, fresh=True, reuse=)"
+            if serves
+            else "or replace it with --fresh (in Python output=, fresh=True)"
+        )
     )
     assert ran.read_bytes() == before and not ran.with_name("small.nc.lock").exists()
     engine.run(workflow.read(small, [override]), fresh=True)

@@ -56,6 +56,7 @@ def test_the_schema_accepts_the_kept_workflows_and_no_others():
     for path in sorted((ROOT / "workflows").glob("*.toml")):
         assert list(validator.iter_errors(tomllib.loads(path.read_text()))) == [], path
     base = {"scene": "mathieu", "axes": {"a": 1.0}}
+    assert validator.is_valid(base | {"axes": {"a": [1.0, 2.0]}})
     for wrong in (
         {"axis": {}},
         {"solver": {"tol": 1}},

@@ -108,7 +108,7 @@ def test_functions_are_told_of_keywords_and_files_of_their_names(tmp_path):
 
 def test_other_words_mean_names_that_exist():
     """Each is a key of a workflow, a keyword, or a name in some scene."""
-    names = {"rtol", "method", "variables", "num", "start", "stop", "spacing"}
+    names = {"rtol", "method", "variables", "num", "start", "stop", "spacing", "path"}
     for scene in api.scenes():
         module = load(scene)
         names |= {one.name for one in (*module.PARAMETERS, *module.OUTPUTS)}

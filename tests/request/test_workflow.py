@@ -101,7 +101,9 @@ def test_defaults_are_filled_in():
         (["axes.k.num.more=3"], ["num is a value"]),
         (["axes"], ["--set 'axes'", "KEY=VALUE"]),
         (["axes..k=3"], ["--set 'axes..k=3'", "empty part"]),
-        (["axes.k=[0.1, 0.2]"], ["axes.k is a list", "values = [...]"]),
+        (["axes.k=[0.1, 'x']"], ["axes.k.1 = 'x'", "number"]),
+        (["axes.k=[0.1, [0.2]]"], ["axes.k.1 = [0.2]", "number"]),
+        (["axes.k=[]"], ["axes.k", "value"]),
         (["axes.rho.num=3"], ["axes.rho.values cannot be combined", "values alone"]),
         (["axes.k.stop=0.1"], ["axes.k", "both 0.1"]),
         (["axes.k.num=1"], ["axes.k", "num = 1", "single number"]),
@@ -252,3 +254,16 @@ def test_boundaries_of_a_question_without_a_verdict_are_refused_before_any_point
         survey.edge(
             "brun_triaxial", question="trajectory", along="B", A=1.0, C=0.7, t=1.0, B=(0.5, 0.9)
         )
+
+
+@pytest.mark.parametrize(
+    "q",
+    [[0.1, 0.2], np.array([0.1, 0.2]), {"values": np.array([0.1, 0.2])}],
+    ids=["list", "array", "values"],
+)
+def test_lists_and_arrays_are_values_of_an_axis(q):
+    data = {"scene": "mathieu", "axes": {"a": np.float32(1), "q": q}, "output": {"path": "m.nc"}}
+    checked = workflow.check(data)
+    assert checked.grid.parameters["q"][1].tolist() == [0.1, 0.2]
+    again = workflow.check(tomllib.loads(checked.text))  # as a file holds it
+    assert again.grid.parameters["q"][1].tolist() == [0.1, 0.2] and again.text == checked.text

@@ -336,3 +336,37 @@ def test_rows_whose_edges_are_known_are_kept_by_a_run_that_stops(path, tmp_path,
     monkeypatch.setattr(boundaries, "_row_solver", stop)  # none is to be found again
     again = survey.run(WORKFLOW, output=tmp_path / "map.nc")
     xr.testing.assert_equal(again.drop_attrs(), xr.load_dataset(path).drop_attrs())
+
+
+def test_progress_of_several_maps_is_told_by_the_map():
+    """And the curves, found on threads, are those of one map after another."""
+    scene = survey.hill(
+        lambda u, p: p[0] - 2.0 * p[1] * np.cos(2.0 * u) - p[2],
+        period=np.pi,
+        parameters=("a", "q", "c"),
+        even=True,
+    )
+    axes = {
+        "q": {"start": 0.1, "stop": 1.0, "num": 2},
+        "a": {"start": -1.0, "stop": 5.0, "num": 3},
+        "c": [0.0, 0.5, 1.0],
+    }
+    stack = check({"scene": scene, "axes": axes, "boundaries": {"axis": "a"}})
+    told = []
+
+    def each(task, items, what):
+        told.append((what, len(items)))
+        with ThreadPoolExecutor(3) as pool:
+            return list(pool.map(task, items))
+
+    found = boundaries.find(stack, each)
+    assert told == [("parts of the edges", 1), ("maps of the curves", 3)]
+    told.clear()
+    one = {**axes, "c": 0.5}
+    middle = boundaries.find(
+        check({"scene": scene, "axes": one, "boundaries": {"axis": "a"}}), each
+    )
+    assert told[0] == ("parts of the edges", 1) and "maps of the curves" not in dict(told)
+    of_middle = found.curve_c.values == 0.5
+    for name in ("curve_a", "curve_q", "curve_position_error"):
+        np.testing.assert_array_equal(found[name][of_middle], middle[name])

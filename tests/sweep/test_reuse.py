@@ -76,8 +76,8 @@ def test_what_is_held_is_not_solved_and_the_bits_are_the_same(
 @pytest.mark.parametrize(
     ("override", "why"),
     [
-        ("solver.rtol=1e-6", r"another rtol \(1e-09, not 1e-06\)"),
-        ("options.sign='-1'", "another options"),
+        ("solver.rtol=1e-6", "its rtol is 1e-09, not 1e-06"),
+        ("options.sign='-1'", "its option sign is 1, not -1"),
         ("axes.alpha=0.3", "no value of alpha that is needed here"),
     ],
 )
