@@ -173,15 +173,26 @@ def _title_brought(point):
 
 def _constant(source, name):
     """The constant `name` in the file `source`, read without an import; None if it is computed."""
-    for node in ast.parse(source.read_bytes()).body:
-        if isinstance(node, ast.Assign) and any(
-            getattr(to, "id", "") == name for to in node.targets
-        ):
-            try:
-                return ast.literal_eval(node.value)
-            except ValueError:
-                return None
-    return None
+    set_by = [
+        node
+        for node in ast.parse(source.read_bytes()).body
+        for to in (getattr(node, "targets", None) or [getattr(node, "target", None)])
+        if getattr(to, "id", "") == name
+    ]
+    if len(set_by) != 1 or not isinstance(set_by[0], ast.Assign):
+        return None
+    try:
+        return ast.literal_eval(set_by[0].value)
+    except ValueError:
+        return None
+
+
+def _serves(method):
+    """The families that the method serves; None if they are computed."""
+    loaded = sys.modules.get(f"{methods.__name__}.{method}")
+    if loaded is not None:
+        return loaded.SERVES
+    return _constant(Path(methods.__path__[0]) / f"{method}.py", "SERVES")
 
 
 @cache
@@ -217,7 +228,7 @@ def _check(module):
             contract.refuse(
                 module, f"AUDIT: {modules.unknown('method', name, modules.names(methods))}", where
             )
-        serves = _constant(Path(methods.__path__[0]) / f"{name}.py", "SERVES")
+        serves = _serves(name)
         if serves is not None and module.FAMILY not in serves:
             words = f"AUDIT names {name!r}, which does not serve the family {module.FAMILY!r}"
             contract.refuse(module, words, where)

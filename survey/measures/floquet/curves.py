@@ -129,9 +129,7 @@ def searched(scene, square, axes, fixed, options):
         of_axis = _solved(
             scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()]
         )
-        indices = {
-            kind: lambda x, name=name: of_axis(x, ROUGH)[name] for kind, name in names.items()
-        }
+        indices = partial(of_axis, rtol=ROUGH), names
         return _on_border(square, matrices, indices, structure, on_lattice, found)
     drawn, passed = (
         [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found],
@@ -163,8 +161,8 @@ def searched(scene, square, axes, fixed, options):
 
 def _on_border(square, matrices, indices, structure, on_lattice, found):
     """The Curves at the border that alone is asked for, with the edges that the number of
-    multipliers outside the unit circle and the `indices` {kind: function of positions} show
-    besides.
+    multipliers outside the unit circle and the `indices`, {name: values} of positions and {kind:
+    name}, show besides.
     """
 
     def places(x):
@@ -186,10 +184,14 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
     number = row_count.outside(*on_lattice[:2], structure)
     ticks = np.linspace(0.0, 1.0, number.size)
     counted = [(outside, kind_of, np.where(number >= 0, number, UNKNOWN), CLASSES.values())]
-    counted += [
-        (lambda x, f=f: f(places(x))[0], lambda x, kind=kind: kind, f(places(ticks)), (kind,))
-        for kind, f in indices.items()
-    ]
+    solved, names = indices
+    on_ticks = solved(places(ticks)) if names else {}
+    for kind, name in names.items():
+        index, is_kind = (
+            lambda x, name=name: solved(places(x))[name][0],
+            lambda x, kind=kind: kind,
+        )
+        counted.append((index, is_kind, on_ticks[name], (kind,)))
     unknown = {output.name: (np.array([np.nan]), np.array([np.nan])) for output in ALONG}
     lost = 0
     for count, kind, values, kinds in counted:
