@@ -112,7 +112,6 @@ def draw(ds: xr.Dataset, workflow: Any) -> list[Path]:
         return []
     from survey.show import figures
 
-    ds = ds.assign_attrs(title=workflow.title)  # that of the file may be an earlier one
     first, suffix = workflow.figures[0], ".pdf" if workflow.style == "paper" else ".png"
     paths = {
         name: workflow.path.with_name(

@@ -16,7 +16,7 @@ from survey.file.reading import attributes_of
 from survey.grid import coordinates
 
 # keys of a workflow that change no value of the file
-OF_PICTURES = ("title", "output.path", "output.figures", "output.style")
+OF_PICTURES = ("output.path", "output.figures", "output.style")
 AGAIN = ("worker_died", "pending")  # points for which a run is repeated
 
 

@@ -29,17 +29,6 @@ def test_the_same_workflow_computes_nothing_and_draws_again(ran, small, monkeypa
     assert {file.name for file in ran.parent.glob("small.nc*")} == {"small.nc", "small.nc.sha256"}
 
 
-def test_a_title_changes_no_number(ran, small, monkeypatch):
-    from survey.show import figures
-
-    before, drawn = ran.read_bytes(), []
-    monkeypatch.chdir(ran.parent)
-    monkeypatch.setattr(figures, "save", lambda ds, *_: drawn.append(ds.attrs["title"]))
-    small.write_text(small.read_text().replace("A small survey", "Another title"))
-    survey.run(small)
-    assert ran.read_bytes() == before and drawn == ["Another title"]
-
-
 def test_the_command_says_so_and_exits_with_0(ran, small, program):
     done = program("run", small)
     assert (
