@@ -364,21 +364,28 @@ def is_quick(ds):
 
 
 def is_slow(ds):
-    """Are there margins of a point that take more than about a second?"""
-    module = user_scene.find(user_scene.of_dataset(ds))[1]
-    measure, here = measures.curves(module), parameters(ds)
-    if measure is None or is_quick(ds):
+    """Are there margins of a point that take more than about a second? Not where its scene may not
+    run.
+    """
+    try:
+        module = user_scene.find(user_scene.of_dataset(ds))[1]
+        if (measure := measures.curves(module)) is None or is_quick(ds):
+            return False
+        return any(_is_searched(measure, module, ds, name) for name in parameters(ds))
+    except BadInput:
         return False
+
+
+def _is_searched(measure, module, ds, name):
+    """Are boundaries known along this parameter of a point?"""
     if not hasattr(measure, "closed"):
         return True
-    fixed = {key: value for key, value in here.items() if np.isfinite(value)}
-    for name in fixed:
-        try:
-            second_axis(measure, module, name, fixed, options_at(ds, module))
-        except BadInput:
-            continue
-        return True
-    return False
+    fixed = {key: value for key, value in parameters(ds).items() if np.isfinite(value)}
+    try:
+        second_axis(measure, module, name, fixed, options_at(ds, module))
+    except BadInput:
+        return False
+    return name in fixed
 
 
 def _seconds(measure, names):

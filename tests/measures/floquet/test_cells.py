@@ -179,5 +179,5 @@ def test_where_there_are_none():
         "omega": {"start": 1.0, "stop": 2.0, "num": 3},
         "F": {"start": 0.1, "stop": 0.2, "num": 3},
     }
-    with pytest.raises(BadInput, match="not of periodic orbits"):
+    with pytest.raises(BadInput, match="not for periodic orbits"):
         check({"scene": str(WORKFLOWS / "duffing.py"), "axes": duffing, "refine": {"width": 0.1}})

@@ -153,5 +153,5 @@ def test_cells_of_damped_equations_are_refused():
         "a": {"start": -2.0, "stop": 6.0, "num": 3},
         "c": 0.1,
     }
-    with pytest.raises(BadInput, match="undamped equations alone"):
+    with pytest.raises(BadInput, match="only for undamped equations"):
         check({"scene": DAMPED, "axes": axes, "refine": {"width": 0.1}})
