@@ -27,21 +27,24 @@ def segments(values, curves, weights_of, border=1, optional=()):
         lines = values if axis == 1 else values.T  # along the axis, by the place on the other one
         ticks = np.linspace(0.0, 1.0, len(lines))
         for number in range(border, len(lines) - border):
-            line, (places, weights, free) = (
-                lines[number],
-                _met(curves, axis, ticks[number], weights_of, optional),
-            )
-            for (first, last), good in along(line, ticks, places, weights, free).items():
+            met = _met(curves, axis, ticks[number])
+            for (first, last), good in along(
+                lines[number], ticks, met, weights_of, optional
+            ).items():
                 found[axis, number, first, last] = good
     return found
 
 
-def along(values, ticks, places, weights, free):
+def along(values, ticks, met, weights_of, optional=()):
     """{(first, last point): do the curves explain the change of `values`?}, of integers at the
-    `ticks` of a line, or UNKNOWN, which meets curves at `places`; those that are `free` may count
-    or not.
+    `ticks` of a line, or UNKNOWN, which meets curves at `met` [(kind, position)]; `weights_of` and
+    `optional` as in `segments`. What is perhaps drawn twice may count or not.
     """
-    found = {}
+    places, found = np.array([place for _, place in met]), {}
+    weights = np.array([weights_of.get(kind, 1) for kind, _ in met], int)
+    _, kinds = np.unique([kind for kind, _ in met], return_inverse=True)
+    near = (abs(places[:, None] - places) < NEAR) & (kinds[:, None] == kinds)
+    free = (near.sum(axis=1) > 1) | np.array([kind in optional for kind, _ in met], bool)
     for first, last in pairwise(np.flatnonzero(values != UNKNOWN)):
         low, high = ticks[first], ticks[last]
         inside = (places > low - NEAR) & (places < high + NEAR)
@@ -51,22 +54,15 @@ def along(values, ticks, places, weights, free):
     return found
 
 
-def _met(curves, axis, tick, weights_of, optional):
-    """Where the line along the axis, at `tick` of the other one, meets curves: positions, weights
-    (1 but for `weights_of` {kind: weight}), and which of them need not count: `optional`, or
-    perhaps drawn twice.
-    """
-    places, weights, kinds = [np.zeros(0)], [np.zeros(0, int)], [np.zeros(0, int)]
+def _met(curves, axis, tick):
+    """[(kind, position)] where the line along the axis, at `tick` of the other one, meets curves."""
+    met = []
     for kind, x in curves:
         off = x[:, 1 - axis] - tick
         at = np.flatnonzero((off[:-1] < 0) != (off[1:] < 0))
         share = off[at] / (off[at] - off[at + 1])
-        places.append(x[at, axis] + share * (x[at + 1, axis] - x[at, axis]))
-        weights.append(np.full(at.size, weights_of.get(kind, 1)))
-        kinds.append(np.full(at.size, kind))
-    place, kind = np.concatenate(places), np.concatenate(kinds)
-    near = (abs(place[:, None] - place) < NEAR) & (kind[:, None] == kind)
-    return place, np.concatenate(weights), (near.sum(axis=1) > 1) | np.isin(kind, optional)
+        met += [(kind, place) for place in x[at, axis] + share * (x[at + 1, axis] - x[at, axis])]
+    return met
 
 
 def _explained(change, weights, optional):

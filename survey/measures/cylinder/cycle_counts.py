@@ -70,13 +70,7 @@ def lost_on_border(plane, rows, ticks, counts):
     parts = set()
     for kind, values in zip(KINDS, counts, strict=True):
         own = [(name, place) for name, place, known in met if _counts_for(kind, name, known)]
-        places = np.array([place for _, place in own])
-        weights = np.array([WEIGHTS.get(name, 1) for name, _ in own], int)
-        twice = [
-            sum(n == name and abs(p - place) < NEAR for n, p in own) > 1 for name, place in own
-        ]
-        free = np.array([name in OPTIONAL for name, _ in own], bool) | np.array(twice, bool)
-        explained = along(values, ticks, places, weights, free)
+        explained = along(values, ticks, own, WEIGHTS, OPTIONAL)
         parts |= {segment for segment, good in explained.items() if not good}
     return [
         (max(0.0, ticks[first] - NEAR), min(1.0, ticks[last] + NEAR))

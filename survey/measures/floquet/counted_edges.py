@@ -12,7 +12,7 @@ import numpy as np
 
 from survey.measures.floquet import row_count
 from survey.measures.floquet.multipliers import COLLISION, MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
-from survey.measures.segments import NEAR, UNKNOWN, along
+from survey.measures.segments import UNKNOWN, along
 
 SHARES = (0.5, 0.31, 0.69)  # of a part: where it is cut, the first at which the number is known
 HALVINGS = 60
@@ -45,12 +45,7 @@ def edges(count, kind_of, values, ticks, found, grain):
 
 def _lost(values, ticks, found):
     """The segments (first, last) whose change the edges do not explain."""
-    places = np.array([place for _, place in found])
-    weights = np.array([row_count.WEIGHTS.get(kind, 1) for kind, _ in found], int)
-    twice = [
-        sum(k == kind and abs(p - place) < NEAR for k, p in found) > 1 for kind, place in found
-    ]
-    explained = along(values, ticks, places, weights, np.array(twice, bool))
+    explained = along(values, ticks, found, row_count.WEIGHTS)
     return [segment for segment, good in explained.items() if not good]
 
 

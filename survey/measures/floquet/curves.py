@@ -187,11 +187,11 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
     solved, names = indices
     on_ticks = solved(places(ticks)) if names else {}
     for kind, name in names.items():
-        index, is_kind = (
-            lambda x, name=name: solved(places(x))[name][0],
-            lambda x, kind=kind: kind,
-        )
-        counted.append((index, is_kind, on_ticks[name], (kind,)))
+
+        def index(x, name=name):
+            return solved(places(x))[name][0]
+
+        counted.append((index, lambda x, kind=kind: kind, on_ticks[name], (kind,)))
     unknown = {output.name: (np.array([np.nan]), np.array([np.nan])) for output in ALONG}
     lost = 0
     for count, kind, values, kinds in counted:
