@@ -33,7 +33,7 @@ from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
 from survey.sweep.progress import Progress, watched
-from survey.wording import counted, html_table, short, shown
+from survey.wording import counted, html_table, short, shown, summary
 
 
 def run(
@@ -538,7 +538,5 @@ def _method_line(module: Any, name: str) -> str:
         inspect.cleandoc(method.__doc__),
         condition(module, getattr(method, "WHEN", {})),
     )
-    first = getattr(method, "ABOUT", {}).get(
-        module.FAMILY, docstring.split("\n\n")[0].replace("\n", " ")
-    )
+    first = getattr(method, "ABOUT", {}).get(module.FAMILY, summary(docstring))
     return first.removesuffix(".") + when if when else first

@@ -15,6 +15,11 @@ def counted(number, noun):
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
+def summary(docstring):
+    """Its first paragraph, on one line."""
+    return docstring.strip().split("\n\n")[0].replace("\n", " ")
+
+
 def plain(text, most=LINE, lines=False):
     """The text with control and invisible characters escaped, such as \\x1b, and the middle of a
     long one left out.

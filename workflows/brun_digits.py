@@ -181,7 +181,7 @@ def table(results):
 
 
 def main(argv=None):
-    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0].replace("\n", " "))
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("-o", default="results", metavar="FOLDER")
     folder = Path(parser.parse_args(argv).o)
     folder.mkdir(parents=True, exist_ok=True)

@@ -79,7 +79,7 @@ def measured(driver, kind, seconds):
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.split("\n\n")[0].replace("\n", " "))
+    words = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     words.add_argument("path", metavar="MAP.html", type=Path, help="the page (survey share)")
     words.add_argument("--size", default="3840x2160", help="of the window, in pixels")
     words.add_argument("--seconds", type=float, default=8.0, help="of each motion")

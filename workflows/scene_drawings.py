@@ -17,7 +17,7 @@ INK, BODY, PALE, MARK = "#222222", "#b9cfe4", "#999999", "#c04010"
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.split("\n\n")[0].replace("\n", " "))
+    words = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     words.add_argument(
         "-o", "--output", type=Path, default=Path("results"), help="folder of the drawings"
     )

@@ -9,7 +9,7 @@ def parser(doc, what):
     """Parser of a script's command line; its `output`, where `what` goes, is a folder that is made
     where none is.
     """
-    words = argparse.ArgumentParser(description=doc.split("\n\n")[0].replace("\n", " "))
+    words = argparse.ArgumentParser(description=doc.split("\n\n")[0])
     words.add_argument(
         "-o", "--output", default="results", metavar="DIR", type=_folder, help=f"folder for {what}"
     )

@@ -16,6 +16,7 @@ from survey.errors import Damaged
 from survey.file import schema
 from survey.grid import Grid
 from survey.scene import Request, exists
+from survey.wording import summary
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 UNDECIDED = -1  # of every verdict
@@ -179,7 +180,7 @@ def attributes(scene, name, request):
     return {
         "Conventions": CONVENTIONS,
         "title": scene.TITLE,
-        "summary": (scene.__doc__ or scene.TITLE).strip().split("\n\n")[0].replace("\n", " "),
+        "summary": summary(scene.__doc__ or scene.TITLE),
         "keywords": f"stability, parameter survey, {name}",
         "scene": name,
         "options": ", ".join(f"{key}={value}" for key, value in request.options.items()),

@@ -18,9 +18,7 @@ from attack import command  # noqa: E402
 
 
 def main(arguments=None):
-    words = argparse.ArgumentParser(
-        prog="attack", description=__doc__.split("\n\n")[0].replace("\n", " ")
-    )
+    words = argparse.ArgumentParser(prog="attack", description=__doc__.split("\n\n")[0])
     words.add_argument(
         "--points", type=int, default=1_000_000, metavar="N", help="points in all (default 1000000)"
     )

@@ -78,7 +78,7 @@ def check(folder):
 
 
 def main():
-    words = argparse.ArgumentParser(description=__doc__.split("\n\n")[0].replace("\n", " "))
+    words = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     words.add_argument(
         "--no-notebooks",
         action="store_true",
