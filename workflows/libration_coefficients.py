@@ -91,13 +91,13 @@ def draw_verdict(ds, path):
     )
     mu, verdict = ds.mu.values, ds.verdict.values
     names = dict(zip(ds.verdict.flag_values, ds.verdict.flag_meanings.split(), strict=True))
-    look = {
+    style = {
         "cmap": ListedColormap(list(VERDICTS.values())),
         "vmin": -0.5,
         "vmax": 2.5,
         "shading": "nearest",
     }
-    strip.pcolormesh(mu, [0.0, 1.0], np.vstack([verdict, verdict]), rasterized=True, **look)
+    strip.pcolormesh(mu, [0.0, 1.0], np.vstack([verdict, verdict]), rasterized=True, **style)
     strip.set(
         yticks=[],
         ylim=(0, 1),

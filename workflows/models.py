@@ -107,8 +107,8 @@ def gyrostat(number, rng):
     }
     asked = {"question": "trajectory", "variables": ["phi", "w"], **system}
     ds, reduced = timed("gyrostat", **asked)
-    whole, full = timed("gyrostat", method="full", **asked)
-    off = np.maximum(abs(ds.phi - whole.phi), abs(ds.w - whole.w)).values
+    reference, full = timed("gyrostat", method="full", **asked)
+    off = np.maximum(abs(ds.phi - reference.phi), abs(ds.w - reference.w)).values
     return row(
         "`gyrostat`", "equations (1)-(6)", "angle and rate at t = 5", number, off, full, reduced
     )

@@ -122,10 +122,10 @@ def _edges(ds, chosen, solve, _):
         raise Damaged("edge_class contains codes that belong to no factor at T/2")
     axis, count = ds.attrs["boundaries"], ds.edge_count.values
     rows = np.repeat(np.arange(count.size), count.ravel())[chosen]
-    places = zip(
+    indices_of = zip(
         ds.edge_count.dims, np.unravel_index(rows, count.shape) if count.ndim else (), strict=True
     )
-    point = {dim: ds[dim].values[place] for dim, place in places}
+    point = {dim: ds[dim].values[at_point] for dim, at_point in indices_of}
     x, width = ds.edge_position.values[chosen], ds.edge_position_error.values[chosen]
     of = np.array(FACTORS)[ds.edge_class.values[chosen]]
     signs = []

@@ -85,7 +85,7 @@ def nearest_indices(ds, coords):
         if name not in axes:
             raise BadInput(unknown_axis(ds, name, axes))
         if name not in ds.coords or ds[name].dtype.kind not in "iuf":
-            indices[name] = _place(ds, name, value)
+            indices[name] = _position(ds, name, value)
             continue
         values = ds[name].values
         if not np.isfinite(values).all():
@@ -106,7 +106,7 @@ def nearest_indices(ds, coords):
     return indices
 
 
-def _place(ds, name, value):
+def _position(ds, name, value):
     """The index of a label, or of a number counted from 0, along a dimension whose coordinate is
     not numeric.
     """

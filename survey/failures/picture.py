@@ -69,16 +69,16 @@ def _panel(ax, found, method, norm):
         )
         ax.text(0.5, 0.5, words, transform=ax.transAxes, ha="center", va="center", fontsize=7)
         return None
-    look = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
+    style = {"origin": "lower", "aspect": "auto", "interpolation": "nearest"}
     # flags alone, which are right
     error = np.where(j.answered & np.isnan(j.error) & ~j.unchecked, 1e-17, j.error)
-    shown = ax.imshow(np.log10(np.maximum(error, 1e-30)), norm=norm, cmap="viridis", **look)
+    shown = ax.imshow(np.log10(np.maximum(error, 1e-30)), norm=norm, cmap="viridis", **style)
     if j.unchecked.any():
-        ax.imshow(np.where(j.unchecked, 1.0, np.nan), cmap=ListedColormap(["white"]), **look)
+        ax.imshow(np.where(j.unchecked, 1.0, np.nan), cmap=ListedColormap(["white"]), **style)
     if j.missed.any():
         wide = np.pad(j.missed.astype(float), 1, mode="edge")
         at = [np.arange(-1, size + 1) for size in (j.missed.shape[1], j.missed.shape[0])]
         ax.contourf(*at, wide, levels=[0.5, 1.5], colors="none", hatches=["////"])
     if j.lie.any():
-        ax.imshow(np.where(j.lie, 1.0, np.nan), cmap=ListedColormap(["black"]), **look)
+        ax.imshow(np.where(j.lie, 1.0, np.nan), cmap=ListedColormap(["black"]), **style)
     return shown

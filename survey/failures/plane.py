@@ -86,12 +86,12 @@ def plain(label, values):
 def logarithmic(label, exponents):
     """An axis of powers of ten, ticks at whole exponents."""
     low, high = sorted((exponents[0], exponents[-1]))
-    whole = np.arange(math.ceil(low), math.floor(high) + 1)
-    whole = whole[:: max(1, len(whole) // 4)]
+    decades = np.arange(math.ceil(low), math.floor(high) + 1)
+    decades = decades[:: max(1, len(decades) // 4)]
     order = np.argsort(exponents)
-    at = np.interp(whole, np.asarray(exponents)[order], np.arange(len(exponents))[order])
+    at = np.interp(decades, np.asarray(exponents)[order], np.arange(len(exponents))[order])
     return PlaneAxis(
-        label, len(exponents), {i: f"$10^{{{k}}}$" for i, k in zip(at, whole, strict=True)}
+        label, len(exponents), {i: f"$10^{{{k}}}$" for i, k in zip(at, decades, strict=True)}
     )
 
 

@@ -155,7 +155,7 @@ def marched(values):
     """(edges (m, 4), corners (t, 3)) of the surface values = 0 on a lattice, not negative counted
     as positive.
 
-    An edge is the place of its lower end on the lattice and its axis; corners of triangles are
+    An edge is the index of its lower end on the lattice and its axis; corners of triangles are
     numbers of edges. Cubes with a value that is not a number are not cut.
     """
     size = np.array(values.shape)
@@ -170,11 +170,11 @@ def marched(values):
     strides, found = np.array([size[1] * size[2], size[2], 1]), [np.zeros((0, 3), np.int64)]
     for own in np.unique(codes):
         table = polygons(int(own))
-        place = (cubes[codes == own][:, None, None] + CORNERS[table % 8]) @ strides
-        found.append((3 * place + table // 8).reshape(-1, 3))
+        corner = (cubes[codes == own][:, None, None] + CORNERS[table % 8]) @ strides
+        found.append((3 * corner + table // 8).reshape(-1, 3))
     numbers, corners = np.unique(np.concatenate(found), return_inverse=True)
-    places = np.stack(np.unravel_index(numbers // 3, values.shape), axis=1)
-    return np.column_stack([places, numbers % 3]), corners.reshape(-1, 3)
+    nodes_at = np.stack(np.unravel_index(numbers // 3, values.shape), axis=1)
+    return np.column_stack([nodes_at, numbers % 3]), corners.reshape(-1, 3)
 
 
 def _sharpened(functions, kind, values, cut, grain):
@@ -227,9 +227,9 @@ def _crossing(values, nodes, axis):
     """Where (0 to 1) along their edges the cubics through four values of the lattice are 0."""
     rows = np.arange(len(nodes))
     first = np.clip(nodes[rows, axis] - 1, 0, LINES - 4)
-    places = np.repeat(nodes[:, None], 4, axis=1)
-    places[rows, :, axis] = first[:, None] + np.arange(4)
-    own = values[tuple(np.moveaxis(places, 2, 0))]
+    nodes_at = np.repeat(nodes[:, None], 4, axis=1)
+    nodes_at[rows, :, axis] = first[:, None] + np.arange(4)
+    own = values[tuple(np.moveaxis(nodes_at, 2, 0))]
     offset = nodes[rows, axis] - first
     ends = own[rows, offset], own[rows, offset + 1]
     with np.errstate(all="ignore"):

@@ -24,7 +24,9 @@ def segments(values, curves, weights_of, border=1, optional=()):
     """
     found = {}
     for axis in (0, 1):
-        lines = values if axis == 1 else values.T  # along the axis, by the place on the other one
+        lines = (
+            values if axis == 1 else values.T
+        )  # along the axis, by the position on the other one
         ticks = np.linspace(0.0, 1.0, len(lines))
         for number in range(border, len(lines) - border):
             met = _met(curves, axis, ticks[number])
@@ -40,15 +42,15 @@ def along(values, ticks, met, weights_of, optional=()):
     `ticks` of a line, or UNKNOWN, which meets curves at `met` [(kind, position)]; `weights_of` and
     `optional` as in `segments`. What is perhaps drawn twice may count or not.
     """
-    places, found = np.array([place for _, place in met]), {}
+    positions, found = np.array([position for _, position in met]), {}
     weights = np.array([weights_of.get(kind, 1) for kind, _ in met], int)
     _, kinds = np.unique([kind for kind, _ in met], return_inverse=True)
-    near = (abs(places[:, None] - places) < NEAR) & (kinds[:, None] == kinds)
+    near = (abs(positions[:, None] - positions) < NEAR) & (kinds[:, None] == kinds)
     free = (near.sum(axis=1) > 1) | np.array([kind in optional for kind, _ in met], bool)
     for first, last in pairwise(np.flatnonzero(values != UNKNOWN)):
         low, high = ticks[first], ticks[last]
-        inside = (places > low - NEAR) & (places < high + NEAR)
-        sure = (places > low + NEAR) & (places < high - NEAR) & ~free
+        inside = (positions > low - NEAR) & (positions < high + NEAR)
+        sure = (positions > low + NEAR) & (positions < high - NEAR) & ~free
         change = values[last] - values[first]
         found[first, last] = _explained(change, weights[inside & sure], weights[inside & ~sure])
     return found
@@ -61,7 +63,9 @@ def _met(curves, axis, tick):
         off = x[:, 1 - axis] - tick
         at = np.flatnonzero((off[:-1] < 0) != (off[1:] < 0))
         share = off[at] / (off[at] - off[at + 1])
-        met += [(kind, place) for place in x[at, axis] + share * (x[at + 1, axis] - x[at, axis])]
+        met += [
+            (kind, position) for position in x[at, axis] + share * (x[at + 1, axis] - x[at, axis])
+        ]
     return met
 
 

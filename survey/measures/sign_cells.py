@@ -15,8 +15,8 @@ from survey.kernels.hill.cells import (
     ENOUGH,
     HALVED_X,
     HALVED_Y,
+    INDEX_X,
     LEAF,
-    PLACE_X,
     STABLE_PART,
     UNSOLVED,
     UNSTABLE_PART,
@@ -45,15 +45,15 @@ def _descend(series, doubts, blocks, depth, halves):
         loose = (verdict == UNDECIDED) & (
             doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)
         ).any(axis=1)
-        whole = (
+        to_split = (
             (where == blocks[of]).all(axis=1)
             & loose
             & (where[:, [HALVED_X, HALVED_Y]] < depth).any(axis=1)
         )
         left = np.maximum(depth[0] - where[:, HALVED_X], depth[1] - where[:, HALVED_Y])
-        done = ~whole & ((verdict != UNDECIDED) | (left == 0))
-        leaves += [_leaves(where[done], verdict[done]), _split(where[whole], depth)]
-        go = ~done & ~whole
+        done = ~to_split & ((verdict != UNDECIDED) | (left == 0))
+        leaves += [_leaves(where[done], verdict[done]), _split(where[to_split], depth)]
+        go = ~done & ~to_split
         own, where, of = own[go], where[go], of[go]
         along = np.where(depth[0] - where[:, HALVED_X] == left[go], 0, 1)
         own, where, of = _halved(own, where, of, along, halves)
@@ -93,9 +93,9 @@ def _split(where, depth):
 def _half(blocks, axis, side):
     """The lower (0) or the upper (1) half of a block, or of each of some."""
     half = blocks.copy()
-    halved, place = AXIS * axis + HALVED_X, AXIS * axis + PLACE_X
+    halved, index = AXIS * axis + HALVED_X, AXIS * axis + INDEX_X
     half[..., halved] += 1
-    half[..., place] = 2 * half[..., place] + side
+    half[..., index] = 2 * half[..., index] + side
     return half
 
 

@@ -17,7 +17,7 @@ FITS = 3  # parabolas, one inside the other
 MOST = 60  # steps
 ENDS = 64  # that are followed, those of the longest pieces: where tongues crowd there are hundreds
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
-SAME = 1e-8  # how near one place is found again, besides the brackets
+SAME = 1e-8  # how near one point is found again, besides the brackets
 
 
 class _End:
@@ -107,8 +107,8 @@ def _merged(pieces):
             for number, back in chain(end)
         ]
         if parts:
-            whole = [parts[0], *((x[1:], error[1:]) for x, error in parts[1:])]
-            done.append(tuple(np.concatenate(one) for one in zip(*whole, strict=True)))
+            joined = [parts[0], *((x[1:], error[1:]) for x, error in parts[1:])]
+            done.append(tuple(np.concatenate(one) for one in zip(*joined, strict=True)))
     return done
 
 
@@ -167,8 +167,8 @@ def _steps(function, going, ends, grain):
     for k, end in enumerate(going):
         if not end.going:  # another one has met it
             continue
-        place = goals[k].copy()
-        place[axis[k]] = t[k]
+        point = goals[k].copy()
+        point[axis[k]] = t[k]
         other = met[k]
         bend = off[k] if other is None else 0.0  # a goal that is met is where the curve goes
         if (
@@ -180,11 +180,11 @@ def _steps(function, going, ends, grain):
             end.step *= 0.5
             end.going = end.step >= LEAST
             continue
-        end.x.append(place)
+        end.x.append(point)
         end.error.append(error[k] + grain)
         if other is not None and off[k] <= SAME + error[k] + other.error[-1]:
             end.going = other.going = False
-        elif ((place <= 0.0) | (place >= 1.0)).any():
+        elif ((point <= 0.0) | (point >= 1.0)).any():
             end.going = False
         elif bend < 2.0 * FLAT:
             end.step = min(1.5 * end.step, LONGEST)

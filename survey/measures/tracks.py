@@ -1,7 +1,7 @@
 """Curves on a map on which something that moves with the parameters is exceptional: followed point
 by point.
 
-A system gives, at a position of the map and a place x, two numbers (a, b) and their error bounds: b
+A system gives, at a position of the map and a coordinate x, two numbers (a, b) and their error bounds: b
 = 0 says where the thing is (an extremum, an equilibrium), a = 0 that the position lies on the
 curve. The curve is followed in the space of (x, position), where it has no cusps, by steps along
 its tangent and Newton's method. Each of its points is bracketed, across the curve, by positions at
@@ -29,14 +29,14 @@ TINY = 1e-300
 
 @dataclass(frozen=True)
 class Track:
-    """Points of a curve: positions (m, 2) with their errors, places x with theirs; which of them
+    """Points of a curve: positions (m, 2) with their errors, coordinates x with theirs; which of them
     are certain.
     """
 
     x: np.ndarray
     error: np.ndarray
-    place: np.ndarray
-    place_error: np.ndarray
+    coordinate: np.ndarray
+    coordinate_error: np.ndarray
     sure: np.ndarray
 
     def certain(self):
@@ -51,8 +51,8 @@ class Track:
         share = ((u[1:] - low) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), TINY)
         off = abs(low + np.clip(share, 0.0, 1.0)[:, None] * chord - u[1:]).max(axis=1)
         least, most = (
-            np.minimum(self.place[:-1], self.place[1:]),
-            np.maximum(self.place[:-1], self.place[1:]),
+            np.minimum(self.coordinate[:-1], self.coordinate[1:]),
+            np.maximum(self.coordinate[:-1], self.coordinate[1:]),
         )
         return bool(
             ((off < SAME) & ((u[0] - least + APART) % turn < most - least + 2.0 * APART)).any()
@@ -60,7 +60,7 @@ class Track:
 
     def within(self, other, turn):
         """Does nearly all of this curve lie on the other?"""
-        points = np.column_stack([self.place, self.x])
+        points = np.column_stack([self.coordinate, self.x])
         return np.mean([other.passes(u, turn) for u in points]) > 0.9
 
 
@@ -69,20 +69,20 @@ def part_of(track, part):
     return Track(*(getattr(track, name)[part] for name in Track.__dataclass_fields__))
 
 
-def with_points(track, places, others):
-    """The Track with a point of each of the `others` put in before its point of the number in `places`."""
+def with_points(track, indices, others):
+    """The Track with a point of each of the `others` put in before its point of the number in `indices`."""
     pairs = [
         (name, np.concatenate([getattr(other, name) for other in others]))
         for name in Track.__dataclass_fields__
     ]
     return Track(
-        *(np.insert(getattr(track, name), places, values, axis=0) for name, values in pairs)
+        *(np.insert(getattr(track, name), indices, values, axis=0) for name, values in pairs)
     )
 
 
 @dataclass(frozen=True)
 class Follower:
-    """Follows the curve a = b = 0 of the function (place, position) -> (a, b, bar of a, bar of b)."""
+    """Follows the curve a = b = 0 of the function (coordinate, position) -> (a, b, bar of a, bar of b)."""
 
     function: Callable
     grain: float
@@ -117,10 +117,10 @@ class Follower:
             return None
         for _ in range(8):
             values = self._at(u)
-            whole = np.vstack([slopes, tangent])
-            if not np.isfinite(values).all() or abs(np.linalg.det(whole)) < TINY:
+            jacobian = np.vstack([slopes, tangent])
+            if not np.isfinite(values).all() or abs(np.linalg.det(jacobian)) < TINY:
                 return None
-            step = np.linalg.solve(whole, -np.array([*values[:2], tangent @ (u - start)]))
+            step = np.linalg.solve(jacobian, -np.array([*values[:2], tangent @ (u - start)]))
             u = u + step
             if abs(step).max() > 0.5:
                 return None
@@ -137,8 +137,8 @@ class Follower:
         ahead, closed = self._half(found, 1.0)
         back = [] if closed else self._half(found, -1.0)[0]
         rows = [*back[::-1], self._row(*found, None), *ahead]
-        x, error, place, spread, sure = map(np.array, zip(*rows, strict=True))
-        return Track(x, error, place, spread, sure)
+        x, error, coordinate, spread, sure = map(np.array, zip(*rows, strict=True))
+        return Track(x, error, coordinate, spread, sure)
 
     def _half(self, found, sense):
         """The rows after the first point to one side, and whether the curve closes."""
@@ -199,7 +199,7 @@ class Follower:
         return None
 
     def _row(self, u, slopes, axis):
-        """(position, its error, place, its error, is it certain?), bracketed across the curve or
+        """(position, its error, coordinate, its error, is it certain?), bracketed across the curve or
         along the `axis`.
         """
         (a_x, *a_y), (b_x, *b_y) = slopes
@@ -268,8 +268,8 @@ def from_lattice(number, things, function_of, square):
 
     Where only a border of the `square` is asked for: of their points there, Tracks of one point.
 
-    things(position) -> [(label, side, place, a)] where b = 0; function_of(label): what a Follower
-    takes, and by how much places differ that are the same (an infinite number if none are). A curve
+    things(position) -> [(label, side, coordinate, a)] where b = 0; function_of(label): what a Follower
+    takes, and by how much coordinates differ that are the same (an infinite number if none are). A curve
     is begun where, from one node to the next, a changes its sign on things of one label and side
     that are near.
     """
@@ -322,7 +322,7 @@ def _add(found, label, function, turn, grain, start):
 
 
 def _changes(some, others, here, there):
-    """(label, (place, position)) where a of a thing changes its sign between two positions."""
+    """(label, (coordinate, position)) where a of a thing changes its sign between two positions."""
     for label, side, x, a in some:
         same = [(abs(y - x), y, c) for *other, y, c in others if other == [label, side]]
         if same:

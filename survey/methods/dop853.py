@@ -218,11 +218,11 @@ def _body_at(G, T, dt, state):
     """The state at dt after the start of the step: one step of size dt."""
     start = motion.state_of(T[0])
     for i in range(STAGES):
-        motion.put(state, start)
+        motion.store(state, start)
         for j in range(i):
             for k in range(motion.STATE):
                 state[k] += dt * A[i, j] * T[motion.STAGE + j, k]
-        motion.put(T[motion.STAGE + i], motion.slope(G, 0.0, motion.state_of(state)))
+        motion.store(T[motion.STAGE + i], motion.slope(G, 0.0, motion.state_of(state)))
     for k in range(motion.STATE):
         change = 0.0
         for i in range(STAGES):

@@ -229,7 +229,7 @@ def flow_fates(p, section, ends, sizes, eqs, plus, minus, lib, starts, tolerance
 def _body_at(G, T, dt, state):
     """The state at dt after the start of the step: two half steps."""
     middle = classical(motion.slope, G, (0.0, 0.0, 0.0), motion.state_of(T[0]), 0.5 * dt)
-    motion.put(state, classical(motion.slope, G, (0.0, 0.0, 0.0), middle, 0.5 * dt))
+    motion.store(state, classical(motion.slope, G, (0.0, 0.0, 0.0), middle, 0.5 * dt))
 
 
 @kernel
@@ -237,7 +237,7 @@ def _body_begin(G, state, tolerance, T, V):
     """Start a step; its error is that of two half steps, by Richardson, with a margin of 2."""
     h = motion.expanded(G, state, T, V) * min(1.0, (100.0 * tolerance) ** 0.25)
     one, two, error = np.empty(motion.STATE), np.empty(motion.STATE), 0.0
-    motion.put(one, classical(motion.slope, G, (0.0, 0.0, 0.0), motion.state_of(state), h))
+    motion.store(one, classical(motion.slope, G, (0.0, 0.0, 0.0), motion.state_of(state), h))
     _body_at(G, T, h, two)
     for k in range(motion.STATE):
         error = max(error, abs(two[k] - one[k]) / (motion.size_of(state) if k < 3 else 1.0))

@@ -200,14 +200,14 @@ def _holds(source, panel, middle, radius):
 
 def _file(workflow, source, axes, sides, fixed, panels, proof):
     """The bytes of the file (the format: workflows/docs/model.md)."""
-    places, numbers, first = [], [], 0
+    entries, numbers, first = [], [], 0
     for panel in panels:
         terms = []
         for own in panel.series:
             counts = _counts(own)
             terms.append(counts)
             numbers += [own[j, :count] for j, count in enumerate(counts)]
-        places.append({"low": panel.low, "high": panel.high, "bars": [float(bar) for bar in panel.bars],
+        entries.append({"low": panel.low, "high": panel.high, "bars": [float(bar) for bar in panel.bars],
                        "first": first, "terms": terms})  # fmt: skip
         first = sum(map(len, numbers))
     series = np.concatenate(numbers).astype("<f8").tobytes()
@@ -221,7 +221,7 @@ def _file(workflow, source, axes, sides, fixed, panels, proof):
         "fixed": fixed,
         "functions": [{"name": name, "long_name": words}
                       for name, words in zip(source.names, source.long_names, strict=True)],
-        "rtol": workflow.request.rtol, "panels": places, "sha256": hashlib.sha256(series).hexdigest(),
+        "rtol": workflow.request.rtol, "panels": entries, "sha256": hashlib.sha256(series).hexdigest(),
         "workflow": workflow.text, "references": list(workflow.scene.REFERENCES),
         "versions": {"survey": survey.__version__, "numpy": np.__version__, "python": platform.python_version()},
         "proof": proof,

@@ -68,14 +68,14 @@ def _damped(workflow, names, fixed):
     """
     scene = workflow.scene
     columns = [p.name for p in scene.PARAMETERS]
-    if (scene.damping if scene.place is None else fixed.get(columns[scene.place])) == 0.0:
+    if (scene.damping if scene.column is None else fixed.get(columns[scene.column])) == 0.0:
         return _hill(workflow, names, fixed)
     solve = _evaluated(workflow, names, fixed, ("discriminant", "period"))
 
     def at(x, y):
         found = solve(x, y)
         points = {names[0]: x[:, None], names[1]: y} | fixed
-        c = scene.damping if scene.place is None else points[columns[scene.place]]
+        c = scene.damping if scene.column is None else points[columns[scene.column]]
         turn = np.broadcast_to(2.0 * c, (x.size, y.size)) * found["period"]
         det = np.exp(-turn)
         off = (

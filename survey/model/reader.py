@@ -33,7 +33,7 @@ CELLS, PIECES, FEW = 16, 4, 100_000
 SHORTER = 0.1  # of a cell's bound: what the degrees that are left out may add to it
 LOT = 2**20  # points that are sorted together
 MOST_CELLS = 2**16  # what their numbers (uint16) tell apart
-FINE = 2**14  # places along a side, each in one cell
+FINE = 2**14  # positions along a side, each in one cell
 # at most: of a member, of a series along a side, of all series
 BYTES, TERMS, DENSE = 2**28, 2**10, 2**27
 HALF, INVARIANTS = ("y1", "dy1", "y2", "dy2"), ("A", "B", "C", "D", "t")
@@ -379,13 +379,13 @@ def tables(x, n):
 
 
 def _run(inside):
-    """The places that are True: a slice where they follow each other, else their numbers; None if
+    """The indices that are True: a slice where they follow each other, else their numbers; None if
     there are none.
     """
-    places = np.flatnonzero(inside)
-    if not places.size:
+    at = np.flatnonzero(inside)
+    if not at.size:
         return None
-    return slice(places[0], places[-1] + 1) if places[-1] - places[0] == places.size - 1 else places
+    return slice(at[0], at[-1] + 1) if at[-1] - at[0] == at.size - 1 else at
 
 
 class _Cells:
@@ -399,7 +399,7 @@ class _Cells:
         self._solve(model, lattice)
         at = [np.searchsorted(edges, low + (np.arange(FINE) + 0.5) / scale, side="right") - 1
               for edges, low, scale in zip(lattice, model.low, self.scale, strict=True)]  # fmt: skip
-        self.places = (at[0] * (lattice[1].size - 1)).astype(np.uint16), at[1].astype(np.uint16)
+        self.cells = (at[0] * (lattice[1].size - 1)).astype(np.uint16), at[1].astype(np.uint16)
 
     def _solve(self, model, lattice):
         """Fill `series` (cells, 3 q, q): of D and its derivatives; and `bars` (cells), NaN where
@@ -475,7 +475,7 @@ class _Cells:
         x, y = x[lot], y[lot]
         at = [np.clip((values - low) * scale, 0, FINE - 1).astype(np.int16)
               for values, low, scale in zip((x, y), self.low, self.scale, strict=True)]  # fmt: skip
-        cell = self.places[0][at[0]] + self.places[1][at[1]]
+        cell = self.cells[0][at[0]] + self.cells[1][at[1]]
         order = np.argsort(cell, kind="stable")
         ends = np.searchsorted(cell[order], np.arange(self.bars.size + 1))
         parts = 3 if len(out) > 3 else 1  # D and its derivatives
@@ -520,7 +520,7 @@ def _lattice(model, side, pieces):
 
 
 def _short_tables(table):
-    """T_2 ... into `table` (q, 2, N), whose second row holds the places, by T_(m+n) = 2 T_m T_n - T_|m-n|."""
+    """T_2 ... into `table` (q, 2, N), whose second row holds the points, by T_(m+n) = 2 T_m T_n - T_|m-n|."""
     table[0], last, q = 1.0, 1, len(table)
     while last < q - 1:
         most = min(2 * last, q - 1)

@@ -181,7 +181,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
     ):
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
-    full, shared, whole = case.works(), _shared(module), getattr(case, "ALL", ())
+    full, shared = case.works(), _shared(module)
+    with_all_outputs = getattr(case, "ALL", ())
     thinned = {work: (_thinned(point), options) for work, (point, options) in full.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
@@ -193,7 +194,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
         smallest = timed[_smallest(works)]
         compile_seconds = _first_call(solve, *smallest) if peer else _cold(scene, method, smallest)
         for work, (point, options) in timed.items():  # every path is compiled before it is timed
-            solve(point, options, SETTINGS[0]) if peer or work not in whole else solve(
+            solve(point, options, SETTINGS[0]) if peer or work not in with_all_outputs else solve(
                 point, options, SETTINGS[0], everything=True
             )
         slow = set()
@@ -211,7 +212,11 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 error, wrong = errors[id(references)]
                 if np.isnan(error):
                     continue
-                asked = solve if peer or work not in whole else partial(solve, everything=True)
+                asked = (
+                    solve
+                    if peer or work not in with_all_outputs
+                    else partial(solve, everything=True)
+                )
                 seconds = _per_point(asked, *timed[work], setting)
                 records.append(
                     Record(work, method, peer, setting, error, seconds, wrong, compile_seconds)
@@ -291,18 +296,18 @@ def _within(reference, point):
             v.min() <= parameters[name] <= v.max() for name, v in about.items()
         ):
             return reference
-        whole = {name: np.array([value]) for name, value in parameters.items()}
+        inputs = {name: np.array([value]) for name, value in parameters.items()}
         return (
-            whole | {name: np.append(whole[name], v) for name, v in about.items()},
+            inputs | {name: np.append(inputs[name], v) for name, v in about.items()},
             options,
             exact,
             verdict,
         )
-    whole = {name: np.array([[value]]) for name, value in parameters.items()}
-    whole |= {
-        name: np.concatenate([whole[name], np.atleast_2d(point[name])], axis=1) for name in dense
+    inputs = {name: np.array([[value]]) for name, value in parameters.items()}
+    inputs |= {
+        name: np.concatenate([inputs[name], np.atleast_2d(point[name])], axis=1) for name in dense
     }
-    return whole, options, exact, verdict
+    return inputs, options, exact, verdict
 
 
 def _solver(module, method, error):

@@ -81,7 +81,7 @@ def rational(text):  # the rational number that a text such as '0.99' or '-7/3' 
     return Fraction(text)
 
 
-def whole(value, least, most, what):
+def integer(value, least, most, what):
     need(type(value) is int and least <= value <= most, f"{what} is not a whole number from {least} to {most}")
     return value
 
@@ -101,12 +101,12 @@ class Formula:
         need(isinstance(text, str) and len(text) < 20_000, "a formula is not a text, or too long")
         self.text, self.names, self.parts = text, {*names, "pi"}, {}  # what stands in it twice is evaluated once
         try:
-            self.whole = self._read(ast.parse(text, mode="eval").body)
+            self.integer = self._read(ast.parse(text, mode="eval").body)
         except (SyntaxError, ValueError, RecursionError, MemoryError):
             raise Failed(f"this is not a formula: {text[:80]!r}") from None
 
     def __call__(self, **values):  # its value for balls, complex balls, or power series of balls
-        return self.known(values)[self.whole]
+        return self.known(values)[self.integer]
 
     def known(self, values):  # these values, and those of all parts that follow from them
         values = {"pi": arb.pi(), **values}
@@ -126,7 +126,7 @@ class Formula:
             case ast.UnaryOp(op=ast.USub()):
                 operands, operation = [node.operand], neg
             case ast.BinOp(op=ast.Pow(), right=ast.Constant()):
-                exponent = whole(node.right.value, 0, 64, "an exponent")
+                exponent = integer(node.right.value, 0, 64, "an exponent")
                 operands, operation = [node.left], lambda x: prod([x] * exponent, start=arb(1))
             case ast.BinOp() if type(node.op) in OPERATIONS:
                 operands, operation = [node.left, node.right], OPERATIONS[type(node.op)]
@@ -186,7 +186,7 @@ class Equation:
         ctx.cap, over = order, []
         fixed = {f: f.known(point) for *_, entries in self.pieces for f in entries}
         for known, *own in steps:
-            series = [arb_series(0) + f.known(fixed[f] | values)[f.whole] for f, values in known.items()]
+            series = [arb_series(0) + f.known(fixed[f] | values)[f.integer] for f, values in known.items()]
             over.append(step(blocks(series), order, *own))
         table = reduce(mul, reversed(over)).tolist()
         halves = product((slice(len(table) // 2), slice(len(table) // 2, None)), repeat=2)
@@ -203,7 +203,7 @@ class Equation:
         across, up = half * (r + 1 / r) / 2, half * (r - 1 / r) / 2
         arcs = [acb(centre + across * x.cos_pi(), up * x.sin_pi()) for x in ARCS]
         boxes = [acb(centre + across * (2 * x - 1), up * y) for x, y in product(SIDE, repeat=2)]
-        return [[{**real, name: place} for place in places] for places in (arcs, boxes)]
+        return [[{**real, name: region} for region in regions] for regions in (arcs, boxes)]
 
     def sizes(self, sides, name, r, least):
         """Bounds of the factors (less constants, which I1 reproduces) for one parameter in E_r, if all is analytic."""
@@ -211,9 +211,9 @@ class Equation:
 
         def tried(start, length, entries):
             u = start.union(start + length)
-            values = [[acb(f(u=u, **place)) for f in entries] for place in arcs]
+            values = [[acb(f(u=u, **region)) for f in entries] for region in arcs]
             sharp = all(length * x.rad() < WIDE * (1 + x.abs_upper().sqrt()) for own in values for x in own)
-            if sharp and all(acb(f(u=u, **place)).is_finite() for place in boxes for f in entries):
+            if sharp and all(acb(f(u=u, **region)).is_finite() for region in boxes for f in entries):
                 return [(length, own) for own in values]
 
         found = self.bisected(BOXES, SMALLEST, tried, f"K or L is singular, or changes too fast, for complex {name}")
@@ -274,10 +274,10 @@ class Panel:
     def __init__(self, equation, sides, data):
         self.equation, self.cells = equation, data["cells"]
         self.sides = [(exact((low + high) / 2), exact((high - low) / 2)) for low, high in sides]
-        self.counts = [whole(n, 2, 40, "a number of nodes") for n in data["nodes"]]
+        self.counts = [integer(n, 2, 40, "a number of nodes") for n in data["nodes"]]
         self.ellipses, self.rates = ([exact(rational(x)) for x in data[key]] for key in ("ellipses", "rates"))
         need(all(r > 1 for r in self.ellipses) and all(w > 0 for w in self.rates), "an r <= 1, or a w <= 0")
-        self.order = whole(data["order"], 2, 400, "an order")
+        self.order = integer(data["order"], 2, 400, "an order")
         self.halves = [halving(n) for n in self.counts]
 
     @cached_property
@@ -286,8 +286,8 @@ class Panel:
         with ctx.workprec(3 * ctx.prec):  # inverses lose digits
             nodes = [[(arb.pi() * (2 * i + 1) / (2 * n)).cos() for i in range(n)] for n in self.counts]
             matrices = [bernstein(at).inv() for at in nodes]
-        steps = self.equation.steps(self.place([UNIT] * len(nodes)), self.order)
-        values = [self.equation.factors(steps, self.order, self.place(at)) for at in product(*nodes)]
+        steps = self.equation.steps(self.region([UNIT] * len(nodes)), self.order)
+        values = [self.equation.factors(steps, self.order, self.region(at)) for at in product(*nodes)]
         sizes = list(map(partial(self.equation.sizes, self.sides), self.equation.names, self.ellipses, self.rates))
         norms, found = [1 + 2 / arb.pi() * arb(n).log() for n in self.counts], []
         for own, *bounds in zip(zip(*values, strict=True), *sizes, strict=True):
@@ -300,7 +300,7 @@ class Panel:
             found.append((transformed(table, matrices), bound.upper(), slope.upper()))
         return found
 
-    def place(self, x):  # {name: parameter} at x in [-1, 1]^2
+    def region(self, x):  # {name: parameter} at x in [-1, 1]^2
         return {name: c + half * at for name, (c, half), at in zip(self.equation.names, self.sides, x, strict=True)}
 
     def check(self):
@@ -375,14 +375,14 @@ def walk(letters, parts, split):
     need(not waiting, "the cells or panels do not cover the whole")
 
 
-def halved(place):
-    """The halves or quarters of a place, which is (start, end) of each side; the first one last."""
-    halves = [[((start + end) / 2, end), (start, (start + end) / 2)] for start, end in place]
+def halved(region):
+    """The halves or quarters of a region, which is (start, end) of each side; the first one last."""
+    halves = [[((start + end) / 2, end), (start, (start + end) / 2)] for start, end in region]
     return [part[::-1] for part in product(*halves[::-1])]
 
 
-def size(place):  # its length or area
-    return prod(end - start for start, end in place)
+def size(region):  # its length or area
+    return prod(end - start for start, end in region)
 
 
 @lru_cache(maxsize=1)  # each process reads it once
@@ -393,7 +393,7 @@ class Certificate:
         data = json.loads(text)
         need(data["format"] == FORMAT, f"the format is not {FORMAT!r}")
         need(digest(data) == data["sha256"], "it was changed: its digest differs")
-        ctx.prec = whole(data["bits"], 53, 4096, "the number of bits")
+        ctx.prec = integer(data["bits"], 53, 4096, "the number of bits")
         self.names = names = [str(name) for name in data["parameters"]]
         good = all(name.isidentifier() and name not in {"u", "pi", *FUNCTIONS} for name in names)
         need(good and len(names) == len(set(names)) in (1, 2), "there must be one or two distinct parameter names")
@@ -401,14 +401,14 @@ class Certificate:
         self.sides = [(rational(low), rational(high)) for low, high in data["rectangle"]]
         good = len(self.sides) == len(names) and all(low < high for low, high in self.sides)
         need(good, "the rectangle must have a side of positive length for each parameter")
-        pairs = list(zip(places(self.sides, data["panels"]), data["panels"]["list"], strict=True))
+        pairs = list(zip(regions(self.sides, data["panels"]), data["panels"]["list"], strict=True))
         self.panels = [Panel(self.equation, *pair) for pair in pairs]
-        self.cells = [cell for place, panel in pairs for cell in walk(panel["cells"], [place], halved)]
+        self.cells = [cell for region, panel in pairs for cell in walk(panel["cells"], [region], halved)]
         self.letters = "".join(letter for letter, _ in self.cells)
         need(set(self.letters) <= {*VERDICTS, *(EDGES if len(names) == 1 else "")}, "there are unknown cells")
         self.shares = dict.fromkeys(VERDICTS, Fraction(0))
-        for letter, place in self.cells:
-            self.shares[letter if letter in VERDICTS else OPEN] += size(place) / size(self.sides)
+        for letter, region in self.cells:
+            self.shares[letter if letter in VERDICTS else OPEN] += size(region) / size(self.sides)
         good = self.shares == {letter: rational(data["shares"][letter]) for letter in VERDICTS}
         need(good, "the shares of the verdicts are not those of its cells")
 
@@ -428,9 +428,9 @@ class Certificate:
             f"{ends} consists of cells, borders included: {counts}{', and edges:' if row else '.'}",
         ]
         number = sum(letter in EDGES for letter in self.letters)
-        for (letter, place), after in zip(self.cells, self.letters[1:] + OPEN, strict=True):
+        for (letter, region), after in zip(self.cells, self.letters[1:] + OPEN, strict=True):
             if letter in EDGES:
-                where, factor = between(*place[0], 3 - floor(log10(size(place)))), factors[EDGES.index(letter)]
+                where, factor = between(*region[0], 3 - floor(log10(size(region)))), factors[EDGES.index(letter)]
                 lines.append(f"    {where}: {factor} at {start} is 0 once, {VERDICTS.get(after, 'an edge')} after it;")
         if row:
             where = f"{number} point{', in this edge' if number == 1 else 's, one in each of these edges'}."
@@ -442,12 +442,12 @@ class Certificate:
         return "\n".join(lines)
 
 
-def places(sides, panels):
+def regions(sides, panels):
     """Those of the panels, the last side varying first; in a layout such as "..+....", "+" is divided."""
-    across = [whole(n, 1, 4096, "a number of panels") for n in panels["across"]]
+    across = [integer(n, 1, 4096, "a number of panels") for n in panels["across"]]
     need(prod(across) <= 2**16, "there are too many panels")
     ends = [[a + (b - a) * Fraction(k, n) for k in range(n + 1)] for n, (a, b) in zip(across, sides, strict=True)]
-    return [place for _, place in walk(panels["layout"], list(product(*map(pairwise, ends))), halved)]
+    return [region for _, region in walk(panels["layout"], list(product(*map(pairwise, ends))), halved)]
 
 
 def digest(data):  # the SHA-256 of all but itself

@@ -116,18 +116,18 @@ def _sampled(equation, sides, name, r):
     """(the length of each sample of u, the entries of K and L at them on the border of the ellipse,
     each an array with samples along its first axis), no bounds; NaN where they are singular."""
     arcs, boxes = equation.cover(sides, name, r)
-    arcs = [{key: x.mid() for key, x in place.items()} for place in arcs]
+    arcs = [{key: x.mid() for key, x in region.items()} for region in arcs]
     lengths, rows = [], []
     for start, end, _, entries in equation.pieces:
         known = [start + (end - start) * (arb(k) / SAMPLES) for k in range(0, SAMPLES + 1, CHECKED)]
         if not all(
-            acb(f(u=u, **place)).is_finite() for u in known for place in boxes for f in entries
+            acb(f(u=u, **region)).is_finite() for u in known for region in boxes for f in entries
         ):
             return np.array([1.0]), np.full((1, 1, 1), math.nan)
         for k in range(SAMPLES):
             u = start + (end - start) * (arb(2 * k + 1) / (2 * SAMPLES))
             lengths.append(float((end - start) / SAMPLES))
-            rows.append([[complex(acb(f(u=u, **place))) for place in arcs] for f in entries])
+            rows.append([[complex(acb(f(u=u, **region))) for region in arcs] for f in entries])
     return np.array(lengths), np.array(rows).swapaxes(0, 1)
 
 

@@ -30,13 +30,13 @@ ROUNDING = 8.0 * EPS  # of c T and of e^(-c T), relative
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DampedScene(FunctionScene):
-    """What a scene's module offers (see `survey.scenes`); `damping` is c, or the place of the
+    """What a scene's module offers (see `survey.scenes`); `damping` is c, or the column of the
     parameter that is c.
     """
 
     z: Callable
     damping: float | None
-    place: int | None
+    column: int | None
     period: float | Callable
     breaks: tuple[float, ...] | Callable
     even: bool
@@ -67,7 +67,7 @@ class DampedScene(FunctionScene):
     @cached_property
     def _inner(self):
         """The scene of x, over the same parameters."""
-        return self._undamped(_less_square(self.z, self.damping, self.place))
+        return self._undamped(_less_square(self.z, self.damping, self.column))
 
     def _undamped(self, z):
         shared = ("period", "breaks", "own", "NAME", "TEXT", "HASH", "TITLE", "about", "REFERENCES")
@@ -110,7 +110,7 @@ class DampedScene(FunctionScene):
 
     def _loss(self, point, out):
         """c, c T and a bound of its error, in the shape of the outputs `out`."""
-        given = self.damping if self.place is None else point[self.PARAMETERS[self.place].name]
+        given = self.damping if self.column is None else point[self.PARAMETERS[self.column].name]
         c = np.broadcast_to(np.asarray(given, float), out["status"].shape)
         turn = c * out["period"]
         return c, turn, abs(turn) * (ROUNDING + out["period_error"] / out["period"])
@@ -124,7 +124,7 @@ class DampedScene(FunctionScene):
 
     def trajectory(self, point, answer, options, time=None):
         """Solutions and multipliers of a point (see `survey.scenes`)."""
-        damping = self.damping if self.place is None else point[self.PARAMETERS[self.place].name]
+        damping = self.damping if self.column is None else point[self.PARAMETERS[self.column].name]
         return self._undamped(self.z).trajectory(point, answer, options, time, float(damping))
 
     def why(self, answer):
@@ -135,13 +135,13 @@ class DampedScene(FunctionScene):
         return f"{named(answer, 'exponent')} per period {sign}"
 
 
-def _less_square(z, damping, place):
+def _less_square(z, damping, column):
     """z - c^2, as numba and Python run it."""
     inner = inline(getattr(z, "py_func", z))
-    if place is None:
+    if column is None:
         square = damping * damping
         return lambda u, p: inner(u, p) - square
-    return lambda u, p: inner(u, p) - p[place] * p[place]
+    return lambda u, p: inner(u, p) - p[column] * p[column]
 
 
 def checked_damping(damping, refuse):

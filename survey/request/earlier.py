@@ -106,15 +106,15 @@ def _common(workflow, ds, path):
         return None, "its parameters are different"
     where, fixed = {}, {}
     for name, (dims, values) in new.parameters.items():
-        place = _places(np.atleast_1d(old.parameters[name][1]), np.atleast_1d(values))
-        if name in new.uncut and not np.array_equal(place, np.arange(old.sizes.get(name, 1))):
+        index = _indices(np.atleast_1d(old.parameters[name][1]), np.atleast_1d(values))
+        if name in new.uncut and not np.array_equal(index, np.arange(old.sizes.get(name, 1))):
             return None, f"one solution serves the whole axis {name}, and that axis differs"
-        if (place < 0).all():
+        if (index < 0).all():
             return None, f"it has no value of {name} that is needed here"
         if dims:
-            where[name] = place
+            where[name] = index
         elif name in old.sizes:
-            fixed[name] = int(place[0])
+            fixed[name] = int(index[0])
     where, shared = (
         {dim: where[dim] for dim in new.sizes},
         tuple(dim for dim in new.sizes if dim in old.sizes),
@@ -124,8 +124,8 @@ def _common(workflow, ds, path):
     return (None, why) if why else (found, "")
 
 
-def _places(old, new):
-    """For each new value the place of the same float among the old ones, or -1."""
+def _indices(old, new):
+    """For each new value the index of the same float among the old ones, or -1."""
     order = np.argsort(old)
-    place = order[np.minimum(np.searchsorted(old[order], new), old.size - 1)]
-    return np.where(old[place] == new, place, -1)
+    index = order[np.minimum(np.searchsorted(old[order], new), old.size - 1)]
+    return np.where(old[index] == new, index, -1)

@@ -52,7 +52,7 @@ from survey import methods
 from survey.kernels.body.motion import FLOATS, STATE
 from survey.measures.body import limits, motion, transversal
 from survey.measures.body import rests as of_rest
-from survey.measures.body.system import CONDITIONS, NAMES, OFF, place, read
+from survey.measures.body.system import CONDITIONS, NAMES, OFF, nearest, read
 from survey.measures.cylinder import portrait as reduced_portrait
 from survey.measures.rows import Rows
 from survey.modules import load
@@ -238,8 +238,8 @@ def solve(point, request):
         if body is None:
             out["status"][i] = INVALID_PARAMETERS
             continue
-        placed = place(body)
-        _write_place(placed, out, i)
+        placed = nearest(body)
+        _write_nearest(placed, out, i)
         if question == "portrait":
             _write_rests(placed, out, i)
         if placed.case == OFF:
@@ -279,7 +279,7 @@ def _put_complex(out, name, where, values, bars):
         _put(out, f"{name}_{end}", where, part, bars)
 
 
-def _write_place(placed, out, i):
+def _write_nearest(placed, out, i):
     """Where the body is by the paper's conditions."""
     out["case"][i] = placed.case
     _put(out, "residual", i, placed.residuals + 0.0, placed.bars)

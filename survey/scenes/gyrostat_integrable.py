@@ -154,10 +154,10 @@ def solve(point, request):
     for name, (value, bar) in heads.items():
         for key, column in ((name, value), (f"{name}_error", bar)):
             column = np.where(real.reshape(-1, *[1] * (column.ndim - 1)), column, np.nan)
-            whole = [
+            stacked = [
                 back(np.broadcast_to(c[:, None], times.shape)) for c in np.atleast_2d(column.T)
             ]
-            results[key] = np.stack(whole, axis=-1) if column.ndim > 1 else whole[0]
+            results[key] = np.stack(stacked, axis=-1) if column.ndim > 1 else stacked[0]
     verdict = back(np.broadcast_to(motions.verdict[:, None], times.shape))
     results["verdict"] = np.where(solved, verdict, _MOTIONS["undecided"])
     return results

@@ -135,9 +135,9 @@ def _rules(q, a):
     if not free.size:
         return None, None
     z = a[free]
-    whole = np.rint(np.sqrt(abs(z)))
+    order = np.rint(np.sqrt(abs(z)))
     rule = np.full(a.shape, NO_RULE, np.int8)
-    rule[free] = np.where(z == whole * whole, ON_EDGE, np.where(z > 0, NO_UNSTABLE_SIDE, NO_RULE))
+    rule[free] = np.where(z == order * order, ON_EDGE, np.where(z > 0, NO_UNSTABLE_SIDE, NO_RULE))
     return rule, (free, z)
 
 

@@ -434,9 +434,9 @@ def _rules(row, rho, low=None):
     if not at_rest.size:
         return rule, None
     still = rho[at_rest]
-    whole = (still == 0) | ((2 * still == np.rint(2 * still)) if row.oblate else False)
-    whole &= True if low is None else low[at_rest] == 0  # of rho exactly, as no rounded one says
-    rule[at_rest] = np.where(whole, ON_EDGE, NO_UNSTABLE_SIDE)
+    on_edge = (still == 0) | ((2 * still == np.rint(2 * still)) if row.oblate else False)
+    on_edge &= True if low is None else low[at_rest] == 0  # of rho exactly, as no rounded one says
+    rule[at_rest] = np.where(on_edge, ON_EDGE, NO_UNSTABLE_SIDE)
     return rule, (at_rest, still * still + (0.0 if row.oblate else 1.0))
 
 

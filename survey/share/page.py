@@ -264,13 +264,13 @@ def _separated(ds, axes):
         dim, bar = others[0], f"{name}_error"
         labels = ds[dim].values if dim in ds.coords else 1 + np.arange(ds.sizes[dim])
         for i, label in enumerate(labels):
-            place = f"({plain(str(dim), 40)} {plain(str(label), 40)})"
-            words = f"{variable.attrs.get('long_name', name)} {place}"
-            more[f"{name} {place}"] = variable.isel({dim: i}, drop=True).assign_attrs(
+            of_dim = f"({plain(str(dim), 40)} {plain(str(label), 40)})"
+            words = f"{variable.attrs.get('long_name', name)} {of_dim}"
+            more[f"{name} {of_dim}"] = variable.isel({dim: i}, drop=True).assign_attrs(
                 long_name=words
             )
             if bar in ds:
-                more[f"{name} {place}_error"] = ds[bar].isel({dim: i}, drop=True)
+                more[f"{name} {of_dim}_error"] = ds[bar].isel({dim: i}, drop=True)
     return ds.assign(more)
 
 

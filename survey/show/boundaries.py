@@ -111,8 +111,8 @@ def in_plane(ds, variable):
     for coordinate in fixed:
         here &= ds[f"curve_{coordinate.name}"].values == float(coordinate)
     curve = np.repeat(np.arange(ds.sizes["curve"]), ds.curve_count.values)
-    whole = np.bincount(curve[~here], minlength=ds.sizes["curve"]) == 0
-    return ds.isel(curve_point=whole[curve], curve=whole)
+    unbroken = np.bincount(curve[~here], minlength=ds.sizes["curve"]) == 0
+    return ds.isel(curve_point=unbroken[curve], curve=unbroken)
 
 
 def curves_of(ds):

@@ -140,7 +140,7 @@ def _start(axes, variable):
 def _turning_points(axes, turning, there, ends):
     """Mark the turning points of all curves; returns their legend handle."""
     at = [(i, beyond) for i, row in enumerate(ends) for _, beyond in row if beyond >= 0]
-    points = np.array([(turning[place], there[place]) for place in at]).reshape(-1, 2)
+    points = np.array([(turning[index], there[index]) for index in at]).reshape(-1, 2)
     points = points[np.isfinite(points).all(axis=1)]
     if not points.size:
         return []
@@ -162,8 +162,8 @@ def _unknown_ends(axes, ds, states, lines, ends, paper):
     for name, (codes, colour) in kinds.items():
         found = [(i, side) for i, row in enumerate(ends) for side, (_, beyond) in enumerate(row)
                  if beyond >= 0 and states[i, beyond] in codes]  # fmt: skip
-        places = np.array([lines[i][-side] for i, side in found if len(lines[i])]).reshape(-1, 2)
-        axes.plot(*places.T, mfc=colour, **_RING)
+        tips = np.array([lines[i][-side] for i, side in found if len(lines[i])]).reshape(-1, 2)
+        axes.plot(*tips.T, mfc=colour, **_RING)
         label = spaced(name) if paper else f"{spaced(name)} ({len({i for i, _ in found}):,})"
         handles += [Line2D([], [], mfc=colour, label=label, **_RING)] if found else []
     return handles

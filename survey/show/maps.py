@@ -198,7 +198,7 @@ def counts(shown):
     }
 
 
-def colours_of_numbers(shown, variable, asked, whole):
+def colours_of_numbers(shown, variable, asked, integers):
     """Colour map and limits: as asked; else a colour for each of a few counts; else by the values.
 
     Quantities of both signs have a diverging map about 0.
@@ -210,13 +210,13 @@ def colours_of_numbers(shown, variable, asked, whole):
         if high > 100.0 * low > 0.0:
             return {"cmap": asked.get("cmap") or SEQUENTIAL, "norm": LogNorm(low, high)}
     given = {key: asked[key] for key in ("vmin", "vmax") if asked.get(key) is not None}
-    if whole and not given and asked.get("cmap") is None:
+    if integers and not given and asked.get("cmap") is None:
         few = counts(shown)
         if few:
             return few
     limits = (_full(shown) if asked.get("robust") is False else colour_limits(shown)) | given
     low, high = limits.get("vmin"), limits.get("vmax")
-    signed = low is not None and high is not None and low < 0.0 < high and not whole
+    signed = low is not None and high is not None and low < 0.0 < high and not integers
     if signed and not given:
         most = max(-low, high)
         limits = {"vmin": -most, "vmax": most}

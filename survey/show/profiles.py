@@ -61,10 +61,10 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
         shown = variable.where(~variable.isin(list(words))).values
         after, linear = _poles(shown.astype(float))
         poles = [0.5 * (x.values[i - 1] + x.values[i]) for i in after]
-        places, shown = _gapped(x, after, poles), _gapped(shown, after, np.nan)
+        positions, shown = _gapped(x, after, poles), _gapped(shown, after, np.nan)
         counts = fill_of(variable) is not None
-        looks = {"drawstyle": "steps-mid" if counts else "default", "lw": 1.2, "color": "#0072B2"}
-        axes.plot(places, shown, "o" if named else "-", ms=5, label=label, **looks)
+        style = {"drawstyle": "steps-mid" if counts else "default", "lw": 1.2, "color": "#0072B2"}
+        axes.plot(positions, shown, "o" if named else "-", ms=5, label=label, **style)
         if counts:
             axes.yaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
         if linear:
@@ -95,7 +95,7 @@ def draw_profile(axes, ds, variable, state, paper, named=False):
         else:
             bar = _gapped(bar, after, np.nan)
             axes.fill_between(
-                places,
+                positions,
                 shown - bar,
                 shown + bar,
                 color="#56B4E9",
@@ -130,12 +130,12 @@ def _isolated(where):
 
 
 def _gapped(values, after, gap):
-    """The values as floats, with these more before the places `after`."""
+    """The values as floats, with these more before the indices `after`."""
     return np.insert(np.asarray(values, float), after, gap)
 
 
 def _poles(values):
-    """(the places i of poles between i - 1 and i, where the values' axis is linear, or None).
+    """(the indices i of poles between i - 1 and i, where the values' axis is linear, or None).
 
     A pole is a change of sign between neighbours that are large, and larger than theirs of their
     sign.

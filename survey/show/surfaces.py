@@ -51,7 +51,7 @@ def draw_surfaces(axes, ds):
     schema.surfaces(ds)
     dims = list(ds.status.dims)
     logs = [logarithmic(ds[dim].values) for dim in dims]
-    places = np.stack(
+    vertices = np.stack(
         [_scaled(ds[f"surface_{dim}"].values, log) for dim, log in zip(dims, logs, strict=True)],
         axis=1,
     )
@@ -63,10 +63,10 @@ def draw_surfaces(axes, ds):
     names = {code: name for name, code in flag_codes(ds.surface_class.attrs).items()}
     colours = _colours(names)
     faces = np.array([colours[code] for code in kinds]).reshape(-1, 3)
-    faces *= _shade((places[corners] - ends[:, 0]) / (ends[:, 1] - ends[:, 0]))[:, None]
+    faces *= _shade((vertices[corners] - ends[:, 0]) / (ends[:, 1] - ends[:, 0]))[:, None]
     # edges of the faces' colours: else the background shows between them
     drawn = Poly3DCollection(
-        places[corners], facecolors=faces, edgecolors=faces, linewidths=0.2, zsort="average"
+        vertices[corners], facecolors=faces, edgecolors=faces, linewidths=0.2, zsort="average"
     )
     drawn.set_rasterized(True)
     axes.add_collection(drawn, autolim=False)  # that of 3d takes no autolim before Matplotlib 3.10
@@ -120,13 +120,13 @@ def section(ds, variable):
     low, high = values[sides].T
     with np.errstate(all="ignore"):
         part = np.clip((plane - low) / (high - low), 0.0, 1.0)
-    order = np.concatenate([np.zeros(0, int), *(places for _, places in chains)]).astype(int)
+    order = np.concatenate([np.zeros(0, int), *(vertices for _, vertices in chains)]).astype(int)
     first = np.array([triangle for triangle, _ in chains], int)
     points = {}
     for dim in dims:
         low, high = ds[f"surface_{dim}"].values[sides].T
         points[f"curve_{dim}"] = ("curve_point", ((1 - part) * low + part * high)[order])
-    points["curve_count"] = ("curve", np.array([len(places) for _, places in chains], np.int32))
+    points["curve_count"] = ("curve", np.array([len(vertices) for _, vertices in chains], np.int32))
     points["curve_class"] = ("curve", kinds[first].astype(np.int8), ds.surface_class.attrs)
     return ds.assign(points)
 

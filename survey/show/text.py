@@ -107,7 +107,7 @@ def title_of(ds, variable):
     )
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
-    position = {name: f" ({_place(ds[name], c)} of {ds.sizes[name]})"
+    position = {name: f" ({_position(ds[name], c)} of {ds.sizes[name]})"
                 for name, c in variable.coords.items() if c.ndim == 0 and ds.sizes.get(name, 1) > 1}  # fmt: skip
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
     labels = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "UO"]
@@ -142,7 +142,7 @@ def _is_default(fixed):
     return fixed.name == "branch" and float(fixed) < 0
 
 
-def _place(axis, coordinate):
+def _position(axis, coordinate):
     """Where a value stands on its axis, counted from 1."""
     return int(np.argmax(axis.values == coordinate.item())) + 1
 

@@ -233,7 +233,7 @@ def _row_solver(workflow, axis, rows):
     """What `edges.find` asks of the scene, for these rows."""
     grid = workflow.grid
     other = [dim for dim in grid.sizes if dim != axis]
-    place = dict(
+    at = dict(
         zip(
             other,
             np.unravel_index(rows, [grid.sizes[dim] for dim in other]) if other else (),
@@ -241,7 +241,7 @@ def _row_solver(workflow, axis, rows):
         )
     )
     others = {
-        name: values[place[dims[0]]] if dims else values
+        name: values[at[dims[0]]] if dims else values
         for name, (dims, values) in grid.parameters.items()
         if name != axis
     }
@@ -287,7 +287,7 @@ def _curves(workflow, across, axis, other, edges, each):
     their folds.
     """
     grid, further = workflow.grid, [dim for dim in other if dim != across]
-    place = dict(
+    at = dict(
         zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True)
     )
     found, square = [], square_of(workflow, across, axis)
@@ -297,8 +297,8 @@ def _curves(workflow, across, axis, other, edges, each):
     def on_plane(plane, each=in_turn):
         own = np.ones(edges.row.size, bool)
         for dim, value in plane.items():
-            own &= np.asarray(grid.parameters[dim][1])[place[dim]] == value
-        of_rows = np.asarray(grid.parameters[across][1])[place[across][own]]
+            own &= np.asarray(grid.parameters[dim][1])[at[dim]] == value
+        of_rows = np.asarray(grid.parameters[across][1])[at[across][own]]
         seeds = np.stack([of_rows, edges.position[own]], axis=1), edges.kind[own], edges.index[own]
         return own, *_on_plane(workflow, square, across, axis, seeds, plane, each)
 

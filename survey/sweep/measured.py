@@ -44,9 +44,9 @@ def note(workflow, estimated, measured, compiling, unanswered=0.0):
         path = _path()
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            whole = Path(folder) / path.name
-            whole.write_text(json.dumps([*_records(), record][-MOST:]), encoding="utf-8")
-            os.replace(whole, path)
+            path_new = Path(folder) / path.name
+            path_new.write_text(json.dumps([*_records(), record][-MOST:]), encoding="utf-8")
+            os.replace(path_new, path)
 
 
 def factor(workflow, part, estimated):

@@ -187,7 +187,7 @@ class Prover:
         checker.ctx.prec = self.bits
         equation = checker.Equation(self.equation["kind"], self.equation["pieces"], self.names)
         sides = [[Fraction(end) for end in side] for side in self.rectangle]
-        part = checker.places(
+        part = checker.regions(
             sides, {"across": self.across, "layout": search.PANEL * len(self.numbers)}
         )[number]
         return number, search.panels(equation, part, self.depth, self.tolerance)
@@ -246,10 +246,10 @@ def certificate(title, prover, layout, panels):
     from survey.proof import checker
 
     sides = [tuple(Fraction(end) for end in side) for side in prover.rectangle]
-    places = checker.places(sides, {"across": prover.across, "layout": layout})
+    regions = checker.regions(sides, {"across": prover.across, "layout": layout})
     shares = dict.fromkeys(checker.VERDICTS, Fraction(0))
-    for place, panel in zip(places, panels, strict=True):
-        for letter, part in checker.walk(panel["cells"], [place], checker.halved):
+    for region, panel in zip(regions, panels, strict=True):
+        for letter, part in checker.walk(panel["cells"], [region], checker.halved):
             shares[letter if letter in shares else checker.OPEN] += checker.size(
                 part
             ) / checker.size(sides)
@@ -276,7 +276,7 @@ def _describe(workflow, path, text):
     certificate, names = checker.Certificate(text), list(workflow.refine)
     parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
     box = np.array(
-        [[float(end) for side in place for end in side] for _, place in certificate.cells]
+        [[float(end) for side in region for end in side] for _, region in certificate.cells]
     )
     letters = certificate.letters
     variables = {}
@@ -324,7 +324,9 @@ def _describe_row(workflow, path, text):
     from survey.proof import checker
 
     certificate, axis = checker.Certificate(text), workflow.boundaries
-    cells = [(letter, *place[0]) for letter, place in certificate.cells if letter in checker.EDGES]
+    cells = [
+        (letter, *region[0]) for letter, region in certificate.cells if letter in checker.EDGES
+    ]
     position = np.array([float((low + high) / 2) for _, low, high in cells])
     reach = [
         max(high - Fraction(x), Fraction(x) - low)

@@ -32,13 +32,13 @@ class Earlier:
     @property
     def points(self):
         """The number of points that need not be solved."""
-        return prod(int((place >= 0).sum()) for place in self.where.values())
+        return prod(int((source >= 0).sum()) for source in self.where.values())
 
     def values(self, name, cuts):
         """A variable at the held points of a block: its dimensions are those of the grid, then its own."""
         at = {
-            dim: place[cut][place[cut] >= 0]
-            for (dim, place), cut in zip(self.where.items(), cuts, strict=True)
+            dim: source[cut][source[cut] >= 0]
+            for (dim, source), cut in zip(self.where.items(), cuts, strict=True)
         }
         held = (
             _dataset(self.path, self.version)[name]
@@ -111,9 +111,9 @@ def obstacle(scene, request, grid, earlier, old, points=3):
     """
     seen = [(_Seen(grid.lines), old.lines), (_Seen(grid.ranges), old.ranges)]
     request = replace(request, lines=seen[0][0], fixed=grid.fixed, ranges=seen[1][0])
-    places = [np.flatnonzero(place >= 0) for place in earlier.where.values()]
+    sources = [np.flatnonzero(source >= 0) for source in earlier.where.values()]
     for k in range(points):
-        here = [place[k * (place.size - 1) // (points - 1)] for place in places]
+        here = [source[k * (source.size - 1) // (points - 1)] for source in sources]
         cuts = tuple(
             slice(0, size) if dim in grid.uncut else slice(i, i + 1)
             for i, (dim, size) in zip(here, grid.sizes.items(), strict=True)

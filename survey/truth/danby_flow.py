@@ -19,10 +19,10 @@ from survey.truth.double import (
     horner,
     mul,
     neg,
-    put,
     reach,
     root,
     sine_cosine,
+    store,
     sub,
     times,
 )
@@ -57,31 +57,31 @@ def points(mu, e, tolerance, out):
             # 1 - e cos E without loss near pericentre: (1 - e) + 2 e sin^2(E/2)
             half, _ = sine_cosine(times(at, 0.5))
             a, b = times(cos, -e[i]), times(sin, e[i])
-            put(c, 0, add(sub((1.0, 0.0), ee), times(mul(half, half), 2.0 * e[i])))
+            store(c, 0, add(sub((1.0, 0.0), ee), times(mul(half, half), 2.0 * e[i])))
             for n in range(1, TERMS):
                 a, b = div(b, (float(n), 0.0)), div(neg(a), (float(n), 0.0))
-                put(c, n, a)
-            put(g, 0, div(s, get(c, 0)))
+                store(c, n, a)
+            store(g, 0, div(s, get(c, 0)))
             first = get(c, 0)
-            put(c, 0, (0.0, 0.0))
+            store(c, 0, (0.0, 0.0))
             for n in range(1, TERMS):
-                put(g, n, div(neg(conv(c, g, n)), first))
+                store(g, n, div(neg(conv(c, g, n)), first))
             h = reach(g, abs(g[0, 0]), tolerance)
             for k in range(4):
                 q = y[k]
                 size = 0.0
                 for j in range(4):
-                    put(q[j], 0, (x[k, j, 0], x[k, j, 1]))
+                    store(q[j], 0, (x[k, j, 0], x[k, j, 1]))
                     size += abs(x[k, j, 0])
                 for n in range(TERMS - 1):
-                    put(u, n, sub(get(q[2], n), get(q[3], n)))
-                    put(v, n, sub(get(q[0], n), get(q[1], n)))
+                    store(u, n, sub(get(q[2], n), get(q[3], n)))
+                    store(v, n, sub(get(q[0], n), get(q[1], n)))
                     gu, gv = conv(g, u, n), conv(g, v, n)
                     by = (n + 1.0, 0.0)
-                    put(q[0], n + 1, div(gu, by))
-                    put(q[1], n + 1, div(neg(add(gu, mul(d2, get(q[3], n)))), by))
-                    put(q[2], n + 1, div(sub(mul(d1, get(q[0], n)), gv), by))
-                    put(q[3], n + 1, div(gv, by))
+                    store(q[0], n + 1, div(gu, by))
+                    store(q[1], n + 1, div(neg(add(gu, mul(d2, get(q[3], n)))), by))
+                    store(q[2], n + 1, div(sub(mul(d1, get(q[0], n)), gv), by))
+                    store(q[3], n + 1, div(gv, by))
                 for j in range(4):
                     h = min(h, reach(q[j], size, tolerance))
             last = h >= left[0]

@@ -112,7 +112,7 @@ def conv(a, b, n):
 
 
 @inline
-def put(series, n, x):
+def store(series, n, x):
     series[0, n], series[1, n] = x
 
 

@@ -29,10 +29,10 @@ def _twice(kernel, points, said, bars, columns):
         for j, c in enumerate(columns):
             suspicious |= np.abs((said[j] - out[:, c]) - out[:, c + 1]) > 0.5 * bars[j]
     if suspicious.any():
-        again = _solved(kernel, points[suspicious], 1e-30)
+        sharper = _solved(kernel, points[suspicious], 1e-30)
         for j, c in enumerate(columns):
             off = np.abs(
-                (again[:, c] - out[suspicious, c]) + (again[:, c + 1] - out[suspicious, c + 1])
+                (sharper[:, c] - out[suspicious, c]) + (sharper[:, c + 1] - out[suspicious, c + 1])
             )
             doubt[suspicious, j] += 100 * off
     return out, doubt

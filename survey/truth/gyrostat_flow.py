@@ -16,10 +16,10 @@ from survey.truth.double import (
     get,
     horner,
     neg,
-    put,
     reach,
     sine_cosine,
     slope,
+    store,
     sub,
     times,
 )
@@ -34,24 +34,24 @@ PHI, W, SIN, COS, F, SC, CC = range(7)
 def expand(p, y, phi, w):
     """Series of everything at a state."""
     sin, cos = sine_cosine(phi)
-    put(y[PHI], 0, phi)
-    put(y[W], 0, w)
-    put(y[SIN], 0, sin)
-    put(y[COS], 0, cos)
+    store(y[PHI], 0, phi)
+    store(y[W], 0, w)
+    store(y[SIN], 0, sin)
+    store(y[COS], 0, cos)
     for n in range(TERMS - 1):
         s, c = get(y[SIN], n), get(y[COS], n)
-        put(y[F], n, sub(times(c, p[0]), times(s, p[1])))
-        put(y[CC], n, conv(y[COS], y[COS], n))
+        store(y[F], n, sub(times(c, p[0]), times(s, p[1])))
+        store(y[CC], n, conv(y[COS], y[COS], n))
         g = neg(times(conv(y[SIN], y[COS], n), p[2]))
         g = sub(g, times(get(y[CC], n), 2.0 * p[3]))
         if n == 0:
             g = add(g, (p[3], 0.0))
         g = add(g, sub(times(c, p[4]), times(s, p[5])))
         by = (n + 1.0, 0.0)
-        put(y[PHI], n + 1, div(get(y[W], n), by))
-        put(y[W], n + 1, div(add(conv(y[F], y[W], n), g), by))
-        put(y[SIN], n + 1, div(conv(y[COS], y[W], n), by))
-        put(y[COS], n + 1, div(neg(conv(y[SIN], y[W], n)), by))
+        store(y[PHI], n + 1, div(get(y[W], n), by))
+        store(y[W], n + 1, div(add(conv(y[F], y[W], n), g), by))
+        store(y[SIN], n + 1, div(conv(y[COS], y[W], n), by))
+        store(y[COS], n + 1, div(neg(conv(y[SIN], y[W], n)), by))
 
 
 @inline

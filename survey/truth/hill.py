@@ -147,11 +147,11 @@ def hill_outputs(out, answer, half):
         dtheta = _angle_doubt(minus, plus, dminus, dplus)
         fraction = theta / LONG_PI  # of theta / 2 pi, theta in [0, pi]
         said = answer["rotation_number"]
-        whole = (
+        whole_turns = (
             np.rint(np.asarray(said, LONG) - fraction),
             np.rint(np.asarray(said, LONG) + fraction),
         )
-        near, other = whole[0] + fraction, whole[1] - fraction
+        near, other = whole_turns[0] + fraction, whole_turns[1] - fraction
         true = np.where(np.abs(near - said) < np.abs(other - said), near, other)
         found["rotation_number"] = true, 0.0, dtheta + 8 * ULP * (1 + np.abs(true).astype(float))
     verdict = answer["verdict"]

@@ -20,11 +20,11 @@ from survey.truth.double import (
     mean,
     mul,
     neg,
-    put,
     reach,
     root,
     sine_cosine,
     slope,
+    store,
     sub,
     times,
 )  # fmt: skip
@@ -116,13 +116,13 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
         biggest = 1.0
         while left[0] > 0.0 and steps < MOST:
             steps += 1
-            put(w, 0, w0)
-            put(w, 1, v0)
+            store(w, 0, w0)
+            store(w, 1, v0)
             for n in range(TERMS):
-                put(w2, n, conv(w, w, n))
-                put(w3, n, conv(w2, w, n))
+                store(w2, n, conv(w, w, n))
+                store(w3, n, conv(w2, w, n))
                 if n + 2 < TERMS:
-                    put(
+                    store(
                         w,
                         n + 2,
                         div(
@@ -134,15 +134,15 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
             for side in range(signs):
                 both = times(ro, 2.0 if side == 0 else -2.0)
                 for n in range(TERMS):
-                    put(z, n, add(times(get(w2, n), 2.0), mul(both, get(w, n))))
-                put(z, 0, add(get(z, 0), constant))
+                    store(z, n, add(times(get(w2, n), 2.0), mul(both, get(w, n))))
+                store(z, 0, add(get(z, 0), constant))
                 for s in range(2):
                     q = y[2 * side + s]
                     x = state[2 * side + s]
-                    put(q, 0, (x[0], x[1]))
-                    put(q, 1, (x[2], x[3]))
+                    store(q, 0, (x[0], x[1]))
+                    store(q, 1, (x[2], x[3]))
                     for n in range(TERMS - 2):
-                        put(q, n + 2, div(neg(conv(z, q, n)), ((n + 1.0) * (n + 2.0), 0.0)))
+                        store(q, n + 2, div(neg(conv(z, q, n)), ((n + 1.0) * (n + 2.0), 0.0)))
                     h = min(h, reach(q, abs(x[0]) + abs(x[2]) / (1.0 + abs(ro[0])), tolerance))
             last = h >= left[0]
             step = left if last else (h, 0.0)
@@ -192,7 +192,7 @@ def wave(z, sin, cos, rate, a, b):
     f = add(times(cos, a), times(sin, b))
     g = sub(times(cos, b), times(sin, a))
     for n in range(TERMS):
-        put(z, n, add(get(z, n), f))
+        store(z, n, add(get(z, n), f))
         f, g = div(mul(g, rate), (n + 1.0, 0.0)), div(mul(f, neg(rate)), (n + 1.0, 0.0))
 
 
@@ -200,13 +200,13 @@ def wave(z, sin, cos, rate, a, b):
 def own_series(kind, p, u, z, piece):
     """Series of z about u (a double-double); `piece` is 1 behind the break."""
     for n in range(TERMS):
-        put(z, n, (0.0, 0.0))
+        store(z, n, (0.0, 0.0))
     if kind == COSINE:  # a + b cos 2u + c cos 4u
         for n in range(2):
             if p[1 + n] != 0.0:
                 sin, cos = sine_cosine(times(u, 2.0 * (n + 1)))
                 wave(z, sin, cos, (2.0 * (n + 1), 0.0), p[1 + n], 0.0)
-        put(z, 0, add(get(z, 0), (p[0], 0.0)))
+        store(z, 0, add(get(z, 0), (p[0], 0.0)))
     elif kind == HARMONICS:  # a + sum of c_n cos n x + s_n sin n x, x = 2 pi u / T
         base = div((TWO_PI, 0.0), (p[9], 0.0))
         for n in range(4):
@@ -214,29 +214,29 @@ def own_series(kind, p, u, z, piece):
                 rate = times(base, n + 1.0)
                 sin, cos = sine_cosine(mul(rate, u))
                 wave(z, sin, cos, rate, p[1 + n], p[5 + n])
-        put(z, 0, add(get(z, 0), (p[0], 0.0)))
+        store(z, 0, add(get(z, 0), (p[0], 0.0)))
     elif kind == BENT:  # a + b u before the break, c + d cos 6u behind it
         if piece == 0:
-            put(z, 0, add((p[0], 0.0), times(u, p[1])))
-            put(z, 1, (p[1], 0.0))
+            store(z, 0, add((p[0], 0.0), times(u, p[1])))
+            store(z, 1, (p[1], 0.0))
         else:
             sin, cos = sine_cosine(times(u, 6.0))
             wave(z, sin, cos, (6.0, 0.0), p[3], 0.0)
-            put(z, 0, add(get(z, 0), (p[2], 0.0)))
+            store(z, 0, add(get(z, 0), (p[2], 0.0)))
     else:
         # p[0] + p[1] / (1 + x^2), x = (u - p[2]) / p[3]
         x = div(sub(u, (p[2], 0.0)), (p[3], 0.0))
         inverse = div((1.0, 0.0), (p[3], 0.0))
         ahead = times(mul(x, inverse), 2.0)
         square = mul(inverse, inverse)
-        whole = add(mul(x, x), (1.0, 0.0))
-        put(z, 0, div((p[1], 0.0), whole))
+        squared = add(mul(x, x), (1.0, 0.0))
+        store(z, 0, div((p[1], 0.0), squared))
         for n in range(1, TERMS):
             s = mul(ahead, get(z, n - 1))
             if n > 1:
                 s = add(s, mul(square, get(z, n - 2)))
-            put(z, n, div(neg(s), whole))
-        put(z, 0, add(get(z, 0), (p[0], 0.0)))
+            store(z, n, div(neg(s), squared))
+        store(z, 0, add(get(z, 0), (p[0], 0.0)))
 
 
 @kernel
@@ -270,10 +270,10 @@ def own_points(kind, points, ends, lengths, tolerance, out):
                 own_series(kind, p, u, z, piece)
                 h = reach(z, 1e-25 + size, tolerance)
                 for s in range(2):
-                    put(q[s], 0, (x[s, 0], x[s, 1]))
-                    put(q[s], 1, (x[s, 2], x[s, 3]))
+                    store(q[s], 0, (x[s, 0], x[s, 1]))
+                    store(q[s], 1, (x[s, 2], x[s, 3]))
                     for n in range(TERMS - 2):
-                        put(q[s], n + 2, div(neg(conv(z, q[s], n)), ((n + 1.0) * (n + 2.0), 0.0)))
+                        store(q[s], n + 2, div(neg(conv(z, q[s], n)), ((n + 1.0) * (n + 2.0), 0.0)))
                     h = min(
                         h,
                         reach(q[s], abs(x[s, 0]) + abs(x[s, 2]) / (1.0 + np.sqrt(size)), tolerance),

@@ -44,7 +44,7 @@ OWN = {
     "harmonics even": (harmonics, LONG_NAMES, HARMONICS, dict(period=lambda p: p[9], even=True)),
     "meissner": (meissner, SHORT[:3], None, dict(period=1.0, breaks=lambda p: [0.0, p[2]])),
     "meissner even": (meissner_even, SHORT[:3], None, dict(period=1.0, breaks=lambda p: p[2], even=True)),
-    "bent": (bent, (*SHORT, "place"), BENT, dict(period=1.0, breaks=lambda p: [0.0, p[4]])),
+    "bent": (bent, (*SHORT, "jump"), BENT, dict(period=1.0, breaks=lambda p: [0.0, p[4]])),
     "spike": (lorentz, SHORT, LORENTZ, dict(period=1.0, breaks=0.0)),
     "spike named": (lorentz, SHORT, LORENTZ, dict(
         period=1.0, breaks=lambda p: [0.0, p[2] - 4 * p[3], p[2], p[2] + 4 * p[3]])),
@@ -71,10 +71,10 @@ def _solve(name, p, out):
 def _steps(row, even):
     """As `hill_flow.own_points` for z = a before the break and b behind it: the closed form, 50 digits."""
     with mp.workdps(50):
-        a, b, place = (mpf(float(x)) for x in row)
+        a, b, jump = (mpf(float(x)) for x in row)
         end = mpf(0.5 if even else 1)
         flow = mp.eye(2)
-        for z, length in ((a, min(place, end)), (b, end - min(place, end))):
+        for z, length in ((a, min(jump, end)), (b, end - min(jump, end))):
             root = mp.sqrt(abs(z))
             x = root * length
             if z > 0:

@@ -23,8 +23,10 @@ def wanted(shown, view):
         if not low < high:
             return False
         seen.append(np.count_nonzero((axis.values >= low) & (axis.values <= high)))
-    whole = all(number == axis.values.size for number, axis in zip(seen, shown.axes, strict=True))
-    return not whole and any(number < few for number, few in zip(seen, COARSE, strict=True))
+    all_shown = all(
+        number == axis.values.size for number, axis in zip(seen, shown.axes, strict=True)
+    )
+    return not all_shown and any(number < few for number, few in zip(seen, COARSE, strict=True))
 
 
 def of_window(shown, view):

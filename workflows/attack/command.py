@@ -72,11 +72,11 @@ def solve(family, seed, index, size):
 
 def plan(points, scenes):
     """[(family, index, size)], the families mixed, so that an early stop has seen all of them."""
-    whole = sum(FAMILIES[name][0] for name in scenes)
+    all_points = sum(FAMILIES[name][0] for name in scenes)
     chunks = []
     for name in scenes:
         share, size = FAMILIES[name]
-        wanted = max(1, round(points * share / whole))
+        wanted = max(1, round(points * share / all_points))
         number = -(-wanted // size)
         chunks += [((i + 0.5) / number, name, i, -(-wanted // number)) for i in range(number)]
     return [chunk[1:] for chunk in sorted(chunks)]

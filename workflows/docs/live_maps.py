@@ -53,11 +53,11 @@ def pages(folder):
     found = {}
     for name, points in MAPS.items():
         path = folder / f"{name}.nc"
-        told = page.write(_solved(name, points, path), path.with_suffix(".html"))
-        if told["series"] != (points == SERIES):
-            raise RuntimeError(f"{name}: series {told['series']}, {told['why']}")
-        if told["bytes"] > LARGEST:
-            raise RuntimeError(f"{name}: a page of {told['bytes']:,} bytes")
+        written = page.write(_solved(name, points, path), path.with_suffix(".html"))
+        if written["series"] != (points == SERIES):
+            raise RuntimeError(f"{name}: series {written['series']}, {written['why']}")
+        if written["bytes"] > LARGEST:
+            raise RuntimeError(f"{name}: a page of {written['bytes']:,} bytes")
         for left in folder.glob(f"{path.name}*"):
             left.unlink()
         given = _given(name)["output"]
@@ -95,8 +95,8 @@ def _solved(name, points, path):
     certificate = ROOT / "results" / f"{name}.cert"
     if not certificate.is_file():
         return ds
-    whole, text = workflow.read(_path(name), (), str(path)), certificate.read_text(encoding="utf-8")
-    stated = proofs.described(whole, certificate, text)
+    asked, text = workflow.read(_path(name), (), str(path)), certificate.read_text(encoding="utf-8")
+    stated = proofs.described(asked, certificate, text)
     return ds.merge(stated).assign_attrs(stated.attrs)
 
 

@@ -89,13 +89,18 @@ def _roots(n):
     = g' = 0).
     """
     x, away = two_sided("distance to the separatrix, $w_0 - w_s$", np.linspace(-15.5, -0.5, n))
-    gaps, phi0, place = np.linspace(-6.0, 0.0, n), 0.3, 2.0
-    s, c, s2, c2 = math.sin(place), math.cos(place), math.sin(2 * place), math.cos(2 * place)
+    gaps, phi0, saddle_phi = np.linspace(-6.0, 0.0, n), 0.3, 2.0
+    s, c, s2, c2 = (
+        math.sin(saddle_phi),
+        math.cos(saddle_phi),
+        math.sin(2 * saddle_phi),
+        math.cos(2 * saddle_phi),
+    )
     d, c23, systems, speeds = 1.1, 0.3, [], []
-    for gap in 10.0**gaps:  # g(place) = 0, g'(place) = gap
+    for gap in 10.0**gaps:  # g(saddle_phi) = 0, g'(saddle_phi) = gap
         a, b = d * c * s + c23 * c2, d * c2 - 2 * c23 * s2 + gap
         systems.append((0.0, 0.0, d, c23, a * c - b * s, -a * s - b * c))
-        speeds.append(_separatrix(systems[-1], phi0, place))
+        speeds.append(_separatrix(systems[-1], phi0, saddle_phi))
     y = logarithmic("distance to a fold,\n$g'$ at the saddle", gaps)
     six = (0.0, 0.0, d, c23, *(values[:, None] for values in np.array(systems).T[4:]))
     w0 = np.array(speeds)[:, None] + away[None]

@@ -26,14 +26,14 @@ def _large(share):
 
 def _gaps(share):
     """Width about 2 (q / 4)^n / (n - 1)!^2 / 4^-n, from 1e-3 to 1e-13."""
-    q, place = (
+    q, position = (
         10.0 ** np.linspace(-1.6, 0.5, few(share, 18)),
         np.linspace(-1.5, 1.5, few(share, 25)),
     )
     ends = [edge("mathieu", along="a", a=(24.0, 26.5), q=x).edge.values for x in q]
     low, high = np.array([[x[0], x[-1]] for x in ends]).T
-    a = 0.5 * (low + high)[:, None] + place[None] * (high - low)[:, None]
+    a = 0.5 * (low + high)[:, None] + position[None] * (high - low)[:, None]
     return Plane(
-        f"the gap at a = {ORDER**2}, width\n1e-13 to 1e-3", plain("place in the gap, over its width", place),
+        f"the gap at a = {ORDER**2}, width\n1e-13 to 1e-3", plain("position in the gap, over its width", position),
         logarithmic("width of the gap", np.log10(high - low)), "mathieu", {"q": q[:, None], "a": a}, mathieu, SOURCE,
     )  # fmt: skip

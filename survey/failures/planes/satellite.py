@@ -45,16 +45,17 @@ def _long(share):
 def _tongues(share, body):
     """The third tongue, whose width is about k^3 / 8."""
     k = 10.0 ** np.linspace(-4.0, -0.7, few(share, 18))
-    place = np.linspace(-1.5, 1.5, few(share, 25))
+    position = np.linspace(-1.5, 1.5, few(share, 25))
     centre = np.sqrt(1.25) if body == "prolate" else 1.5
     ends = [
         edge("satellite", along="rho", rho=(centre - 4 * m * m, centre), k=m, body=body).edge.values
         for m in k
     ]
     low, high = np.array([[x[0], x[-1]] for x in ends]).T
-    rho = 0.5 * (low + high)[:, None] + place[None] * (high - low)[:, None]
+    rho = 0.5 * (low + high)[:, None] + position[None] * (high - low)[:, None]
     return Plane(
-        f"{body} librations, the tongue\nn = 3, width 1e-13 to 1e-3", plain("place in the tongue, of its width", place),
+        f"{body} librations, the tongue\nn = 3, width 1e-13 to 1e-3",
+        plain("position in the tongue, over its width", position),
         logarithmic("width of the tongue", np.log10(high - low)), "satellite", {"k": k[:, None], "rho": rho},
         satellite("k", False, 1, body == "oblate"), SOURCE, {"body": body},
     )  # fmt: skip

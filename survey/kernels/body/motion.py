@@ -107,7 +107,7 @@ def state_of(row):
 
 
 @inline
-def put(row, y):
+def store(row, y):
     """Write a tuple of six into the first places of a row."""
     row[0], row[1], row[2], row[3], row[4], row[5] = y
 

@@ -219,7 +219,7 @@ def monodromy(p, M, slip, start, rotates, fundamental, notes):
         phi, w, t = x1, 0.0 if turned and not ends else w1, t + reach
         if ends:
             speed = abs(w1) if start[1] != 0.0 else abs(values(p, x1)[1])
-            late = 1.2 * (bar_phi if start[1] != 0.0 else bar_w) / max(speed, 1e-300) + 4e-16 * t
+            delay = 1.2 * (bar_phi if start[1] != 0.0 else bar_w) / max(speed, 1e-300) + 4e-16 * t
             worst = largest = 0.0
             for c in range(SIZE):
                 for i in range(SIZE):
@@ -227,8 +227,8 @@ def monodromy(p, M, slip, start, rotates, fundamental, notes):
                         max(worst, ellipses[c, i, i]),
                         max(largest, abs(fundamental[i, c])),
                     )
-            notes[PERIOD], notes[PERIOD_BAR] = t, late
-            notes[LOG_DET], notes[LOG_DET_BAR] = log_det, log_bar + SIZE * rate * late
-            notes[MATRIX_BAR] = 1.01 * math.sqrt(SIZE * n * worst) + rate * SIZE * largest * late
+            notes[PERIOD], notes[PERIOD_BAR] = t, delay
+            notes[LOG_DET], notes[LOG_DET_BAR] = log_det, log_bar + SIZE * rate * delay
+            notes[MATRIX_BAR] = 1.01 * math.sqrt(SIZE * n * worst) + rate * SIZE * largest * delay
             return True
     return False

@@ -444,8 +444,8 @@ def neighbours(found, serial, curve, falls, first, turning, links, seeds):
         for k in range(turning[2 * cell] + 1):
             plus, minus = first[2 * cell] + 2 * cell + k, first[2 * cell + 1] + 2 * cell + 1 + k
             # g < 0: from w > 0 to w < 0 in time
-            late, early = (minus, plus) if falls[cell] != 0 else (plus, minus)
-            links[size, 0], links[size, 1], links[size, 2], links[size, 3] = late, early, 0, 1
+            later, earlier = (minus, plus) if falls[cell] != 0 else (plus, minus)
+            links[size, 0], links[size, 1], links[size, 2], links[size, 3] = later, earlier, 0, 1
             size += 1
     return size, cuts
 
@@ -479,10 +479,10 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
     for i in range(gaps):
         parent[i] = i
     for k in range(size):
-        late, early = links[k, 0], links[k, 1]
-        if open_[late] or open_[early]:
+        later, earlier = links[k, 0], links[k, 1]
+        if open_[later] or open_[earlier]:
             continue
-        _join(parent, turns, counts, loops, early, late, links[k, 2], links[k, 3])
+        _join(parent, turns, counts, loops, earlier, later, links[k, 2], links[k, 3])
     for i in range(gaps):
         root, t, c = _root(parent, turns, counts, i)
         if parent[i] != i:

@@ -51,7 +51,7 @@ ORDER = 30
 TRUNCATION = 1e-32  # of the series, relative
 FURTHEST = 0.1  # rad from the saddle
 _HI, _LO, _LAW = range(3)  # rows of the series: a_n as double-doubles, and r_n/n
-_REACH, _TURNS, _TIME, _LATE, _SLIP, _W_SLIP, _X0 = range(7)  # of a branch
+_REACH, _TURNS, _TIME, _TIME_BAR, _SLIP, _W_SLIP, _X0 = range(7)  # of a branch
 SIZE = 7
 _SAFE = 1.5
 
@@ -63,10 +63,10 @@ def scratch():
 
 
 @kernel
-def expand(p, place, a):
+def expand(p, saddle, a):
     """Fill `a` (3, ORDER + 1) with the series at the saddle; returns how far it may be taken."""
     f, g = np.zeros((2, ORDER + 1)), np.zeros((2, ORDER + 1))
-    s, c = sine_cosine((place[ANGLE], place[ANGLE_LOW]))
+    s, c = sine_cosine((saddle[ANGLE], saddle[ANGLE_LOW]))
     s2, c2 = scaled(mul(s, c), 2.0), shifted(scaled(square(s), -2.0), 1.0)
     factorial, power = 1.0, 1.0
     for n in range(ORDER + 1):
@@ -132,24 +132,24 @@ def _between(a, x, y):
 
 
 @inline
-def _begin(p, place, branch, a):
+def _begin(p, saddle, branch, a):
     """The start of the flow: phi, w and their error ellipse, where the series ends."""
     x = (branch[_REACH], 0.0)
-    phi, _k = centred(shifted((place[ANGLE], place[ANGLE_LOW]), branch[_REACH]))
+    phi, _k = centred(shifted((saddle[ANGLE], saddle[ANGLE_LOW]), branch[_REACH]))
     e, f = branch[_SLIP], branch[_W_SLIP]
     return phi, velocity(a, x), (e * e, 0.0, f * f)
 
 
 @kernel
-def enter(p, place, phi0, a, branch, out):
+def enter(p, saddle, phi0, a, branch, out):
     """Follow the branch to phi0: fill `out` with w there and its bar, and return the status.
 
     At other statuses than OK the branch turns (TURNING) or is lost before it passes phi0.
     """
-    x0 = ahead(place, phi0)
-    reach = expand(p, place, a)
-    f0, _g, _dg = values(p, place[ANGLE])
-    slip, first = place[SLIP] + PAIR_SUM_ROUNDOFF, a[_HI, 1]
+    x0 = ahead(saddle, phi0)
+    reach = expand(p, saddle, a)
+    f0, _g, _dg = values(p, saddle[ANGLE])
+    slip, first = saddle[SLIP] + PAIR_SUM_ROUNDOFF, a[_HI, 1]
     slope = slip * (p[BOUND_F] * first + p[BOUND_DDG]) + PAIR_SUM_ROUNDOFF * (
         p[BOUND_F] * first + p[BOUND_DG]
     )
@@ -158,30 +158,30 @@ def enter(p, place, phi0, a, branch, out):
     branch[_W_SLIP] = 3.0 * (
         PAIR_SUM_ROUNDOFF * first * reach + 2.0 * reach * slope / spread + 2.0 * first * slip
     )
-    start = centred(shifted((place[ANGLE], place[ANGLE_LOW]), reach))[0]
+    start = centred(shifted((saddle[ANGLE], saddle[ANGLE_LOW]), reach))[0]
     branch[_TURNS] = math.floor((sub(shifted(neg(x0), phi0), start)[0] + reach) / TWO_PI + 0.5)
     branch[_X0] = x0[0]
     if x0[0] <= 1e3 * slip:
         return EQUILIBRIUM
     if x0[0] <= reach:
         w = velocity(a, x0)[0]
-        branch[_TIME], branch[_LATE] = _between(a, x0[0], reach)
-        branch[_LATE] += slip / w
+        branch[_TIME], branch[_TIME_BAR] = _between(a, x0[0], reach)
+        branch[_TIME_BAR] += slip / w
         out[0], out[1] = w, 2.0 * ROUNDOFF_UP * w + branch[_W_SLIP] * x0[0] / reach
         return OK
     floats, status, targets = np.zeros((1, rc.STATE)), np.zeros(1, np.int64), np.empty(1)
     targets[0] = phi0
     flow_double.passed(
-        p, _begin(p, place, branch, a), branch[_TURNS], 0.0, 0, targets, floats, status
+        p, _begin(p, saddle, branch, a), branch[_TURNS], 0.0, 0, targets, floats, status
     )
     if status[0] == OK:
-        branch[_TIME], branch[_LATE] = -floats[0, rc.TIME], floats[0, rc.TIME_BAR]
+        branch[_TIME], branch[_TIME_BAR] = -floats[0, rc.TIME], floats[0, rc.TIME_BAR]
         out[0], out[1] = floats[0, rc.VALUE], floats[0, rc.VALUE_BAR]
     return status[0]
 
 
 @kernel
-def trajectory(p, place, a, branch, phi0, asked, floats, turnings):
+def trajectory(p, saddle, a, branch, phi0, asked, floats, turnings):
     """As `steps.trajectory` at the ascending times `asked`, of either sign, after phi0."""
     first, j = a[_HI, 1], 0
     while j < len(asked) and asked[j] <= branch[_TIME]:
@@ -196,7 +196,7 @@ def trajectory(p, place, a, branch, phi0, asked, floats, turnings):
                 break
         x = reach * math.exp(y)
         w = velocity(a, (x, 0.0))[0]
-        share = 16.0 * ROUNDOFF_UP * (1.0 + abs(y) + abs(end)) + first * branch[_LATE]
+        share = 16.0 * ROUNDOFF_UP * (1.0 + abs(y) + abs(end)) + first * branch[_TIME_BAR]
         steep = abs(_steepness(a, x))
         phi = phi0 + (x - branch[_X0])
         floats[j, rc.PHI], floats[j, rc.W], turnings[j] = phi, w, 0
@@ -211,9 +211,9 @@ def trajectory(p, place, a, branch, phi0, asked, floats, turnings):
         j += 1
     if j == len(asked):
         return OK
-    origin = branch[_TIME], branch[_LATE]
-    return flow_double.followed(p, _begin(p, place, branch, a), branch[_TURNS], origin, 1, False, asked[j:], floats[j:],
-                                turnings[j:])  # fmt: skip
+    origin = branch[_TIME], branch[_TIME_BAR]
+    return flow_double.followed(p, _begin(p, saddle, branch, a), branch[_TURNS], origin, 1, False, asked[j:],
+                                floats[j:], turnings[j:])  # fmt: skip
 
 
 @inline
@@ -226,9 +226,9 @@ def _steepness(a, x):
 
 
 @kernel
-def abel(p, place, a, branch, phi0, targets, floats, status):
+def abel(p, saddle, a, branch, phi0, targets, floats, status):
     """As `steps.abel` at the ascending targets, on either side of phi0."""
-    j, x0 = 0, ahead(place, phi0)
+    j, x0 = 0, ahead(saddle, phi0)
     while j < len(targets):
         x = add(sub((targets[j], 0.0), (phi0, 0.0)), x0)
         if x[0] > branch[_REACH]:
@@ -246,7 +246,7 @@ def abel(p, place, a, branch, phi0, targets, floats, status):
             )
         j += 1
     if j < len(targets):
-        start = _begin(p, place, branch, a)
+        start = _begin(p, saddle, branch, a)
         flow_double.passed(p, start, branch[_TURNS], branch[_TIME], j, targets, floats, status)
     for i in range(len(targets)):
-        floats[i, rc.TIME_BAR] += branch[_LATE]
+        floats[i, rc.TIME_BAR] += branch[_TIME_BAR]

@@ -257,7 +257,7 @@ def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
     A, T, eqs, end = scratch(), table(), np.zeros((MOST, EQUILIBRIUM_SIZE)), np.zeros(5)
     size, _hidden = equilibria_inside(p, eqs)
     phi, w, ellipse = start[0], start[1], round_about(start[2])
-    t, at_rest, late = (origin[0], 0.0), w[0] == 0.0, origin[1]
+    t, at_rest, origin_bar = (origin[0], 0.0), w[0] == 0.0, origin[1]
     count, j, unsure = 0, 0, 0
     known, since = False, (0.0, 0.0)  # `end` gives the turnings after that time
     for n in range(1, LIMIT):
@@ -272,7 +272,7 @@ def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
                 break
             x, v = at(phi, A, dt)
             a, _b, c, _d = spread(carried(p, A, T, dt[0], v[0], ellipse))
-            delay = n * ROUGH * (asked[j] - min(origin[0], 0.0)) + late  # error of the time
+            delay = n * ROUGH * (asked[j] - min(origin[0], 0.0)) + origin_bar  # error of the time
             wide, high = (
                 bar(n, a) + abs(v[0]) * delay,
                 bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay,

@@ -317,14 +317,14 @@ def _go_on(reached, state, fixed, i):
     """Set lane i, after `enter`, to what `lockstep_phi` reached; error bounds at an angle become
     those at a time.
     """
-    w, late = reached[far.W], reached[far.T_BOUND]
+    w, delay = reached[far.W], reached[far.T_BOUND]
     state[PSI, i], state[TURNS, i], state[V, i] = (
         reached[far.AT] - fixed[TURN, i],
         reached[far.TURNED],
         w,
     )
     state[TIME, i], state[TIME_LOW, i] = reached[far.TIME], reached[far.TIME_LOW]
-    wide, tall = w * late, reached[far.W_BOUND] + (fixed[PF, i] * w + fixed[PG, i]) * late
+    wide, tall = w * delay, reached[far.W_BOUND] + (fixed[PF, i] * w + fixed[PG, i]) * delay
     state[SAA, i] += wide * wide
     state[SBB, i], state[STEPS, i] = tall * tall, 1.0
 

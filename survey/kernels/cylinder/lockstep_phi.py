@@ -244,7 +244,7 @@ def _record(T, before, state, step, i, block, targets, first, floats, status):
         before[TIME_LOW, i],
     )
     inverse, size, end = 1.0 / before[W, i], len(targets), state[AT, i]
-    high, slope, late, slowest = (
+    high, slope, time_bar, slowest = (
         step[W_WITHIN, i],
         step[STEEPEST, i],
         state[T_BOUND, i],
@@ -263,7 +263,7 @@ def _record(T, before, state, step, i, block, targets, first, floats, status):
             value, time = w + w * _rise(omega, s), t + (_elapsed(r, s) * inverse + t_low)
             block[2 * BLOCK + j], block[3 * BLOCK + j] = value, time
             block[4 * BLOCK + j] = 1.02 * (high + slope * slip)
-            block[5 * BLOCK + j] = 1.02 * (late + slip * slowest) + 4e-16 * time
+            block[5 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
         for j in range(min(BLOCK, last - first)):
             row = floats[first + j]
             row[rc.VALUE], row[rc.TIME] = block[2 * BLOCK + j], block[3 * BLOCK + j]

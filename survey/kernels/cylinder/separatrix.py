@@ -96,9 +96,9 @@ def saddle(p, index, out):
 
 
 @inline
-def ahead(place, phi0):
+def ahead(at_saddle, phi0):
     """phi0 less the angle of the saddle next to its left, in [0, 2 pi)."""
-    x = sub(centred((phi0, 0.0))[0], (place[ANGLE], place[ANGLE_LOW]))
+    x = sub(centred((phi0, 0.0))[0], (at_saddle[ANGLE], at_saddle[ANGLE_LOW]))
     if x[0] < 0.0:
         x = add(x, radians(1.0))
     elif x[0] >= TWO_PI:
@@ -117,21 +117,21 @@ def _pair(data, at):
 
 
 @kernel
-def enter(p, place, exact, phi0, data):
+def enter(p, at_saddle, exact, phi0, data):
     """Fill data (SIZE, 2) for the branch to the right of the saddle that passes phi0: OK;
     SEPARATRIX; or -1: none does.
 
     `exact`: the parameters give two saddles of the same energy, or the degenerate one that the
     saddle is taken for.
     """
-    x0 = ahead(place, phi0)
-    slip = PAIR_SUM_ROUNDOFF + (place[SLIP] if place[MULTIPLICITY] == ONE else 0.0)
-    s, c = sine_cosine((place[ANGLE], place[ANGLE_LOW]))
+    x0 = ahead(at_saddle, phi0)
+    slip = PAIR_SUM_ROUNDOFF + (at_saddle[SLIP] if at_saddle[MULTIPLICITY] == ONE else 0.0)
+    s, c = sine_cosine((at_saddle[ANGLE], at_saddle[ANGLE_LOW]))
     a, b = add(times(c, p[S2]), times(s, -p[S3])), neg(add(times(s, p[S2]), times(c, p[S3])))
     turned = shifted(scaled(square(s), -2.0), 1.0)
     A = add(b, add(times(turned, -p[D]), scaled(times(mul(s, c), p[C23]), 4.0)))
-    A = A if place[MULTIPLICITY] == ONE else (0.0, 0.0)
-    a = a if place[MULTIPLICITY] <= TWO else (0.0, 0.0)
+    A = A if at_saddle[MULTIPLICITY] == ONE else (0.0, 0.0)
+    a = a if at_saddle[MULTIPLICITY] <= TWO else (0.0, 0.0)
     noise = slip * p[BOUND_DDG]
     product, doubt = sub(square(a), mul(A, b)), 4.0 * noise * (2.0 * abs(a[0]) + abs(b[0]) + A[0])
     if exact and abs(product[0]) <= doubt:

@@ -42,7 +42,7 @@ def answer(
     table,
     near,
     starts,
-    places,
+    outputs,
     n,
     paired,
     asked,
@@ -53,7 +53,7 @@ def answer(
     crossing,
     missed,
 ):
-    """Answer the points places (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in
+    """Answer the points `outputs` (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in
     `stability.Answers`.
 
     series (n1, K m), of K coefficients, m terms along the row each; table (m, L or more, a multiple
@@ -62,7 +62,7 @@ def answer(
     there; starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d coefficients the last d are
     those of the Krein form.
     """
-    K, m, d, R, L = len(doubts), len(table), starts.shape[2], len(x), places.shape[1]
+    K, m, d, R, L = len(doubts), len(table), starts.shape[2], len(x), outputs.shape[1]
     work, own = np.empty((2, K * m)), np.empty((1, K * m))
     c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
     z, y = np.empty((d, LANES)), np.empty((d, LANES))
@@ -80,7 +80,7 @@ def answer(
             for lane in range(LANES):
                 column, own_places[lane] = (
                     first + min(lane, count - 1),
-                    places[r, first + min(lane, count - 1)],
+                    outputs[r, first + min(lane, count - 1)],
                 )
                 one, two = near[r], near[R + column]
                 for k in range(K):
@@ -115,7 +115,7 @@ def answer_points(
     x,
     near,
     starts,
-    places,
+    outputs,
     n,
     paired,
     asked,
@@ -138,7 +138,7 @@ def answer_points(
         count = min(LANES, N - first)
         for lane in range(LANES):
             p = first + min(lane, count - 1)
-            across[0, lane], along[0, lane], own_places[lane] = 1.0, 1.0, places[p]
+            across[0, lane], along[0, lane], own_places[lane] = 1.0, 1.0, outputs[p]
             if n1 > 1:
                 across[1, lane] = x[0, p]
             if m > 1:
@@ -193,7 +193,7 @@ def _polynomials(table):
 
 @kernel
 def _lanes(
-    c, bars, z, y, places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+    c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
 ):
     """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to
     within `bars`, and roots z + i y (d, LANES), nearly.
@@ -207,7 +207,7 @@ def _lanes(
     _roots(c, d, z, y, parts)
     _corrections(c, d, bars, z, y, w, gap, parts)
     for lane in range(count):
-        p = places[lane]
+        p = outputs[lane]
         widest = 0.0
         for i in range(d):
             widest = max(widest, w[i, lane]) if w[i, lane] >= 0.0 else math.inf

@@ -41,7 +41,7 @@ def factors(
     """As `steps.factors`; the nodes of one step take the places of the lanes there."""
     S, V = np.zeros((len(operations), 1, NODES.size)), np.empty((numbers.shape[1], NODES.size))
     t, zero, A = np.empty(NODES.size), np.zeros(NODES.size), np.empty((NODES.size, n, n))
-    work, first, second, whole = (
+    work, first, second, one_step = (
         np.empty((3, n, n)),
         np.empty((n, n)),
         np.empty((n, n)),
@@ -62,13 +62,13 @@ def factors(
                 A[node, row, column] += weight * S[terms[q, BASIS], 0, node]
         _step(A[0], A[1], A[2], 0.5 * h, work, first)
         _step(A[2], A[3], A[4], 0.5 * h, work, second)
-        _step(A[0], A[2], A[4], h, work, whole)
+        _step(A[0], A[2], A[4], h, work, one_step)
         multiply(second, first, 0.0, F[task])
         largest = off = norm = 0.0
         for j in range(n):
             for c in range(n):
                 largest = max(largest, abs(F[task, j, c]))
-                off = max(off, abs(F[task, j, c] - whole[j, c]))
+                off = max(off, abs(F[task, j, c] - one_step[j, c]))
                 for node in range(NODES.size):
                     norm = max(norm, abs(A[node, j, c]))
         rounding = ROUNDOFF_UP * (SUMS + 2.0 * n + SUMS * n * h * norm) * largest

@@ -25,13 +25,13 @@ SHORTER, SHORTEST = 0.1, 1e-9
 
 @kernel
 def flow(
-    operations, signs, inside, order, used, terms, numbers, places, x0, span, reach, tolerance, most, first, X, M, size,
-    steps, begin, length, series,
+    operations, signs, inside, order, used, terms, numbers, states_at, x0, span, reach, tolerance, most, first, X, M,
+    size, steps, begin, length, series,
 ):  # fmt: skip
     """Fill X (N, n), the states at t = span (N) from x0 (N, n) at 0, and the numbers of `steps`
     (N); NaN: it fails.
 
-    numbers (N, count), places (n): of the states among them; `most` steps at most. M (N, n, n), if
+    numbers (N, count), states_at (n): where the states stand among them; `most` steps at most. M (N, n, n), if
     N > 0: dX/dx0, and size (N, n): the largest moduli of the states at the ends of steps. If first
     (N + 1) is not empty, step k of point i is recorded at first[i] + k: `begin`, `length`, `series`
     (n, ORDER + 1) in units of the step.
@@ -78,7 +78,7 @@ def flow(
         while left > 0:
             for c in range(n):
                 for lane in range(lanes):
-                    V[places[c], lane] = x[c, lane]
+                    V[states_at[c], lane] = x[c, lane]
             if derived:
                 P[0] = 0.0
                 for c in range(n):

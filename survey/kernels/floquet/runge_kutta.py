@@ -110,11 +110,11 @@ def factors(
 
 
 @kernel
-def motion(operations, signs, inside, order, terms, numbers, places, x0, span, steps, X, M):
+def motion(operations, signs, inside, order, terms, numbers, states_at, x0, span, steps, X, M):
     """Fill X (N, n), the states of x' = f(t, x) at t = span (N) from x0 at 0, and M = dX/dx0 (N, n,
     n).
 
-    In steps[i] equal steps; numbers (N, count), places (n) of the states among them, as in
+    In steps[i] equal steps; numbers (N, count), states_at (n): where the states stand among them, as in
     `flow.flow`.
     """
     n = x0.shape[1]
@@ -144,7 +144,7 @@ def motion(operations, signs, inside, order, terms, numbers, places, x0, span, s
                     break
                 t[0] = (step + C[stage]) * h
                 for c in range(n):
-                    V[places[c], 0] = new[c, 0]
+                    V[states_at[c], 0] = new[c, 0]
                 extend(operations, signs, inside, order, V, t, zero, S, 0)
                 own = K[stage]
                 own[:] = 0.0

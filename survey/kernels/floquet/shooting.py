@@ -14,14 +14,14 @@ MOST_LOST = 1e-2  # of an entry that is about 1, by rounding
 
 
 @kernel
-def responses(F, delta, first, back, ends, at_end, states, last, late):
+def responses(F, delta, first, back, ends, at_end, states, last, time_bar):
     """Fill bounds of the solutions of x_k+1 = F_k x_k + d_k, |d_k| <= delta_k, with conditions at both ends.
 
-    Point i has the steps k from first[i] to first[i + 1]. At their end the states `ends` (m) of x, plus what `late`
+    Point i has the steps k from first[i] to first[i + 1]. At their end the states `ends` (m) of x, plus what `time_bar`
     unknown times a column adds, are e, |e| <= at_end (N, m); at the beginning x is a combination of unknown columns. As
     `back` (N, n + 1, m) times what the ends lack is x at the beginning and, in the last row, the late unknown, |x| is
-    `states` (steps, n) at most at the steps' beginnings, `last` (N, n) at the end, and the unknown `late` (N). Infinite
-    where rounding counts.
+    `states` (steps, n) at most at the steps' beginnings, `last` (N, n) at the end, and the unknown time
+    `time_bar` (N). Infinite where rounding counts.
     """
     n, m = F.shape[1], len(ends)
     A, B, suffix = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))
@@ -30,7 +30,7 @@ def responses(F, delta, first, back, ends, at_end, states, last, late):
         begin, end = first[i], first[i + 1]
         states[begin:end] = 0.0
         last[i] = 0.0
-        late[i] = 0.0
+        time_bar[i] = 0.0
         set_identity(suffix)
         largest, growth, sources = 0.0, 1.0, 0.0
         for source in range(end - 1, begin - 2, -1):  # the last one: what is asked of the ends
@@ -52,7 +52,7 @@ def responses(F, delta, first, back, ends, at_end, states, last, late):
                     A[r, c] = start[r, c]
             for c in range(width):
                 size = delta[source, c] if source >= begin else at_end[i, c]
-                late[i] += abs(start[n, c]) * size
+                time_bar[i] += abs(start[n, c]) * size
                 sources += size
             for k in range(begin, end + 1):
                 for r in range(n):
@@ -84,4 +84,4 @@ def responses(F, delta, first, back, ends, at_end, states, last, late):
         more = lost * sources if lost <= MOST_LOST else math.inf
         states[begin:end] += more
         last[i] += more
-        late[i] = late[i] * (1.0 + lost) if lost <= MOST_LOST else math.inf
+        time_bar[i] = time_bar[i] * (1.0 + lost) if lost <= MOST_LOST else math.inf

@@ -55,9 +55,9 @@ def factors(
     twice as many, the propagators F^-1 of the steps backwards follow.
     """
     lanes, ways = lanes_of(n), 2 if len(F) > len(point) else 1
-    places = len(operations)
-    S, X = np.zeros((places, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
-    B, C = np.zeros((places, ORDER + 1, n * lanes)), np.zeros((places, n, n * lanes))
+    size = len(operations)
+    S, X = np.zeros((size, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
+    B, C = np.zeros((size, ORDER + 1, n * lanes)), np.zeros((size, n, n * lanes))
     V, W = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), n * lanes))
     a, w, e = (
         np.zeros((ORDER + 1, lanes)),
@@ -76,7 +76,7 @@ def factors(
         np.empty(lanes),
         np.empty(lanes),
     )
-    per_row, needed = np.zeros(n), np.zeros((places, n), np.bool_)
+    per_row, needed = np.zeros(n), np.zeros((size, n), np.bool_)
     for k in range(len(terms)):
         per_row[terms[k, ROW]] += 1.0
         needed[terms[k, BASIS], terms[k, COLUMN]] = True

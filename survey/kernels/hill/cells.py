@@ -25,8 +25,8 @@ BLURRED = 0.1
 DROPPED = 0.02
 CORNERS = 12  # of a square cut by four lines, at most 8
 # A block, or a cell: along each axis how often it is halved, and the number of the part; along axis
-# 0 or 1 these are the columns AXIS * axis + HALVED_X and + PLACE_X.
-HALVED_X, PLACE_X, HALVED_Y, PLACE_Y = range(4)
+# 0 or 1 these are the columns AXIS * axis + HALVED_X and + INDEX_X.
+HALVED_X, INDEX_X, HALVED_Y, PLACE_Y = range(4)
 AXIS, BLOCK = 2, 4
 # A leaf: its block, its verdict, or UNSOLVED, and which parts of it are stable and unstable at least.
 VERDICT, STABLE_PART, UNSTABLE_PART = range(4, 7)
@@ -180,7 +180,7 @@ def _children(here, block, along_x, along_y, leaves, count):
             _write(here, UNSOLVED, 0.0, 0.0, leaves[count])
             if full and along_x:
                 leaves[count, HALVED_X] = here[HALVED_X] + 1
-                leaves[count, PLACE_X] = 2 * here[PLACE_X] + i
+                leaves[count, INDEX_X] = 2 * here[INDEX_X] + i
             if full and along_y:
                 leaves[count, HALVED_Y] = here[HALVED_Y] + 1
                 leaves[count, PLACE_Y] = 2 * here[PLACE_Y] + j
@@ -197,10 +197,10 @@ def _halve(stack, slack, where, size, top, axis, matrices, sums):
         slack[top, i] += EPS * (4.0 + 2.0 * size[top, axis]) * (abs(sums[i, 0]) + sums[i, 1])
         slack[top + 1, i] = slack[top, i]
     size[top + 1, 0], size[top + 1, 1] = size[top, 0], size[top, 1]
-    halved, place = AXIS * axis + HALVED_X, AXIS * axis + PLACE_X
+    halved, index = AXIS * axis + HALVED_X, AXIS * axis + INDEX_X
     for at in (top, top + 1):
         where[at, halved] += 1
-        where[at, place] = 2 * where[at, place] + (1 if at == top else 0)
+        where[at, index] = 2 * where[at, index] + (1 if at == top else 0)
     _times(matrices[0], stack[top], size[top], axis, stack[top + 1])
     _times(matrices[1], stack[top], size[top], axis, stack[top])
 

@@ -84,16 +84,16 @@ def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdic
     # pages.
     for turn in range((len(rows) + ROWS - 1) // ROWS * tiles):
         start, t = turn // tiles * ROWS, turn % tiles
-        count, place = len(x) - t * TILE if t == tiles - 1 else TILE, t if kept > 1 else 0
+        count, slot = len(x) - t * TILE if t == tiles - 1 else TILE, t if kept > 1 else 0
         if start == 0:
             own = x[t * TILE : t * TILE + count]
-            _polynomials(own, table[place])
+            _polynomials(own, table[slot])
             if n > 0:
-                _lagrange(n, own, table[place], sums, weights[place])
+                _lagrange(n, own, table[slot], sums, weights[slot])
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
-            _sum(coefficients[j], table[place], sums, count)
+            _sum(coefficients[j], table[slot], sums, count)
             if n > 0:
-                _sum(at_nodes[j], weights[place], bounds, count)
+                _sum(at_nodes[j], weights[slot], bounds, count)
                 for i in range(count):
                     bounds[i] += bars[j]
             else:

@@ -139,7 +139,7 @@ def pair(work, at):
 
 
 @inline
-def put(work, at, number):
+def store(work, at, number):
     work[at], work[at + LANES] = number
 
 
@@ -154,13 +154,13 @@ def prepare(left, right, shape, part, rates, work, lane):
     square, linear, last = dd.square(middle), dd.scaled(dd.mul(middle, half), 2.0), dd.square(half)
     a0, c0 = dd.shifted(square, 1.0), dd.add(b0, dd.mul(b2, square))
     by_r = dd.scaled(dd.div(half, c0), 2.0)
-    put(work, TURN + lane, dd.scaled(dd.div(half, a0), 2.0))
-    put(work, TURN_1 + lane, dd.div(linear, a0))
-    put(work, TURN_2 + lane, dd.div(last, a0))
-    put(work, RATE_G + lane, dd.mul(by_r, (-rates[2], -rates[3])))
-    put(work, RATE_K + lane, dd.mul(by_r, (rates[0], rates[1])))
-    put(work, RATE_1 + lane, dd.div(dd.mul(b2, linear), c0))
-    put(work, RATE_2 + lane, dd.div(dd.mul(b2, last), c0))
+    store(work, TURN + lane, dd.scaled(dd.div(half, a0), 2.0))
+    store(work, TURN_1 + lane, dd.div(linear, a0))
+    store(work, TURN_2 + lane, dd.div(last, a0))
+    store(work, RATE_G + lane, dd.mul(by_r, (-rates[2], -rates[3])))
+    store(work, RATE_K + lane, dd.mul(by_r, (rates[0], rates[1])))
+    store(work, RATE_1 + lane, dd.div(dd.mul(b2, linear), c0))
+    store(work, RATE_2 + lane, dd.div(dd.mul(b2, last), c0))
     for c in range(lane, lane + COLUMNS):
         for row in range(0, NOW, LANES):
             work[row + c] = work[row + lane]
@@ -237,11 +237,11 @@ def follow(work, i, row, n, driver, doubt, rate, one, two):
     work[TAIL + at] = tail if live > 0.0 else work[TAIL + at]
     total = dd.add(pair(work, OTHER + at), (live * a[0], live * a[1]))
     work[BOUND + at] += live * (off + PAIR_ROUNDOFF * abs(total[0]))
-    put(work, OTHER + at, pair(work, SUM + at))
-    put(work, SUM + at, total)
-    put(work, BEFORE + at, c)
-    put(work, SCALED + at, new)
-    put(work, NOW + at, a)
+    store(work, OTHER + at, pair(work, SUM + at))
+    store(work, SUM + at, total)
+    store(work, BEFORE + at, c)
+    store(work, SCALED + at, new)
+    store(work, NOW + at, a)
     work[BEFORE_OFF + at], work[SCALED_OFF + at], work[OFF + at] = work[SCALED_OFF + at], bound, off
 
 

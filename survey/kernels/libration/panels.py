@@ -11,7 +11,7 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
-from survey.kernels.libration.traces import INVARIANTS, NODES, place
+from survey.kernels.libration.traces import INVARIANTS, NODES, coordinate
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import EPS
 
@@ -159,7 +159,7 @@ def points(e, mu, first, middle, coefficients, lengths, bars, out):
         growth = (1.0 + e[i]) / (1.0 - e[i])
         growth = growth if first else growth * growth
         cosines(position(e[i], middle), in_y)
-        cosines(place(mu[i]), in_s)
+        cosines(coordinate(mu[i]), in_s)
         for j in range(INVARIANTS):
             for m in range(NODES):
                 sums[m] = 0.0

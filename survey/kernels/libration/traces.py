@@ -149,7 +149,7 @@ def nearest(t, k, t_bar, k_bar):
 
 
 @inline
-def place(mu):
+def coordinate(mu):
     """4 s - 3 within half an EPS."""
     s = dd.positive_root(dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu)), 3.0), 0.25))
     return (4.0 * s[0] - 3.0) + 4.0 * s[1]
@@ -169,7 +169,7 @@ def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, mi
         for first in range(0, mu.shape[1], TILE):
             count = min(TILE, mu.shape[1] - first)
             for i in range(count):
-                x[i] = place(mu[rows[r], first + i])
+                x[i] = coordinate(mu[rows[r], first + i])
             for j in range(INVARIANTS):
                 # Clenshaw; NODES is a constant, so that the inner loop is unrolled
                 for i in range(count):

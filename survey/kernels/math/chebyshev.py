@@ -103,10 +103,10 @@ def lagrange(x, n):
     That of node i is sin(theta_i) T_n(x) / (n (x - x_i)), at most sqrt 2 (Fejer). T_n is known to
     within 4 n EPS.
     """
-    theta, place = angles(n)[:, None], np.clip(x, -1.0, 1.0)
+    theta, clipped = angles(n)[:, None], np.clip(x, -1.0, 1.0)
     with np.errstate(divide="ignore"):
-        sizes = abs(np.cos(n * np.arccos(place))) * (np.sin(theta) / n) + 6 * EPS
-        sizes /= abs(place - np.cos(theta))
+        sizes = abs(np.cos(n * np.arccos(clipped))) * (np.sin(theta) / n) + 6 * EPS
+        sizes /= abs(clipped - np.cos(theta))
     return np.minimum(sizes, np.sqrt(2.0), out=sizes)
 
 

@@ -74,7 +74,7 @@ def origins(rows, starts, periods, out):
 
 
 @kernel
-def places(rows, starts, periods, times, out):
+def fill_angles(rows, starts, periods, times, out):
     """Fill `out` (n, m, 2, PLACE), values and bounds, at `times` (n, m), in units of A."""
     pairs, at = np.empty((2, MEANS)), np.empty(8)
     for i in range(len(rows)):
@@ -102,13 +102,13 @@ def places(rows, starts, periods, times, out):
                 side = -1.0
             if row[nu.HIGH_PLUS] == 0.0 and n % 2.0 != 0.0:
                 side = -side
-            _place(row, at, rising, side, delay, out[i, j])
+            _fill_angles_at(row, at, rising, side, delay, out[i, j])
             if delay * rate > FIRST_ORDER:
                 out[i, j, 1] = inf
 
 
 @kernel
-def _place(row, at, rising, side, delay, out):
+def _fill_angles_at(row, at, rising, side, delay, out):
     """Of one time, from the numbers `at` of `motion.locate`; an error of time, `delay`, moves them
     by their slopes.
     """

@@ -174,13 +174,13 @@ def twists(rows, bodies, out):
         twisted = mul(ee, minor(bb, inner, ba))
         twisted = sub(twisted, mul(eb, sub(mul(eb, inner), mul(ba, ea))))
         twisted = add(twisted, mul(ea, sub(mul(eb, ba), mul(bb, ea))))
-        whole = scaled(mul(exact(size_a), e), 2.0)  # the period over 2 pi
-        cube = mul(mul(whole, whole), whole)
-        fourth = mul(cube, whole)
+        period = scaled(mul(exact(size_a), e), 2.0)  # the period over 2 pi
+        cube = mul(mul(period, period), period)
+        fourth = mul(cube, period)
         area = scaled(mul(exact(size_a), exact(size_a)), 4.0)
         store(out, i, KAM, div(mul(area, flat), fourth))
         store(out, i, ISOENERGETIC, div(edge, cube))
-        store(out, i, KAM_3, div(mul(area, scaled(twisted, -1.0)), mul(fourth, whole)))
+        store(out, i, KAM_3, div(mul(area, scaled(twisted, -1.0)), mul(fourth, period)))
         store(out, i, ISOENERGETIC_3, div(scaled(minor(bb, edge, corner), -1.0), fourth))
 
 

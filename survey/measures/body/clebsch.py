@@ -39,18 +39,18 @@ def rotation(inertia, epsilon, rate):
     kappa = square - e
     two, three, free = over * kappa, other * kappa, A2 + A3 - A1
     b = A2 * two + A3 * three + square * (free * free)
-    place = np.where(over.sign() == other.sign(), over.sign(), 0.0)
+    shared_sign = np.where(over.sign() == other.sign(), over.sign(), 0.0)
     middle = over.sign() * other.sign() < 0.0
     # (6): the rotation about the least axis with epsilon < 0, or the largest with epsilon > 0, must
     # be fast enough
-    needs = place * e.value > 0.0
-    least = Bounded(abs(e.value)).sqrt() * roots(A1, A2, A3, place) / A1
+    needs = shared_sign * e.value > 0.0
+    least = Bounded(abs(e.value)).sqrt() * roots(A1, A2, A3, shared_sign) / A1
     beyond = (bounded.of(abs(np.asarray(rate, dtype=float))) - least).sign()
     free_top = (e.value == 0.0) & (square.value == 0.0)
     verdict = np.where(middle, np.where(kappa.sign() != 0.0, UNSTABLE, UNDECIDED), UNDECIDED)
-    verdict = np.where((place != 0.0) & ~needs & ~free_top, STABLE, verdict)
+    verdict = np.where((shared_sign != 0.0) & ~needs & ~free_top, STABLE, verdict)
     verdict = np.where(
-        (place != 0.0) & needs,
+        (shared_sign != 0.0) & needs,
         np.select([beyond > 0.0, beyond < 0.0], [STABLE, UNSTABLE], -1),
         verdict,
     )
@@ -65,7 +65,9 @@ def rotation(inertia, epsilon, rate):
     nothing = Bounded(np.full(np.shape(needs), np.nan), np.nan)
     return known | {
         "verdict": verdict,
-        "place": np.where(middle, MIDDLE + 0.0, np.where(place != 0.0, place, -2)).astype(np.int64),
+        "place": np.where(
+            middle, MIDDLE + 0.0, np.where(shared_sign != 0.0, shared_sign, -2)
+        ).astype(np.int64),
         "critical_rate": bounded.where(needs, least, nothing),
         "growth": growth,
         "frequency_slow": slow,

@@ -156,7 +156,7 @@ class Placed:
         return 1.0 + max(shares, default=0.0) / (4.0 * ROUNDOFF)
 
 
-def place(system):
+def nearest(system):
     """The Placed of a System: of its possible axes of rotation, the one on which it misses the set
     by least.
     """

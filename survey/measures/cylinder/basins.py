@@ -116,13 +116,13 @@ def cost(starts, each, system):
     return (each if starts < FEWEST else 3e-6 + 0.2 / starts) + system / starts
 
 
-def followed(method, six, s, starts, rtol, whole=None):
-    """`fate.followed`, of as few starts as can be where the Map `whole` says that there are many."""
+def followed(method, six, s, starts, rtol, map_asked=None):
+    """`fate.followed`, of as few starts as can be where the Map `map_asked` says that there are many."""
     basins = None
-    if whole is not None and hasattr(method, "flow_pieces"):
+    if map_asked is not None and hasattr(method, "flow_pieces"):
         with _LOCK:  # threads that wait find it done
             basins = _remembered(
-                method.__name__, tuple(float(value) for value in six), float(rtol), whole
+                method.__name__, tuple(float(value) for value in six), float(rtol), map_asked
             )
     if basins is None:
         return fate.followed(method, s, starts, rtol)
@@ -133,9 +133,9 @@ def followed(method, six, s, starts, rtol, whole=None):
 
 
 @lru_cache(maxsize=SYSTEMS)
-def _remembered(method, six, rtol, whole):
+def _remembered(method, six, rtol, map_asked):
     """The Basins of a system, or None; blocks of one survey share them."""
-    return found(sys.modules[method], fate.remembered(sys.modules[method], six), rtol, whole)
+    return found(sys.modules[method], fate.remembered(sys.modules[method], six), rtol, map_asked)
 
 
 def forget():
@@ -143,7 +143,7 @@ def forget():
     _remembered.cache_clear()
 
 
-def found(method, s, rtol, whole):
+def found(method, s, rtol, map_asked):
     """The Basins of the skeleton s, or None where its starts are to be followed."""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
     if s.stratum != fate.G or s.unknown or s.folded or not s.conclusive or not len(s.equilibria):
@@ -152,8 +152,8 @@ def found(method, s, rtol, whole):
     if limits is None:
         return None
     top, most = (
-        min(max(whole.fastest, scale), 0.5 * limits.min()),
-        min(max(2 * whole.starts, PIECES[0]), PIECES[1]),
+        min(max(map_asked.fastest, scale), 0.5 * limits.min()),
+        min(max(2 * map_asked.starts, PIECES[0]), PIECES[1]),
     )
     for cells in (COARSE, FINE):
         breaks, numbers, edges = _lattice(s, cells)
@@ -281,8 +281,8 @@ def _curves(method, s, edges, falls, scale, top, most):
             TOLERANCE,
         )
         count = method.flow_pieces(*given, most, out)
-        whole = count and (kind == kb.BRANCH or out[count - 1, kb.ENDING] == kb.CLOSES)
-        return out[:count].copy() if whole else None
+        map_asked = count and (kind == kb.BRANCH or out[count - 1, kb.ENDING] == kb.CLOSES)
+        return out[:count].copy() if map_asked else None
 
     for kind in (eq.SADDLE, eq.NODE):
         starts = np.zeros((2, rc.START))

@@ -220,10 +220,10 @@ def _marks(plane, curve, kind, function):
         slope = abs(function(t + step)[0] - function(t - step)[0]) / (2.0 * step)
         if _special(plane, curve.xy(t)) and abs(value[0]) <= 1e-6 * slope[0] + bar[0]:
             name, xy, error, known = _drawn(plane, curve, kind, t)
-            late = 1.1 * (bar / np.maximum(slope, TINY) + 2.0 * np.spacing(abs(t) + 1.0))
+            delay = 1.1 * (bar / np.maximum(slope, TINY) + 2.0 * np.spacing(abs(t) + 1.0))
             speed = (
-                (curve.xy(t + late + step) - curve.xy(t - late - step))
-                / (2.0 * (late + step))
+                (curve.xy(t + delay + step) - curve.xy(t - delay - step))
+                / (2.0 * (delay + step))
                 / plane.widths(xy)
             )
             turned = abs(curve.phi(t + step) - curve.phi(t - step)) / (2.0 * step)
@@ -231,8 +231,8 @@ def _marks(plane, curve, kind, function):
             yield (
                 name,
                 xy,
-                error + late * np.hypot(*speed.T),
-                {"equilibrium_phi": (angle, rough + late * turned)},
+                error + delay * np.hypot(*speed.T),
+                {"equilibrium_phi": (angle, rough + delay * turned)},
             )
 
 
@@ -319,9 +319,9 @@ def _folds_of_one(plane, name):
         sizes = size(rest | {name: value})
         slope = abs(mixed(phi + 1e-6) - mixed(phi - 1e-6)) / 2e-6
         # error of the angle; g'' moves the value with it
-        late = BARS * ROUNDOFF * sizes / max(slope, TINY)
-        bend = abs(force(rest | {name: value}, phi)[2]) + 4.0 * sizes * late
-        bar = (BARS * ROUNDOFF * sizes + late * bend) / math.hypot(a, da)
+        delay = BARS * ROUNDOFF * sizes / max(slope, TINY)
+        bend = abs(force(rest | {name: value}, phi)[2]) + 4.0 * sizes * delay
+        bar = (BARS * ROUNDOFF * sizes + delay * bend) / math.hypot(a, da)
         yield _straight(plane, 1.0 - at, 1.0 * at, -value, lambda xy, bar=bar: bar, phi)
 
 

@@ -107,7 +107,7 @@ def _systems(point, names, flows):
 
 def fates(point, names, flows, method, request):
     """The fates of phi0, w0: one skeleton for each set of the parameters `names`, then its initial states."""
-    whole = basins.asked(request, names)
+    map_asked = basins.asked(request, names)
     starts = [np.asarray(point[key], dtype=float) for key in ("phi0", "w0")]
     systems, own = _systems(point, names, flows)
     shape = np.broadcast_shapes(own, *(array.shape for array in starts))
@@ -121,7 +121,7 @@ def fates(point, names, flows, method, request):
         good = members[np.isfinite(starts[members]).all(axis=1)]
         if np.isfinite(system).all() and len(good):
             s = fate.remembered(method, system)
-            out = basins.followed(method, system, s, starts[good], request.rtol, whole)
+            out = basins.followed(method, system, s, starts[good], request.rtol, map_asked)
             fate.write(s, out, starts[good], result, good)
     return {name: values.reshape(shape) for name, values in result.items()}
 

@@ -123,8 +123,8 @@ def _on_border(plane, find, rows):
     counts = cycle_counts.on_border(plane)
     for low, high in cycle_counts.lost_on_border(plane, rows, *counts):
         part = plane.part(low, high)
-        again = (bifurcations.counted(part, *row) for row in find(part))
-        rows += [(kind, xy, error * (high - low), known) for kind, xy, error, known in again]
+        recounted = (bifurcations.counted(part, *row) for row in find(part))
+        rows += [(kind, xy, error * (high - low), known) for kind, xy, error, known in recounted]
     return rows, len(cycle_counts.lost_on_border(plane, rows, *counts))
 
 

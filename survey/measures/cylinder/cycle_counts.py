@@ -69,7 +69,7 @@ def lost_on_border(plane, rows, ticks, counts):
     ]
     parts = set()
     for kind, values in zip(KINDS, counts, strict=True):
-        own = [(name, place) for name, place, known in met if _counts_for(kind, name, known)]
+        own = [(name, position) for name, position, known in met if _counts_for(kind, name, known)]
         explained = along(values, ticks, own, WEIGHTS, OPTIONAL)
         parts |= {segment for segment, good in explained.items() if not good}
     return [

@@ -50,7 +50,7 @@ class Maps:
         mirrored = flow_of(signed(s.p, MIRROR))
         self.flows[ROTATION_MINUS] = mirrored, mirrored_equilibria(s.equilibria)
 
-    def node(self, kind, place):
+    def node(self, kind, coordinate):
         """(class, a, b, bar of a, bar of b) of a map: a its change (of log w), b its slope less 1.
 
         The section of rotations is phi = 0.
@@ -60,13 +60,13 @@ class Maps:
         if not self.good:
             return 0, *np.full(4, np.nan)
         if kind == LIBRATION:
-            high = self._end(eqs, place)
+            high = self._end(eqs, coordinate)
             if high is None:
                 return 0, *np.full(4, np.nan)
-            taylor.flow_image(rt.LIBRATION, p, eqs, len(eqs), high, place, FINE, node)
-            size, steep = 1.0, p[BOUND_DG] / (abs(values(p, place)[1]) + tracks.TINY)
+            taylor.flow_image(rt.LIBRATION, p, eqs, len(eqs), high, coordinate, FINE, node)
+            size, steep = 1.0, p[BOUND_DG] / (abs(values(p, coordinate)[1]) + tracks.TINY)
         else:
-            size = math.exp(place)
+            size = math.exp(coordinate)
             taylor.flow_image(rt.ROTATION, p, eqs, len(eqs), 0.0, size, FINE, node)
             steep = 1.0 / size
         change, slope, error = node[rt.CHANGE], node[rt.SLOPE], node[rt.ERROR]
@@ -74,16 +74,16 @@ class Maps:
         return int(node[rt.CLASS]), change / size, slope - 1.0, error / size, bar
 
     @staticmethod
-    def _end(eqs, place):
+    def _end(eqs, coordinate):
         """The equilibrium to the right of the angle, if the one to its left is not a saddle."""
         if not len(eqs):
             return None
-        away = (eqs[:, eq.ANGLE] - place) % TWO_PI
+        away = (eqs[:, eq.ANGLE] - coordinate) % TWO_PI
         left = int(np.argmax(away))
-        return None if eqs[left, eq.KIND] == eq.SADDLE else place + away.min()
+        return None if eqs[left, eq.KIND] == eq.SADDLE else coordinate + away.min()
 
     def extrema(self):
-        """[(label, is it a minimum?, place, a)] of the extrema of all maps; a label is (kind, class)."""
+        """[(label, is it a minimum?, coordinate, a)] of the extrema of all maps; a label is (kind, class)."""
         if not self.good:
             return
         speeds = np.log(self.scale * np.geomspace(LEAST, FASTEST, SCANNED))
@@ -94,11 +94,11 @@ class Maps:
             if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
                 high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + TWO_PI
                 scans.append((LIBRATION, row[eq.ANGLE] + share * (high - row[eq.ANGLE])))
-        for kind, places in scans:
-            yield from self._extrema(kind, places)
+        for kind, coordinates in scans:
+            yield from self._extrema(kind, coordinates)
 
-    def _extrema(self, kind, places):
-        nodes = [(x, *self.node(kind, x)) for x in places]
+    def _extrema(self, kind, coordinates):
+        nodes = [(x, *self.node(kind, x)) for x in coordinates]
         for low, high in pairwise(nodes):
             parts = [low, high]
             if low[1] != high[1]:
@@ -124,7 +124,7 @@ class Maps:
         return sorted(found)
 
     def _extremum(self, kind, one, two):
-        """(place, a) of the extremum between two nodes, to a few digits."""
+        """(coordinate, a) of the extremum between two nodes, to a few digits."""
         for _ in range(6):
             share = min(max(one[3] / (one[3] - two[3]), 0.05), 0.95)
             x = one[0] + share * (two[0] - one[0])
@@ -156,9 +156,9 @@ def found(plane):
     def function_of(label):
         kind, own = label
 
-        def function(place, position):
+        def function(coordinate, position):
             here = maps(np.asarray(position))
-            found = here.node(kind, place) if here else (0,) * 5
+            found = here.node(kind, coordinate) if here else (0,) * 5
             return found[1:] if found[0] == own else np.full(4, np.nan)
 
         return function, TWO_PI if kind == LIBRATION else math.inf
@@ -173,7 +173,7 @@ def _known(kind, part):
     none = np.zeros(len(part.x))
     known = {"multiplier": (none + 1.0, none), "cycle_phi": (none, none), "cycle_w": (none, none)}
     if kind == LIBRATION:
-        return known | {"cycle_phi": (part.place, part.place_error)}
-    w = np.exp(part.place)
+        return known | {"cycle_phi": (part.coordinate, part.coordinate_error)}
+    w = np.exp(part.coordinate)
     side = 1.0 if kind == ROTATION_PLUS else -1.0
-    return known | {"cycle_w": (side * w, w * np.expm1(part.place_error) + 4e-16 * w)}
+    return known | {"cycle_w": (side * w, w * np.expm1(part.coordinate_error) + 4e-16 * w)}

@@ -28,8 +28,8 @@ class Angle:
 
     __array_ufunc__ = None  # numpy's numbers leave operators to this class
 
-    def __init__(self, record, place):
-        self.record, self.place = record, place
+    def __init__(self, record, index):
+        self.record, self.index = record, index
 
     def __add__(self, other):
         return self.record.sum(self, other)
@@ -113,7 +113,7 @@ class Record:
             return OTHERS[name](self, *given)
         raise Unsupported(f"it applies {name} to an expression in phi")
 
-    def place(self, code, first, second, number=0.0):
+    def index(self, code, first, second, number=0.0):
         """The value of this operation: the same for the same operation."""
         key = (code, first, second, number)
         if key not in self._places:
@@ -129,8 +129,8 @@ class Record:
         rounded = float(number)
         missed = abs(float(number - rounded)) * (1 + 1e-15) if self.mp.isfinite(number) else 0.0
         if first is None:
-            return self.place(code, missed, at or 0, rounded)
-        return self.place(code, first, missed, rounded)
+            return self.index(code, missed, at or 0, rounded)
+        return self.index(code, first, missed, rounded)
 
     def constant(self, x):
         """The number x as a value, or the value x."""
@@ -141,32 +141,32 @@ class Record:
         if not isinstance(x, Angle):
             x, y = y, x
         if isinstance(y, Angle):
-            return self.place(pg.ADD, *sorted((x.place, y.place)))
-        return x if y == 0 else self.with_number(pg.PLUS, y, first=x.place)
+            return self.index(pg.ADD, *sorted((x.index, y.index)))
+        return x if y == 0 else self.with_number(pg.PLUS, y, first=x.index)
 
     def difference(self, x, y):
         """x - y."""
         if not isinstance(y, Angle):
             return self.sum(x, -self.mp.mpf(y))
         if not isinstance(x, Angle):
-            return self.with_number(pg.FROM, x, first=y.place)
-        return self.place(pg.SUBTRACT, x.place, y.place)
+            return self.with_number(pg.FROM, x, first=y.index)
+        return self.index(pg.SUBTRACT, x.index, y.index)
 
     def product(self, x, y):
         """x y."""
         if not isinstance(x, Angle):
             x, y = y, x
         if isinstance(y, Angle):
-            return self.place(pg.MULTIPLY, *sorted((x.place, y.place)))
-        return x if y == 1 else self.with_number(pg.TIMES, y, first=x.place)
+            return self.index(pg.MULTIPLY, *sorted((x.index, y.index)))
+        return x if y == 1 else self.with_number(pg.TIMES, y, first=x.index)
 
     def quotient(self, x, y):
         """x / y."""
         if not isinstance(y, Angle):
             return self.product(x, 1 / self.mp.mpf(y))
         if not isinstance(x, Angle):
-            return self.with_number(pg.OVER, x, at=y.place)
-        return self.place(pg.DIVIDE, x.place, y.place)
+            return self.with_number(pg.OVER, x, at=y.index)
+        return self.index(pg.DIVIDE, x.index, y.index)
 
     def power(self, x, y):
         """x^y: products where y is a whole number up to HIGHEST."""
@@ -180,7 +180,7 @@ class Record:
             return self.function(pg.SQRT, x)
         if y != float(y):
             return self.function(pg.EXP, self.product(self.function(pg.LOG, x), y))
-        made = self.place(pg.POWER, x.place, None, float(y))
+        made = self.index(pg.POWER, x.index, None, float(y))
         return self._known(made, lambda: self.product(self.quotient(made, x), y))
 
     def _whole(self, x, n):
@@ -191,27 +191,27 @@ class Record:
 
     def function(self, code, x):
         """The function of this code at x, with its derivative, which its series needs."""
-        made = self.place(code, x.place, None)
+        made = self.index(code, x.index, None)
         return self._known(made, lambda: SLOPES[code](self, x, made))
 
     def _known(self, made, slope):
         """The value of a function; its derivative is recorded after it."""
-        code, first, _second, number = self.operations[made.place]
-        if made.place not in self._begun:  # sin and cos need each other
-            self._begun.add(made.place)
-            at = self.constant(slope()).place
-            self.operations[made.place] = (code, first, at, number)
+        code, first, _second, number = self.operations[made.index]
+        if made.index not in self._begun:  # sin and cos need each other
+            self._begun.add(made.index)
+            at = self.constant(slope()).index
+            self.operations[made.index] = (code, first, at, number)
         return made
 
-    def slope(self, place):
+    def slope(self, index):
         """The derivative by phi of the value there, or None for 0."""
-        if place not in self._slopes:
-            self._slopes[place] = self._differentiated(place)
-        return self._slopes[place]
+        if index not in self._slopes:
+            self._slopes[index] = self._differentiated(index)
+        return self._slopes[index]
 
-    def _differentiated(self, place):
-        code, first, second, number = self.operations[place]
-        if place == 0:
+    def _differentiated(self, index):
+        code, first, second, number = self.operations[index]
+        if index == 0:
             return self.constant(1)
         if code == pg.CONSTANT:
             return None
@@ -225,7 +225,7 @@ class Record:
             if one is None:
                 return two if code == pg.ADD else -two
             return one + two if code == pg.ADD else one - two
-        y = Angle(self, place)
+        y = Angle(self, index)
         if code == pg.MULTIPLY:
             a, b = Angle(self, first), Angle(self, second)
             return self._total(
@@ -288,13 +288,13 @@ def recorded(function, name, record, p):
         value = multiprecision.lift(function, record)(record.angle, p)
         if not isinstance(value, (bool, int, float, Angle, record.mp.mpf, record.mp.mpc)):
             raise Unsupported(f"it returns {type(value).__name__}, which is not a real number")
-        return record.constant(value).place
+        return record.constant(value).index
     except Unsupported as error:
         raise Unsupported(f"{name}(phi, p): {error}") from None
     except NameError as error:  # a builtin that numbers with more digits have not
         raise Unsupported(f"{name}(phi, p): it uses {error.name}") from None
     except ArithmeticError:
-        return record.constant(np.nan).place
+        return record.constant(np.nan).index
     except Exception as error:
         raise Raised(name) from error
 
@@ -313,7 +313,7 @@ def program(f, g, point, on_circle):
         found = [recorded(h, name, record, p) for h, name in ((f, "f"), (g, "g"))]
         forces = len(record.operations)
         dg = record.slope(found[1])
-        slope = record.constant(0 if dg is None else dg).place
+        slope = record.constant(0 if dg is None else dg).index
     table = np.array(record.operations, dtype=float)
     row = np.zeros(pg.OPERATIONS + table.size)
     row[pg.OPERATIONS :] = table.ravel()

@@ -84,9 +84,9 @@ def found(plane):
                 yield from drawn(plane, part)
 
 
-def _at(plane, function, place, position):
+def _at(plane, function, coordinate, position):
     row = plane.flow(position)
-    return np.full(4, np.nan) if row is None else function(series(row, place))
+    return np.full(4, np.nan) if row is None else function(series(row, coordinate))
 
 
 def _fold(s):
@@ -124,19 +124,19 @@ def _rests(plane, position):
 
 
 def _curve(plane, kind, part):
-    angle = part.place % TWO_PI
+    angle = part.coordinate % TWO_PI
     return (
         kind,
         plane.square.parameters(part.x),
         part.error,
-        {"equilibrium_phi": (angle, part.place_error)},
+        {"equilibrium_phi": (angle, part.coordinate_error)},
     )
 
 
 def _folds(plane, part):
     """A fold, and its cusps."""
     yield _curve(plane, "fold", part)
-    for _place, mark in _marks(plane, part, _fold, lambda s: (s[G2, 0], s[G2, 1])):
+    for _index, mark in _marks(plane, part, _fold, lambda s: (s[G2, 0], s[G2, 1])):
         yield _curve(plane, "cusp", mark)
 
 
@@ -153,28 +153,28 @@ def _hopfs(plane, part):
     slopes, bends = (
         list(_marks(plane, part, _hopf, third)) for third in (lambda s: (s[G1, 0], s[G1, 1]), bend)
     )
-    for _place, mark in slopes:
+    for _index, mark in slopes:
         yield _curve(plane, "bogdanov_takens", mark)
-    bends = [(place, mark) for place, mark in bends if _series(plane, mark, 0)[G1, 0] < 0.0]
-    for _place, mark in bends:
+    bends = [(index, mark) for index, mark in bends if _series(plane, mark, 0)[G1, 0] < 0.0]
+    for _index, mark in bends:
         yield _curve(plane, "generalised_hopf", mark)
     marks = sorted(slopes + bends, key=lambda one: one[0])
-    places = [place for place, _ in marks]
-    whole = tracks.with_points(part, places, [mark for _, mark in marks]) if marks else part
-    cuts = [0, *(place + i for i, place in enumerate(places)), len(whole.x) - 1]
+    indices = [index for index, _ in marks]
+    refined = tracks.with_points(part, indices, [mark for _, mark in marks]) if marks else part
+    cuts = [0, *(index + i for i, index in enumerate(indices)), len(refined.x) - 1]
     for low, high in pairwise(cuts):
         if high > low:
             s = _series(
-                plane, whole, (low + high + 1) // 2 if high > low + 1 else low + (low in cuts[1:])
+                plane, refined, (low + high + 1) // 2 if high > low + 1 else low + (low in cuts[1:])
             )
             if s[G1, 0] < 0.0:
                 kind = "supercritical_hopf" if bend(s)[0] > 0.0 else "subcritical_hopf"
-                yield _curve(plane, kind, tracks.part_of(whole, slice(low, high + 1)))
+                yield _curve(plane, kind, tracks.part_of(refined, slice(low, high + 1)))
 
 
 def _series(plane, track, i):
     """The `series` at a point of a Track."""
-    return series(plane.flow(track.x[i]), track.place[i])
+    return series(plane.flow(track.x[i]), track.coordinate[i])
 
 
 def _marks(plane, part, function, third):
@@ -192,7 +192,7 @@ def _marks(plane, part, function, third):
         a, b, bar, b_bar = function(s)
         return np.array([(a, bar), (b, b_bar), third(s)])
 
-    points = np.column_stack([part.place, part.x])
+    points = np.column_stack([part.coordinate, part.x])
     values = np.array([equations(u)[2, 0] for u in points])
     for i in np.flatnonzero(values[1:] * values[:-1] < 0.0):
         u = points[i] + (points[i + 1] - points[i]) * values[i] / (values[i] - values[i + 1])

@@ -275,8 +275,14 @@ class Level:
         """Twice the integral of g: sin(x/2) times what vanishes at x = 0."""
         d, c23, s2, s3 = self.p[OF_G]
         middle, half = self.angle + 0.5 * x, 0.5 * x
-        whole = 2.0 * np.cos(half) * (0.5 * d * np.sin(2.0 * middle) + c23 * np.cos(2.0 * middle))
-        return -2.0 * np.sin(half) * (whole - 2.0 * s2 * np.cos(middle) + 2.0 * s3 * np.sin(middle))
+        mean_slope = (
+            2.0 * np.cos(half) * (0.5 * d * np.sin(2.0 * middle) + c23 * np.cos(2.0 * middle))
+        )
+        return (
+            -2.0
+            * np.sin(half)
+            * (mean_slope - 2.0 * s2 * np.cos(middle) + 2.0 * s3 * np.sin(middle))
+        )
 
     def velocity(self, x):
         return np.sqrt(np.maximum(self.depth(x), 0.0))

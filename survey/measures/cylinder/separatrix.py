@@ -48,13 +48,13 @@ def trajectories(method, rows, times, rtol, stable, left):
         if starts.status[i] != OK:
             continue
         at = sign_t * times[i, order[i]]
-        at, places = np.ascontiguousarray(at[np.isfinite(at)]), order[i][np.isfinite(at)]
+        at, asked_at = np.ascontiguousarray(at[np.isfinite(at)]), order[i][np.isfinite(at)]
         found, counts, ending = starts.at(i, at)
         found[:, rc.PHI] *= -1.0 if left else 1.0
         found[:, rc.W] *= sign_w
         found += 0.0  # no negative zeros
-        floats[i, places], turnings[i, places] = found, counts
-        status[i, places] = np.where(np.isfinite(found[:, rc.PHI]), OK, ending)
+        floats[i, asked_at], turnings[i, asked_at] = found, counts
+        status[i, asked_at] = np.where(np.isfinite(found[:, rc.PHI]), OK, ending)
     if method in (None, closed):
         return floats, turnings, status, starts.heads
     results = _by_steps(starts, rows, lambda some: solution.trajectories(method, some, times, rtol))
@@ -71,11 +71,11 @@ def abel(method, rows, targets, rtol, stable, left):
         status[i] = starts.status[i]
         if starts.status[i] != OK:
             continue
-        places = order[i][np.isfinite(targets[i, order[i]])]
-        found, codes = starts.passing(i, np.ascontiguousarray(side * targets[i, places]))
+        asked_at = order[i][np.isfinite(targets[i, order[i]])]
+        found, codes = starts.passing(i, np.ascontiguousarray(side * targets[i, asked_at]))
         found[:, rc.VALUE] *= np.where(codes == TURNING, side, sign_w)
         found[:, rc.TIME] *= -1.0 if stable else 1.0
-        floats[i, places], status[i, places] = found + 0.0, codes
+        floats[i, asked_at], status[i, asked_at] = found + 0.0, codes
     if method in (None, closed):
         return floats, status, starts.heads
     results = _by_steps(starts, rows, lambda some: solution.abel(method, some, targets, rtol))
@@ -98,44 +98,44 @@ class Starts:
         self.P, starts = solution.split(turned)
         self.phi0, self.branches = starts[:, rc.START_PHI].copy(), [None] * len(rows)
         for i in range(len(rows)):
-            place = np.zeros(separatrix.SADDLE)
-            if not separatrix.saddle(plain[i], rows[i, rc.NUMBER], place):
+            at_saddle = np.zeros(separatrix.SADDLE)
+            if not separatrix.saddle(plain[i], rows[i, rc.NUMBER], at_saddle):
                 continue
-            angle, many = place[ANGLE] % (2 * np.pi), place[MULTIPLICITY]
+            angle, many = at_saddle[ANGLE] % (2 * np.pi), at_saddle[MULTIPLICITY]
             self.heads[i, SADDLE] = angle
-            self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle) + place[SLIP]
+            self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle) + at_saddle[SLIP]
             if left:
-                place[ANGLE], place[ANGLE_LOW] = -place[ANGLE], -place[ANGLE_LOW]
+                at_saddle[ANGLE], at_saddle[ANGLE_LOW] = -at_saddle[ANGLE], -at_saddle[ANGLE_LOW]
             free = not rows[i, OF_F].any()
             if many > separatrix.ONE and not (free and _multiple(rows[i], many)):
                 self.status[i] = DEGENERATE
             elif free:
                 self.heads[i, SADDLE_BAR] = EPS * (1.0 + angle)
-                self._elliptic(i, place, many > separatrix.ONE or symmetric(rows[i]))
+                self._elliptic(i, at_saddle, many > separatrix.ONE or symmetric(rows[i]))
             elif method is closed:
                 self.status[i] = NO_FORM
             else:
-                self._series(i, place)
+                self._series(i, at_saddle)
         self.heads[self.status == INVALID_PARAMETERS] = np.nan
         if stable != left:
             self.heads[:, START] *= -1.0
 
-    def _elliptic(self, i, place, exact):
+    def _elliptic(self, i, at_saddle, exact):
         data = np.zeros((separatrix.SIZE, 2))
-        status = separatrix.enter(self.P[i], place, exact, self.phi0[i], data)
+        status = separatrix.enter(self.P[i], at_saddle, exact, self.phi0[i], data)
         if status >= 0:
             self.status[i] = status
         if status == OK:
             self.heads[i, START], self.heads[i, START_BAR] = separatrix.start(data)
             self.branches[i] = data, None, None
 
-    def _series(self, i, place):
+    def _series(self, i, at_saddle):
         (a, branch), out = branch_double.scratch(), np.zeros(2)
-        status = branch_double.enter(self.P[i], place, self.phi0[i], a, branch, out)
+        status = branch_double.enter(self.P[i], at_saddle, self.phi0[i], a, branch, out)
         self.status[i] = INVALID_PARAMETERS if status in (TURNING, EQUILIBRIUM) else status
         if status == OK:
             self.heads[i, START], self.heads[i, START_BAR] = out
-            self.branches[i] = place, a, branch
+            self.branches[i] = at_saddle, a, branch
 
     def at(self, i, times):
         """floats, turnings, and the status where there are none, at ascending times of row i."""
@@ -230,14 +230,14 @@ def branch_of(row):
     `row` holds six parameters, phi0 and w0 != 0, of which it is known that H(phi0, w0) is exactly
     that of a saddle. None if that saddle is not found, or phi0 is not reached from it.
     """
-    p, place = solution.split(np.array([row]))[0][0], np.zeros(separatrix.SADDLE)
+    p, at_saddle = solution.split(np.array([row]))[0][0], np.zeros(separatrix.SADDLE)
     (d, c23, s2, s3), phi0, w0 = row[OF_G], row[rc.PHI0], row[rc.W0]
     level = w0 * w0 - quartic.square_of_w(d, c23, s2, s3, phi0)[0]
     missed = []
     for number in range(1, 5):
-        if separatrix.saddle(p, float(number), place):
+        if separatrix.saddle(p, float(number), at_saddle):
             missed.append(
-                (abs(level + quartic.square_of_w(d, c23, s2, s3, place[ANGLE])[0]), number)
+                (abs(level + quartic.square_of_w(d, c23, s2, s3, at_saddle[ANGLE])[0]), number)
             )
     size = w0 * w0 + abs(d) + abs(c23) + abs(s2) + abs(s3)
     for off, number in sorted(missed):

@@ -105,12 +105,12 @@ def determinant(A, E, relative=True):
     n = A.shape[1]
     with np.errstate(all="ignore"):
         # a smooth one: that of the balanced A would jump
-        whole = (
+        log_det = (
             np.linalg.slogdet(np.eye(n) + np.swapaxes(A, 1, 2) @ A)[1]
             if relative
             else np.zeros(len(A))
         )
-        size = np.exp(whole / (2 * n))
+        size = np.exp(log_det / (2 * n))
         scale = monodromy.balanced(abs(A))
         A, E = (X * scale[:, None, :] / scale[:, :, None] for X in (A, E))
         good = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))

@@ -155,11 +155,11 @@ class Points:
             values[:, -1] = 0.0
         return rows, values
 
-    def held(self, y, place):
-        """The row that holds the state of this place (N) where it is, and its value."""
+    def held(self, y, coordinate):
+        """The row that holds this coordinate (N) where it is, and its value."""
         row = np.zeros((len(y), 1, y.shape[1]))
-        row[np.arange(len(y)), 0, place] = 1.0
-        return row, y[np.arange(len(y)), place][:, None]
+        row[np.arange(len(y)), 0, coordinate] = 1.0
+        return row, y[np.arange(len(y)), coordinate][:, None]
 
     def solved(self, y, rows, values):
         """Newton's method from y, under these conditions too: (y, which are found)."""

@@ -94,7 +94,9 @@ class Walk:
         """Is the chord on the map short and flat enough, and does the tangent turn little?"""
         if not _turn(tangent / size, ahead / size) < TURN:
             return False
-        one, two = (self._on_map(place, along) for place, along in ((y, tangent), (new, ahead)))
+        one, two = (
+            self._on_map(coordinate, along) for coordinate, along in ((y, tangent), (new, ahead))
+        )
         chord = np.hypot(*(self.positions(new[None]) - self.positions(y[None]))[0])
         bend = abs(one[0] * two[1] - one[1] * two[0]) / max(np.hypot(*one) * np.hypot(*two), 1e-300)
         flat = chord * bend <= 8.0 * FLAT or chord <= FLAT
@@ -144,21 +146,21 @@ class Walk:
                 )
         if self.own.kind == NEIMARK_SACKER and back:
             before, after = y[self.own.angle_at], new[self.own.angle_at]
-            whole = np.pi * np.round(0.5 * (before + after) / np.pi)
-            if min(abs(before - whole), abs(after - whole)) <= NEAREST:
+            nearest = np.pi * np.round(0.5 * (before + after) / np.pi)
+            if min(abs(before - nearest), abs(after - nearest)) <= NEAREST:
                 return [], []
-            if (before - whole) * (after - whole) < 0.0:
-                angle = whole + np.copysign(NEAREST, before - whole)
+            if (before - nearest) * (after - nearest) < 0.0:
+                angle = nearest + np.copysign(NEAREST, before - nearest)
                 goals.append(((angle - before) / (after - before), self.own.angle_at, angle, -1))
         if not goals:
             return None
-        share, place, value, border = min(goals)
+        share, coordinate, value, border = min(goals)
         guess = y + share * (new - y)
-        guess[place] = value
+        guess[coordinate] = value
         last, good = self.points.solved(
-            guess[None], *self.points.held(guess[None], np.array([place]))
+            guess[None], *self.points.held(guess[None], np.array([coordinate]))
         )
-        last[0, place] = value
+        last[0, coordinate] = value
         here = self.positions(last)[0]
         if not good[0] or not ((here > -1e-9) & (here < 1 + 1e-9)).all():
             return [], []

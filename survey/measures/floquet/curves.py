@@ -165,16 +165,16 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
     name}, show besides.
     """
 
-    def places(x):
+    def on_line(x):
         x = np.atleast_1d(x)
         return np.stack([x, np.full(x.size, square.across)], axis=1)
 
     def outside(x):
-        number = row_count.outside(*matrices(places(x), RTOL)[:2], structure)
+        number = row_count.outside(*matrices(on_line(x), RTOL)[:2], structure)
         return np.where(number >= 0, number, UNKNOWN)[0]
 
     def kind_of(x):
-        return counted_edges.kind(matrices(places(x), RTOL)[0][0], structure)
+        return counted_edges.kind(matrices(on_line(x), RTOL)[0][0], structure)
 
     own = [
         (kind, x)
@@ -185,11 +185,11 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
     ticks = np.linspace(0.0, 1.0, number.size)
     counted = [(outside, kind_of, np.where(number >= 0, number, UNKNOWN), CLASSES.values())]
     solved, names = indices
-    on_ticks = solved(places(ticks)) if names else {}
+    on_ticks = solved(on_line(ticks)) if names else {}
     for kind, name in names.items():
 
         def index(x, name=name):
-            return solved(places(x))[name][0]
+            return solved(on_line(x))[name][0]
 
         counted.append((index, lambda x, kind=kind: kind, on_ticks[name], (kind,)))
     unknown = {output.name: (np.array([np.nan]), np.array([np.nan])) for output in ALONG}
@@ -200,7 +200,7 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
         lost += left
         for name, x, error in missing:
             own.append((name, x))
-            found.append((name, square.parameters(places(x)), np.array([error]), unknown))
+            found.append((name, square.parameters(on_line(x)), np.array([error]), unknown))
     curves = joined(found, [output.name for output in ALONG])
     curves.complete = False if lost else None
     return curves

@@ -214,7 +214,7 @@ def _scaled(values, panel, side):
     return np.where(abs(x) <= 1.0 + 4 * EPS, np.clip(x, -1.0, 1.0), x)
 
 
-def _answer(key, panel, x, y, places, answer):
+def _answer(key, panel, x, y, outputs, answer):
     """Answer the points of a panel at x (rows), y (columns), between -1 and 1."""
     n1, K = len(panel.series), len(panel.doubts)
     n2 = panel.series.shape[1] // K
@@ -225,13 +225,13 @@ def _answer(key, panel, x, y, places, answer):
         table[k] = 2.0 * table[1] * table[k - 1] - table[k - 2]
     near = np.concatenate([_part(x, n1), _part(y, n2)])
     characteristic.answer(
-        panel.series, panel.doubts, np.ascontiguousarray(x), table, near, panel.starts, np.ascontiguousarray(places),
+        panel.series, panel.doubts, np.ascontiguousarray(x), table, near, panel.starts, np.ascontiguousarray(outputs),
         key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
         answer.verdict, answer.crossing, answer.missed,
     )  # fmt: skip
 
 
-def _answer_points(key, panel, x, places, answer):
+def _answer_points(key, panel, x, outputs, answer):
     """Answer the points of a panel at x (2, N), each between -1 and 1."""
     n1, K = len(panel.series), len(panel.doubts)
     n2 = panel.series.shape[1] // K
@@ -240,7 +240,7 @@ def _answer_points(key, panel, x, places, answer):
     rest = np.cumsum(abs(panel.series[::-1]), axis=0)[::-1].reshape(n1, K, n2)
     terms = (rest > 0.1 * panel.doubts.min(axis=(1, 2))[:, None] / n2).sum(axis=0)
     characteristic.answer_points(
-        panel.series, terms, 1.1 * panel.doubts, x, near, panel.starts, places,
+        panel.series, terms, 1.1 * panel.doubts, x, near, panel.starts, outputs,
         key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
         answer.verdict, answer.crossing, answer.missed,
     )  # fmt: skip

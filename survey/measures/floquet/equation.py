@@ -161,22 +161,22 @@ def compiled(graph, x, rows):
         for i, row in enumerate(rows)
         for j, state in enumerate(states)
     }
-    places = [graph.series[state][1] for state in states]
+    states_at = [graph.series[state][1] for state in states]
     A = graph.compiled({at: symbol for at, symbol in slopes.items() if symbol is not None})
     f = graph.compiled({(i, 0): row for i, row in enumerate(rows)})
-    return Programs(A, f, np.array(places))
+    return Programs(A, f, np.array(states_at))
 
 
 @dataclass(frozen=True, eq=False)
 class Programs:
-    """A = df/dx and f (in column 0) as `trace.Program`s; `places` of the states among the numbers."""
+    """A = df/dx and f (in column 0) as `trace.Program`s; `states_at` of the states among the numbers."""
 
     A: trace.Program
     f: trace.Program
-    places: np.ndarray
+    states_at: np.ndarray
 
     def _with_states(self, points):
-        return np.concatenate([points, np.zeros((len(points), len(self.places)))], axis=1)
+        return np.concatenate([points, np.zeros((len(points), len(self.states_at)))], axis=1)
 
     def holds(self, points):
         """Do the branches of the code go at the points (N, parameters) as they did where it was recorded?"""
@@ -186,7 +186,7 @@ class Programs:
     def numbers(self, points):
         """Values and error bounds of the numbers at the points; those of the states are 0."""
         values, errors = self.A.numbers(self._with_states(points))
-        errors[:, self.places] = 0.0
+        errors[:, self.states_at] = 0.0
         return values, errors
 
     def flow(
@@ -214,7 +214,7 @@ class Programs:
         recorded = np.empty(total), np.empty(total), np.empty((total, n, ORDER + 1))
         A = self.A
         flow(
-            A.operations, A.signs, A.inside, A.order, A.used, A.terms, np.ascontiguousarray(numbers[0]), self.places,
+            A.operations, A.signs, A.inside, A.order, A.used, A.terms, np.ascontiguousarray(numbers[0]), self.states_at,
             np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, tolerance, most,
             np.zeros(0, int) if first is None else first, X, M, size, steps, *recorded,
         )  # fmt: skip

@@ -130,7 +130,7 @@ class Path:
         """The propagators F of the steps, with bounds of their errors in each entry."""
         tasks, n, A = len(self.point), self.n, self.programs.A
         values = self.numbers[0].copy()
-        values[:, self.programs.places] = self.X[:, :, MIDDLE]
+        values[:, self.programs.states_at] = self.X[:, :, MIDDLE]
         self.F, self.error, self.doubt = np.empty((tasks, n, n)), np.empty(tasks), np.empty(tasks)
         method.floquet_factors(
             A.operations, A.signs, A.inside, A.order, A.used, A.terms, values, self.scale[self.point], self.noise, n,
@@ -226,11 +226,11 @@ class Path:
         back = s[:, :, None] / s[:, None, :]
         return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others)
 
-    def _sharp(self, M, E, R, error, doubt, late, which, f, df):
+    def _sharp(self, M, E, R, error, doubt, time_bar, which, f, df):
         """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but
         for its +1.
 
-        Errors are carried in the coordinates of eigenvectors; `late` bounds what the end's shift
+        Errors are carried in the coordinates of eigenvectors; `time_bar` bounds what the end's shift
         adds, relative to M.
         """
         N, n = M.shape[:2]
@@ -249,7 +249,7 @@ class Path:
         carried(self.F, error, doubt, self.first, which, n, vectors, inverses, extra)
         tall = product(abs(M) + E, abs(vectors))
         extra += (
-            late[:, None, None]
+            time_bar[:, None, None]
             * abs(inverses).sum(axis=2)[:, :, None]
             * tall.max(axis=1, keepdims=True)
         )

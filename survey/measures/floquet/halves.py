@@ -85,20 +85,20 @@ class Waves:
     """The sines and cosines of lines c t + d among the basis functions of a Program, and what
     follows from them.
 
-    `places` of the waves, `lines`: those of c and d among the numbers, or None for 1 and 0;
+    `nodes` of the waves, `lines`: those of c and d among the numbers, or None for 1 and 0;
     `cosine`, or sine?
     """
 
     def __init__(self, program):
         self.program, series = program, program.graph.series
-        self.places, self.lines, self.cosine, self.known = [], [], [], {}
+        self.nodes, self.lines, self.cosine, self.known = [], [], [], {}
         self.needed = program.needed(program.used)
-        for place in self.needed:
-            operation, *operands = series[place]
+        for node in self.needed:
+            operation, *operands = series[node]
             if operation in ("sin", "cos") and program.is_line(operands[0]):
                 line, *inside = series[operands[0]]
                 terms = dict(inside[0]) if line == "combination" else {}
-                self.places.append(place)
+                self.nodes.append(node)
                 self.lines.append((terms.get(pg.TIME), terms.get(pg.ONE)))
                 self.cosine.append(operation == "cos")
 
@@ -107,7 +107,7 @@ class Waves:
         the ends (N) of the piece; `late`: see `trace.Program.series`.
         """
         (values, errors), terms = numbers, self.program.terms[:, pg.NUMBER]
-        given = np.zeros((2, 2, len(self.places), len(low)))  # c and d, values and error bounds
+        given = np.zeros((2, 2, len(self.nodes), len(low)))  # c and d, values and error bounds
         given[0, 0] = 1.0
         for w, line in enumerate(self.lines):
             for which, number in enumerate(line):
@@ -133,14 +133,14 @@ class Waves:
         total = off[0] * (images.reversal is not None) + off[1] * (images.repetition is not None)
         # most often of all points: then what depends on t alone is still sampled once
         alike = (total == total[:, :1]).all(axis=1)
-        return {place: total[w, : 1 if alike[w] else None, None] for w, place in enumerate(self.places)
+        return {node: total[w, : 1 if alike[w] else None, None] for w, node in enumerate(self.nodes)
                 if images.parts > 1}  # fmt: skip
 
     def _images(self, n, row):
         """The Images where the waves' multiples of pi and the terms that are not 0 are those of the row."""
         key = n, row.tobytes()
         if key not in self.known:
-            waves = len(self.places)
+            waves = len(self.nodes)
             back, later, present = row[:waves], row[waves : 2 * waves], row[2 * waves :]
             # sin(k pi - x) = -(-1)^k sin x
             back = [
@@ -164,24 +164,24 @@ class Waves:
         return alike_or_opposite(*allowed)
 
     def _parities(self, turns):
-        """{place: 1, -1, or 0 where it is neither}: what the basis functions are times at the image of t."""
-        known = dict(zip(self.places, (int(turn) for turn in turns), strict=True))
-        for place in self.needed:
-            if place in known:
+        """{node: 1, -1, or 0 where it is neither}: what the basis functions are times at the image of t."""
+        known = dict(zip(self.nodes, (int(turn) for turn in turns), strict=True))
+        for node in self.needed:
+            if node in known:
                 continue
-            operation, *o = self.program.graph.series[place]
+            operation, *o = self.program.graph.series[node]
             if operation == "one":
-                known[place] = 1
+                known[node] = 1
             elif operation == "combination":
                 parts = {known[b] for b, _c in o[0]}
-                known[place] = parts.pop() if len(parts) == 1 else 0
+                known[node] = parts.pop() if len(parts) == 1 else 0
             elif operation in ("product", "quotient"):
-                known[place] = known[o[0]] * known[o[1]]
+                known[node] = known[o[0]] * known[o[1]]
             elif operation in ("time", "state"):
-                known[place] = 0
+                known[node] = 0
             else:
                 own = known[o[0]]
-                known[place] = (
+                known[node] = (
                     own if own >= 0 else -1 if operation in ODD else int(operation in EVEN)
                 )
         return known

@@ -87,8 +87,8 @@ class Points:
                     if self.halves
                     else [(slice(None), Images(), None)]
                 )
-                for those, images, late in kinds:
-                    here = *(values[those] for values in numbers), images, late
+                for those, images, phase_bars in kinds:
+                    here = *(values[those] for values in numbers), images, phase_bars
                     found.append(
                         (some[those], [*(_of_those(piece, those) for piece in pieces), here])
                     )
@@ -99,14 +99,16 @@ class Points:
         self.rough[own] = False
         n, N = self.n, len(own)
         largest, scale, sampled = np.zeros((N, n, n)), np.empty((N, n)), []
-        for k, (program, (*numbers, images, late)) in enumerate(zip(programs, given, strict=True)):
+        for k, (program, (*numbers, images, phase_bars)) in enumerate(
+            zip(programs, given, strict=True)
+        ):
             edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
             t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
             A, E = np.empty((N, TIMES.size, n, n)), np.empty((N, n, n))
             self._add_trace(
                 own, program.trace(numbers), self.edges[own, k + 1] - self.edges[own, k]
             )
-            terms, values, errors = program.sampled(numbers, t, late)
+            terms, values, errors = program.sampled(numbers, t, phase_bars)
             errors[:, :, TIMES * images.parts > 1.0] = 0.0  # only what is integrated rounds
             sizes.samples(terms, values, errors, *numbers, A, E, largest)
             sampled.append((numbers, A, E))
@@ -147,10 +149,12 @@ class Points:
 
 def _of_those(piece, those):
     """A piece of `Points._alike`, of some of its points."""
-    values, errors, images, late = piece
+    values, errors, images, phase_bars = piece
     # what is the same for all points has one row
-    late = late and {place: bars if len(bars) == 1 else bars[those] for place, bars in late.items()}
-    return values[those], errors[those], images, late
+    phase_bars = phase_bars and {
+        row_at: bars if len(bars) == 1 else bars[those] for row_at, bars in phase_bars.items()
+    }
+    return values[those], errors[those], images, phase_bars
 
 
 def balanced(matrices):
@@ -222,8 +226,8 @@ def solve(points, method, rtol, factor, those, sharp):
         number[group.own] = g
     for g, group in enumerate(points.groups):
         mine = np.flatnonzero(number[those] == g)
-        place = np.empty(len(points.points), dtype=np.int64)
-        place[group.own] = np.arange(len(group.own))
+        row_at = np.empty(len(points.points), dtype=np.int64)
+        row_at[group.own] = np.arange(len(group.own))
         work = np.cumsum(count[mine].sum(axis=1)) * n * n
         cuts = np.searchsorted(work, np.arange(CALL_WORK, work[-1], CALL_WORK)) if work.size else []
         for some in np.split(mine, cuts):
@@ -233,11 +237,11 @@ def solve(points, method, rtol, factor, those, sharp):
                     count[some],
                     sharp if isinstance(sharp, bool) else partial(sharp, some),
                 )
-                found[some] = _call(points, method, those[some], place[those[some]], *given)
+                found[some] = _call(points, method, those[some], row_at[those[some]], *given)
     return found
 
 
-def _call(points, method, those, place, group, count, sharp):
+def _call(points, method, those, row_at, group, count, sharp):
     n, parts = points.n, np.array([images.parts for images in group.images])
     count = -(-count // parts)  # of the first parts
     first = np.concatenate([[0], np.cumsum((count * parts).sum(axis=1))])
@@ -253,14 +257,14 @@ def _call(points, method, those, place, group, count, sharp):
             continue
         index = np.arange(point.size) - np.repeat(np.cumsum(steps_of) - steps_of, steps_of)
         low, high = points.edges[those, k], points.edges[those, k + 1]
-        late = points.edges[those, -1]
+        phase_bars = points.edges[those, -1]
         if parts[k] > 1:
-            late = high = low + (high - low) / parts[k]
+            phase_bars = high = low + (high - low) / parts[k]
         start, end = (_ends(low, high, steps_of, point, index + shift) for shift in (0, 1))
         middle, half = 0.5 * (start + end), 0.5 * (end - start)
         # all is exact but the first and the last step of the piece, which meet others within their
         # rounding
-        share = late / np.where(high > low, high - low, 1.0)
+        share = phase_bars / np.where(high > low, high - low, 1.0)
         noise = points.noise[those, k] + 4 * ROUNDOFF_UP * points.size[those, k] * share
         ways = 1 if images.reversal is None else 2
         found = (
@@ -273,7 +277,7 @@ def _call(points, method, those, place, group, count, sharp):
             jit.wait_for_other_compiler()
         method.floquet_factors(
             program.operations, program.signs, program.inside, program.order, program.used, program.terms,
-            np.ascontiguousarray(values[place]), scale, noise, n, point, middle, half, *found,
+            np.ascontiguousarray(values[row_at]), scale, noise, n, point, middle, half, *found,
         )  # fmt: skip
         where = np.repeat(offset, steps_of) + index
         where = (

@@ -125,7 +125,7 @@ def _positions(segments, axis, ticks):
 
 
 def _linked(segments, axis, ticks):
-    """[(positions (m, 2), errors (m))] of places on neighbouring lines at which the index takes the
+    """[(positions (m, 2), errors (m))] of points on neighbouring lines at which the index takes the
     same step.
     """
     middle, error = segments.ends.mean(axis=1), 0.5 * np.diff(segments.ends)[:, 0]
@@ -143,8 +143,8 @@ def _linked(segments, axis, ticks):
         else:
             pieces.append([i])
     pieces = [piece for piece in pieces if len(piece) > 1]
-    places = [np.stack([middle[piece], ticks[line[piece]]], axis=1) for piece in pieces]
+    points_of = [np.stack([middle[piece], ticks[line[piece]]], axis=1) for piece in pieces]
     return [
         (x if axis == 0 else x[:, ::-1].copy(), error[piece])
-        for x, piece in zip(places, pieces, strict=True)
+        for x, piece in zip(points_of, pieces, strict=True)
     ]

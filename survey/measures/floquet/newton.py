@@ -59,7 +59,7 @@ def located(equation, points, reach, x, T, relax=True):
         those = orbits.solve()
         if relax and equation.symmetry is None:
             those = np.sort(
-                np.concatenate([those, orbits.again(np.setdiff1d(np.arange(own.size), those))])
+                np.concatenate([those, orbits.restarted(np.setdiff1d(np.arange(own.size), those))])
             )
         found.x[own], found.T[own], found.guess[own] = orbits.x, orbits.T, orbits.guess
         if equation.free:
@@ -81,7 +81,7 @@ class Newton:
         self.x, self.T, self.guess, self.period = x.copy(), T.copy(), x.copy(), T
         self.phase = programs.slopes(numbers, np.zeros(len(x)), x)[0] if equation.free else None
 
-    def again(self, those):
+    def restarted(self, those):
         """As `solve`, for some points, from the state after a long time."""
         numbers, free = chosen(self.numbers, those), self.phase is not None
         span = RELAXED * self.period[those]

@@ -58,8 +58,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     """
     method = monodromy.method_of(method)
     known = np.isfinite(points).all(axis=1) & (branch == np.floor(branch))
-    different, place = np.unique(points[known], axis=0, return_inverse=True)
-    place = place.reshape(-1)
+    different, row_of = np.unique(points[known], axis=0, return_inverse=True)
+    row_of = row_of.reshape(-1)
     parts, of_point = [], [[] for _ in different]
     count = 0
     for where, x, T in followed(equation, continued, different, _reach(rtol)):
@@ -78,7 +78,7 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     empty = Found(equation, 1).outputs(np.ones(1, bool), rtol, wanted, callable(equation.period))
     out = {name: np.concatenate([*(part[name] for part in parts), empty[name]]) for name in empty}
     pick = np.full(len(points), count)
-    for i, k, number in zip(np.flatnonzero(known), place, branch[known].astype(int), strict=True):
+    for i, k, number in zip(np.flatnonzero(known), row_of, branch[known].astype(int), strict=True):
         if abs(number) <= len(order[k]):
             pick[i] = order[k][number - (number > 0)]
     out = {name: values[pick] for name, values in out.items()}
@@ -87,7 +87,7 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     )
     if NUMBER.name in wanted:
         out[NUMBER.name] = np.full(len(points), NUMBER.fill)
-        out[NUMBER.name][known] = np.array([len(one) for one in order], int)[place]
+        out[NUMBER.name][known] = np.array([len(one) for one in order], int)[row_of]
     return out
 
 
@@ -194,7 +194,7 @@ def _show(found, equation, points, orbits, good, method, reach, finer=False):
                     shown = certified(
                         *near, orbits.guess[those], plane, orbits.steps[those], method, reach
                     )
-                found.put(those, shown)
+                found.write_at(those, shown)
 
 
 def _reach(rtol):
@@ -214,7 +214,7 @@ class Found:
         )
         self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
 
-    def put(self, points, shown):
+    def write_at(self, points, shown):
         """Keep what is Shown of these points."""
         to = points[shown.good]
         self.good[to] = True

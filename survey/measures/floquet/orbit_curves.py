@@ -6,7 +6,7 @@ on the unit circle.
     neimark_sacker  a complex pair
 
 Orbits are followed along ROWS lines of the map each way (`continuation`); on a line along another
-parameter than that of the continuation, from the orbits that this gives at nine places. Where det(M
+parameter than that of the continuation, from the orbits that this gives at nine points. Where det(M
 - 1), det(M + 1) or the product of all l_i l_j - 1 changes its sign there, Newton's method on the
 equations of `critical` finds the orbit that has the multiplier, and the curve is followed from it
 in the space of all unknowns, in which folds of orbits and cusps of their curves are nothing
@@ -261,7 +261,7 @@ class _Map:
         return [one for held in (0, 1) for one in self._located(how, start, held)]
 
     def followed(self, points, seeds):
-        """[(y (m, size), places (m) of parameters at the map's border or -1)] of the curves through
+        """[(y (m, size), columns (m) of parameters at the map's border or -1)] of the curves through
         the seeds.
         """
         if len(self.varied) < 2:
@@ -330,8 +330,8 @@ class _Map:
         parameters = np.zeros((N, 2))
         parameters[:, : len(self.varied)] = y[:, last:]
         beside = parameters.copy()
-        places = np.arange(N), 1 - held
-        beside[places] += shown.dy[np.arange(N), np.minimum(last + 1 - held, own.size - 1)]
+        sides = np.arange(N), 1 - held
+        beside[sides] += shown.dy[np.arange(N), np.minimum(last + 1 - held, own.size - 1)]
         with np.errstate(all="ignore"):
             error = abs(self.square.positions(beside) - self.square.positions(parameters)).max(
                 axis=1

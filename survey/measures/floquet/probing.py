@@ -27,50 +27,50 @@ def suspects(program):
     """The basis functions of the entries that may hide a spike."""
     degree = {}
 
-    def visit(place):
-        if place not in degree:
-            code, a, b, first, last = program.operations[place]
+    def visit(node):
+        if node not in degree:
+            code, a, b, first, last = program.operations[node]
             if code == pg.COMBINATION:
-                degree[place] = max(
+                degree[node] = max(
                     (visit(int(k)) for k in program.inside[first:last, 0]), default=0
                 )
             elif code == pg.PRODUCT:
-                degree[place] = visit(int(a)) + visit(int(b))
+                degree[node] = visit(int(a)) + visit(int(b))
             else:
                 simple = code in (pg.ONE, pg.TIME, *WAVES)
-                degree[place] = int(code != pg.ONE) if simple else np.inf
-        return degree[place]
+                degree[node] = int(code != pg.ONE) if simple else np.inf
+        return degree[node]
 
-    return [int(place) for place in program.used if visit(int(place)) > SIMPLE]
+    return [int(node) for node in program.used if visit(int(node)) > SIMPLE]
 
 
 def rates(program, numbers, low, high, scale, number=NUMBER):
     """As `kernels.floquet.sizes.measure`, of each suspect between `low` and `high` (N, 1):
     (suspects, N), NaN where not finite. `scale` (N, n) are the units of the states that balance A.
     """
-    places = suspects(program)
-    if not places:
+    nodes = suspects(program)
+    if not nodes:
         return np.zeros((0, len(low)))
-    found = np.empty((len(places), len(low)))
+    found = np.empty((len(nodes), len(low)))
     for first in range(0, len(low), AT_ONCE):
         some = slice(first, first + AT_ONCE)
         own = [values[some] for values in numbers]
-        found[:, some] = _rates(program, places, own, low[some], high[some], scale[some], number)
+        found[:, some] = _rates(program, nodes, own, low[some], high[some], scale[some], number)
     return found
 
 
-def _rates(program, places, numbers, low, high, scale, number):
+def _rates(program, nodes, numbers, low, high, scale, number):
     """`rates` of some points."""
     if (low == low[0]).all() and (high == high[0]).all():  # what depends on t alone is sampled once
         low, high = low[:1], high[:1]
     t = low + (high - low) * chebyshev.shares(number)
-    found = np.zeros((len(places), len(scale)))
-    for k, (values, bars) in enumerate(_values(program, numbers, t, places)):
+    found = np.zeros((len(nodes), len(scale)))
+    for k, (values, bars) in enumerate(_values(program, numbers, t, nodes)):
         c = (
             abs(np.fft.rfft(np.concatenate([values, values[:, ::-1]], axis=1), axis=1)[:, :number])
             / number
         )
-        terms = program.terms[program.terms[:, pg.BASIS] == places[k]]
+        terms = program.terms[program.terms[:, pg.BASIS] == nodes[k]]
         with np.errstate(all="ignore"):
             share = c / c.max(axis=1, keepdims=True)
             ratio = scale[:, terms[:, pg.COLUMN]] / scale[:, terms[:, pg.ROW]]
@@ -115,8 +115,8 @@ def spikes(points):
     return found
 
 
-def _values(program, numbers, t, places):
+def _values(program, numbers, t, nodes):
     """Yield the values (N, m) of these basis functions at the times t (N or 1, m), and their error bounds."""
     shape = len(numbers[0]), t.shape[1]
-    for values, bars in program.series(numbers, t, places).values():
+    for values, bars in program.series(numbers, t, nodes).values():
         yield np.broadcast_to(values, shape), np.broadcast_to(bars, shape)

@@ -56,11 +56,11 @@ def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
         away = 2.0 * (abs(step) + applied(abs(B), off))
         dx, dT = away[:, :n], away[:, n] if plane is not None else 4 * EPS * T
         E = dM + moved * dx.max(axis=1)[:, None, None]
-        late = np.zeros(N) if plane is None else dT
+        time_bar = np.zeros(N) if plane is None else dT
         at_end = programs.along(
             programs.A, numbers, T[:, None], X[:, :, None], np.zeros((N, n, 1))
         )[0][:, 0]
-        E = E + late[:, None, None] * _product(abs(at_end), abs(M))
+        E = E + time_bar[:, None, None] * _product(abs(at_end), abs(M))
         judged, bounds = M, E
         if plane is not None:
             f, df = programs.slopes(numbers, np.zeros(N), x, dx)
@@ -84,7 +84,7 @@ def _motion(method, programs, numbers, x, T, steps):
     X, M, A = np.empty_like(x), np.empty((*x.shape, x.shape[1])), programs.A
     given = (
         np.ascontiguousarray(numbers[0]),
-        programs.places,
+        programs.states_at,
         np.ascontiguousarray(x),
         np.ascontiguousarray(T),
     )

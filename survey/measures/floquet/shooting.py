@@ -107,10 +107,10 @@ class _Half:
         path, N, last_steps = self.path, len(self.x), self.cuts[1:] - 1
         wide, off = np.empty((2, *delta.shape))
         spread(path.F, np.ascontiguousarray(delta), self.cuts, wide, off)
-        states, last, late = np.empty((len(self.F), path.n)), np.empty_like(self.x), np.empty(N)
+        states, last, time_bar = np.empty((len(self.F), path.n)), np.empty_like(self.x), np.empty(N)
         own = off[last_steps] + self.rounding * around[:, None]
         responses(
-            self.F, own, self.first, self.back, self.symmetry.ends, at_end, states, last, late
+            self.F, own, self.first, self.back, self.symmetry.ends, at_end, states, last, time_bar
         )
         more = np.where(self.lost < SURE, 1.0 + 2.0 * self.lost, np.inf)
         states = states * more[path.point[self.cuts[:-1]], None]
@@ -118,7 +118,7 @@ class _Half:
         begins[1:] = wide[:-1] * states[self.shot[1:]].max(axis=1, keepdims=True) + off[:-1]
         begins[self.cuts[:-1]] = states
         begins[:, list(self.symmetry.transverse)] = 0.0
-        return begins, last * more[:, None], late * more
+        return begins, last * more[:, None], time_bar * more
 
     def certify(self, factor):
         """Shown, of the orbits in a box `factor` times as wide as the linear equations tell."""
@@ -127,8 +127,8 @@ class _Half:
         a_end = path.norm[path.last]
         at_end = self.missed + (self.dT * self.fastest)[:, None]
         first = self._responses(self.delta, at_end, np.zeros(len(self.F)))
-        states, last, late = (factor * one for one in first)
-        shift = self.dT + late * self.unit
+        states, last, time_bar = (factor * one for one in first)
+        shift = self.dT + time_bar * self.unit
         begins = states.max(axis=1)
         tube = WIDER * (np.exp(path.h * path.norm) * begins + self.delta.max(axis=1))
         width = path.noise_X + (tube[:, None] * s[point])[:, :, None]
@@ -149,7 +149,7 @@ class _Half:
         good = (
             np.logical_and.reduceat(inside, path.first[:-1])
             & (last_2 <= last).all(axis=1)
-            & (late_2 <= late)
+            & (late_2 <= time_bar)
         )
         good &= ~symmetry.couples(path.largest)
         return self._shown(
@@ -164,20 +164,20 @@ class _Half:
         dx[:, unknown] = (start * s)[:, unknown] * (1 + 8 * EPS) + EPS * abs(x[:, unknown])
         f, df = path.programs.slopes(path.own, np.zeros(N), x, dx)
         f, df = f / s, (WIDER * df + 8 * EPS * abs(f)) / s
-        late = WIDER * dT * a_end
-        M, E = self._product(path.F, error, doubt, late)
+        time_bar = WIDER * dT * a_end
+        M, E = self._product(path.F, error, doubt, time_bar)
         own = (
             (M, E)
             if not symmetry.transverse
-            else self._product(symmetry.block(path.F), error, doubt, late)
+            else self._product(symmetry.block(path.F), error, doubt, time_bar)
         )
         good = good & np.isfinite(E).all(axis=(1, 2))
         M, E, others = symmetry.matrices(M, E, f, df, *own)
         back = s[:, :, None] / s[:, None, :]
         return Shown(good, x, dx, 2.0 * self.T, 2.0 * dT, M * back, E * back, path.square, others)
 
-    def _product(self, F, error, doubt, late):
-        """dx(T/2)/dx(0) and its bounds, the shift of its end within `late` included."""
-        M, E, R = np.empty((3, len(late), *F.shape[1:]))
+    def _product(self, F, error, doubt, time_bar):
+        """dx(T/2)/dx(0) and its bounds, the shift of its end within `time_bar` included."""
+        M, E, R = np.empty((3, len(time_bar), *F.shape[1:]))
         products(F, error, doubt, self.path.first, F.shape[1], M, E, R)
-        return M, E + late[:, None, None] * (abs(M) + E).max(axis=1, keepdims=True)
+        return M, E + time_bar[:, None, None] * (abs(M) + E).max(axis=1, keepdims=True)

@@ -189,8 +189,8 @@ def judged(system, points, matrices):
     return monodromy.Matrices.plain(*(np.ascontiguousarray(np.swapaxes(X, 1, 2)) for X in (M, E)))
 
 
-def _solve_some(system, structure, given, method, rtol, wanted, places, answer, results):
-    """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
+def _solve_some(system, structure, given, method, rtol, wanted, rows, answer, results):
+    """Answer points (N, parameters), each from its own monodromy matrix, at their `rows`."""
     # another method is asked to answer a second way: without what symmetries tell
     paired = structure != "none"
     points = monodromy.Points(
@@ -228,16 +228,16 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
         own = solved(np.arange(where.size), rung)
         best = assessed(slice(None), own)
         LADDER.climb(rung, own, best, solved, assessed)
-        answer.replace(places[where], best)
+        answer.replace(rows[where], best)
         if len(results.M):
-            results[places[where]] = own
+            results[rows[where]] = own
     lost = ~points.valid
-    answer.status[places[lost]] = np.where(
+    answer.status[rows[lost]] = np.where(
         points.rough[lost], status.NO_CONVERGENCE, status.INVALID_PARAMETERS
     )
     for name in ("verdict", "crossing"):
-        getattr(answer, name)[places[lost]] = UNDECIDED
-    answer.signs[:, places[lost]] = 0
+        getattr(answer, name)[rows[lost]] = UNDECIDED
+    answer.signs[:, rows[lost]] = 0
 
 
 def outputs(answer, results, period, computed, wanted):

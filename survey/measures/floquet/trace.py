@@ -202,10 +202,10 @@ class Symbol:
         return self if self >= 0 else -self
 
     def __floor__(self):
-        whole = math.floor(self.value)
-        self.graph.guard(self - whole, True)
-        self.graph.guard(whole + 1 - self, True)
-        return whole
+        floored = math.floor(self.value)
+        self.graph.guard(self - floored, True)
+        self.graph.guard(floored + 1 - self, True)
+        return floored
 
     def __floordiv__(self, other):
         return (self / other).__floor__()
@@ -306,23 +306,23 @@ class Graph:
         self.time = Symbol(self, {TIME: self.constant(1.0)}, time)
 
     def state(self, number, value):
-        """A state of a nonlinear system as a symbol; the number at this place is where its series begins."""
+        """A state of a nonlinear system as a symbol; the number at this node is where its series begins."""
         return Symbol(self, {self.basis("state", number): self.constant(1.0)}, value)
 
     def symbol(self, number, value):
-        """The number at this place as a symbol."""
+        """The number at this node as a symbol."""
         return Symbol(self, {ONE: number}, value)
 
     def constant(self, value):
-        """The place of a constant."""
+        """The node of a constant."""
         return self.number("constant", float(value))
 
-    def is_constant(self, place):
+    def is_constant(self, node):
         """Is the number the same for all parameters?"""
-        return self.numbers[place][0] == "constant"
+        return self.numbers[node][0] == "constant"
 
     def number(self, operation, *operands):
-        """The place of this number: the same for the same operation; constants are folded."""
+        """The node of this number: the same for the same operation; constants are folded."""
         key = (operation, *operands)
         if operation not in ("constant", "parameter") and all(
             self.is_constant(k) for k in operands
@@ -349,7 +349,7 @@ class Graph:
         return None if value is None or not math.isfinite(value) else self.constant(value)
 
     def basis(self, operation, *operands):
-        """The place of this basis function."""
+        """The node of this basis function."""
         key = (operation, *operands)
         if key not in self._series_places:
             if len(self.series) >= MOST:
@@ -442,7 +442,7 @@ class Graph:
         return Symbol(self, {at: self.constant(1.0)}, value)
 
     def single(self, x):
-        """The place of the basis function that the symbol is."""
+        """The node of the basis function that the symbol is."""
         if len(x.terms) == 1:
             ((basis, number),) = x.terms.items()
             if self.numbers[number] == ("constant", 1.0):
@@ -615,10 +615,10 @@ class Program:
         """What tells the symmetries of A in t."""
         return Waves(self)
 
-    def is_line(self, place):
+    def is_line(self, node):
         """Is the basis function linear in t?"""
-        operation, *operands = self.graph.series[place]
-        return place == TIME or (
+        operation, *operands = self.graph.series[node]
+        return node == TIME or (
             operation == "combination" and all(b in (ONE, TIME) for b, _c in operands[0])
         )
 
@@ -631,22 +631,22 @@ class Program:
         flow = self.graph.flow
         found, begun, later = list(flow), set(flow), []
 
-        def visit(place):
-            if place in begun:
+        def visit(node):
+            if node in begun:
                 return
-            begun.add(place)
-            operation, *operands = self.graph.series[place]
+            begun.add(node)
+            operation, *operands = self.graph.series[node]
             before = [b for b, _c in operands[0]] if operation == "combination" else operands[:2]
             function = operation in FUNCTIONS
             for k, b in enumerate(before):
                 if not (function and k == 1):
                     visit(b)
-            found.append(place)
+            found.append(node)
             if function:
                 later.append(before[1])
 
-        for place in (*self.used, *(basis for symbol in flow.values() for basis in symbol.terms)):
-            visit(int(place))
+        for node in (*self.used, *(basis for symbol in flow.values() for basis in symbol.terms)):
+            visit(int(node))
         while later:
             visit(later.pop())
         return np.array(found, dtype=np.int64)
@@ -692,17 +692,17 @@ class Program:
                 values[:, k], errors[:, k] = v, e
         return values, errors
 
-    def series(self, numbers, t, places, states=None, late=None):
-        """{place: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1,
+    def series(self, numbers, t, nodes, states=None, late=None):
+        """{node: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1,
         m).
 
         `states` are values and error bounds (n, N, m) of the states, to first order in their errors; `late`, of waves
-        {place: (N or 1, 1)}, bounds of further errors of their phases.
+        {node: (N or 1, 1)}, bounds of further errors of their phases.
         The bounds hold for the kernels, whose functions are those of the C library, rounded to 1 or 2 ulp.
         """
         values, errors = numbers
         u, found = ROUNDOFF_UP, {}
-        needed = self.needed(places)
+        needed = self.needed(nodes)
         with np.errstate(all="ignore"):
             for k in needed:
                 operation, *o = self.graph.series[k]
@@ -742,17 +742,17 @@ class Program:
                         + (2 if operation in ACCURATE else 6) * u * abs(v)
                     )
                 found[k] = v, e
-        return {k: found[k] for k in places}
+        return {k: found[k] for k in nodes}
 
-    def needed(self, places):
+    def needed(self, nodes):
         """Places of what these basis functions are made of, in order."""
         found, begun = [], set()
 
-        def visit(place):
-            if place in begun:
+        def visit(node):
+            if node in begun:
                 return
-            begun.add(place)
-            operation, *operands = self.graph.series[place]
+            begun.add(node)
+            operation, *operands = self.graph.series[node]
             if operation == "combination":
                 before = [b for b, _c in operands[0]]
             elif operation == "state":
@@ -761,10 +761,10 @@ class Program:
                 before = operands[: 2 if operation in ("product", "quotient") else 1]
             for b in before:
                 visit(b)
-            found.append(place)
+            found.append(node)
 
-        for place in places:
-            visit(int(place))
+        for node in nodes:
+            visit(int(node))
         return found
 
     def at(self, points, t, size, numbers=None, states=None):
@@ -803,8 +803,8 @@ class Program:
         found = self.series(numbers, t, self.used, late=late)
         wide = max((len(values) for values, _bars in found.values()), default=1)
         out = np.empty((2, len(self.used), wide, t.shape[1]))
-        for k, place in enumerate(self.used):
-            out[0, k], out[1, k] = found[place]
+        for k, node in enumerate(self.used):
+            out[0, k], out[1, k] = found[node]
         terms = self.terms.copy()
         terms[:, 0] = np.searchsorted(self.used, terms[:, 0])
         return terms, *out

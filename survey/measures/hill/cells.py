@@ -23,7 +23,7 @@ from survey.kernels.hill.cells import (
     ENOUGH,
     HALVED_X,
     HALVED_Y,
-    PLACE_X,
+    INDEX_X,
     PLACE_Y,
     STABLE_PART,
     UNSOLVED,
@@ -168,7 +168,7 @@ def _first(depth):
         for grid in np.meshgrid(*(np.arange(1 << at) for at in level), indexing="ij")
     )
     blocks = np.empty((i.size, BLOCK), np.int64)
-    blocks[:, HALVED_X], blocks[:, PLACE_X] = level[0], i
+    blocks[:, HALVED_X], blocks[:, INDEX_X] = level[0], i
     blocks[:, HALVED_Y], blocks[:, PLACE_Y] = level[1], j
     return blocks
 
@@ -177,7 +177,7 @@ def _series(solve, x, y, blocks, of):
     """The functions' series (B, 4, n, n) on blocks, and what each leaves open: tails in x, in y,
     the rest (B, 4, 3).
     """
-    middle_x, radius_x = _spans(x, blocks[:, HALVED_X], blocks[:, PLACE_X])
+    middle_x, radius_x = _spans(x, blocks[:, HALVED_X], blocks[:, INDEX_X])
     middle_y, radius_y = _spans(y, blocks[:, HALVED_Y], blocks[:, PLACE_Y])
     out = solve(
         (middle_x[:, None] + radius_x[:, None] * POINTS)[:, :, None],
@@ -204,10 +204,10 @@ def _series(solve, x, y, blocks, of):
     return series, np.stack([*tails, noise], axis=2)
 
 
-def _spans(side, halved, place):
+def _spans(side, halved, index):
     """Middle and half width of blocks, so often halved and at these places, along one side."""
     part = 0.5**halved
-    low, high = side.at(place * part), side.at((place + 1) * part)
+    low, high = side.at(index * part), side.at((index + 1) * part)
     return 0.5 * (low + high), 0.5 * (high - low)
 
 
@@ -217,10 +217,10 @@ def _gathered(x, y, depth, leaves, points):
     cells = np.empty((len(leaves), MERGED), np.int64)
     cells[:, VERDICT] = leaves[:, VERDICT]
     for axis in (0, 1):
-        halved, place = blocks[:, AXIS * axis + HALVED_X], blocks[:, AXIS * axis + PLACE_X]
+        halved, index = blocks[:, AXIS * axis + HALVED_X], blocks[:, AXIS * axis + INDEX_X]
         size = 1 << (depth[axis] - halved)
-        cells[:, AXIS * axis + LOW_X] = place * size
-        cells[:, AXIS * axis + HIGH_X] = (place + 1) * size
+        cells[:, AXIS * axis + LOW_X] = index * size
+        cells[:, AXIS * axis + HIGH_X] = (index + 1) * size
     parts = cells[:, :VERDICT] / np.repeat(2.0**depth, 2)
     area = x.length(parts[:, LOW_X], parts[:, HIGH_X]) * y.length(parts[:, LOW_Y], parts[:, HIGH_Y])
     stable, unstable = area @ leaves[:, STABLE_PART : UNSTABLE_PART + 1]

@@ -272,13 +272,13 @@ def _on(path, x, towards):
         i, piece = np.nonzero((away**2).sum(axis=2) <= (REACH * length) ** 2)
         i += first
         a, b, ta, tb = path.x[piece], path.x[piece + 1], path.along[piece], path.along[piece + 1]
-        whole = length[piece]
+        chord = length[piece]
         with np.errstate(all="ignore"):
-            s = np.clip(((x[i] - a) * (b - a)).sum(axis=1) / whole**2, 0, 1)[:, None]
+            s = np.clip(((x[i] - a) * (b - a)).sum(axis=1) / chord**2, 0, 1)[:, None]
         curve = (1 + 2 * s) * (1 - s) ** 2 * a + s**2 * (3 - 2 * s) * b
-        curve += whole[:, None] * (s * (1 - s) ** 2 * ta - s**2 * (1 - s) * tb)
+        curve += chord[:, None] * (s * (1 - s) ** 2 * ta - s**2 * (1 - s) * tb)
         same = (((1 - s) * ta + s * tb) * towards[i]).sum(axis=1) > TURN
-        found[i[same & (np.hypot(*(curve - x[i]).T) <= NEAR * whole)]] = True
+        found[i[same & (np.hypot(*(curve - x[i]).T) <= NEAR * chord)]] = True
     return found
 
 

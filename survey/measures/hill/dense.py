@@ -360,10 +360,10 @@ def _between(x, number, kept):
     """Which of the `kept` first of `number` nodes are on both sides of x (twice the last where
     there is none beyond), and the share of the way from one to the other.
     """
-    place = np.arccos(np.clip(np.nan_to_num(x), -1, 1)) * (number / np.pi) - 0.5
-    left = np.clip(np.floor(place), 0, kept - 1).astype(np.int64)
-    right = np.clip(np.floor(place) + 1, 0, kept - 1).astype(np.int64)
-    return left, right, np.where(right > left, place - left, 0.0)
+    node = np.arccos(np.clip(np.nan_to_num(x), -1, 1)) * (number / np.pi) - 0.5
+    left = np.clip(np.floor(node), 0, kept - 1).astype(np.int64)
+    right = np.clip(np.floor(node) + 1, 0, kept - 1).astype(np.int64)
+    return left, right, np.where(right > left, node - left, 0.0)
 
 
 def _discriminants(answers, rows, series, bars, x, nodal):

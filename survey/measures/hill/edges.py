@@ -262,14 +262,14 @@ def _complete(solve, rows, edges, low, high):
     """
     order = np.lexsort((edges[1], edges[0]))
     row, x, width, kind, index = (values[order] for values in edges)
-    place = np.searchsorted(rows, row)
+    row_at = np.searchsorted(rows, row)
     number, own = (
-        np.bincount(place, minlength=rows.size),
+        np.bincount(row_at, minlength=rows.size),
         np.arange(row.size) - np.searchsorted(row, row),
     )
     # of each row both ends, the middles between them and its edges, and its upper end again
     listed = np.full((rows.size, number.max(initial=0) + 2), float(high))
-    listed[:, 0], listed[place, own + 1] = low, x
+    listed[:, 0], listed[row_at, own + 1] = low, x
     points = np.pad(
         0.5 * (listed[:, :-1] + listed[:, 1:]), ((0, 0), (1, 1)), constant_values=(low, high)
     )
@@ -277,26 +277,26 @@ def _complete(solve, rows, edges, low, high):
     known = np.arange(points.shape[1]) < number[:, None] + 3
     last, close = number + 2, np.flatnonzero(own > 0)
     # between edges closer than their errors nothing is known, nor at an end that is an edge
-    known[place[close], own[close] + 1] = (
+    known[row_at[close], own[close] + 1] = (
         np.diff(x)[close - 1] > (width[1:] + width[:-1])[close - 1]
     )
     for end, at in ((low, np.zeros_like(last)), (high, last)):
-        on = place[abs(x - end) <= width]
+        on = row_at[abs(x - end) <= width]
         known[on, at[on]] = False
     sound = np.isfinite([out[name] for name in FACTORS]).all(axis=(0, 2))
     signs = np.stack(
         [np.where(known & (abs(out[n]) > out[f"{n}_error"]), np.sign(out[n]), 0) for n in FACTORS]
     )
     turns = np.zeros(signs.shape, int)
-    turns[kind, place, own + 2] = 1
+    turns[kind, row_at, own + 2] = 1
     # the factors change sign at their edges alone
     straight = signs * np.where(np.cumsum(turns, axis=2) % 2, -1, 1)
     sound &= ((straight >= 0).all(axis=2) | (straight <= 0).all(axis=2)).all(axis=0)
     # every edge lies between its tongue n and a band beside it, at the ends of the row too
     band = np.where(known, _band(out), np.nan)
-    before, after = (abs(band[place, own + side] - index) for side in (1, 2))
+    before, after = (abs(band[row_at, own + side] - index) for side in (1, 2))
     wrong = (before > 0.5) | (after > 0.5) | (before == after)
-    sound[place[wrong]] = False
+    sound[row_at[wrong]] = False
     each = np.arange(rows.size)
     return (
         sound

@@ -68,7 +68,7 @@ def _solve(problem, method, asked, answers, chosen):
         run(problem, method, on_rung, out)
         return out[points]
 
-    def again(points, rung):
+    def solve_at(points, rung):
         return run_at(np.arange(first.size)[chosen][points], rung)
 
     def assess(points, results):
@@ -83,7 +83,7 @@ def _solve(problem, method, asked, answers, chosen):
         status.STEP_LIMIT
     )
     answers.assess(results, rule)
-    ladder.climb(rung, results, answers, again, assess)
+    ladder.climb(rung, results, answers, solve_at, assess)
     answers.results = results
 
 

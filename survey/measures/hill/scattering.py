@@ -52,12 +52,12 @@ def solve(rho, rotates, oblate, wanted):
         return {}
     square = (rho - 1.0) * (rho + 1.0) if oblate else rho * rho
     known = np.isfinite(rho) & (square != 0.0) & (np.abs(rho) <= LARGEST_RHO)
-    places, where = np.unique(rho[known], return_inverse=True)
-    m = (places - 1.0) * (places + 1.0) if oblate else places * places
+    distinct, where = np.unique(rho[known], return_inverse=True)
+    m = (distinct - 1.0) * (distinct + 1.0) if oblate else distinct * distinct
     passages = []
     for side in (1.0, -1.0):
-        out = np.empty((places.size, scattering.PASSAGE))
-        scattering.jost(side * places, m, np.sqrt(np.abs(m)), m > 0, out)
+        out = np.empty((distinct.size, scattering.PASSAGE))
+        scattering.jost(side * distinct, m, np.sqrt(np.abs(m)), m > 0, out)
         there = np.full((scattering.PASSAGE, *rho.shape), np.nan)
         there[:, known] = out[where].T
         passages.append(there)

@@ -134,7 +134,7 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
     else:
         rung = np.searchsorted(ladder.rungs, method.danby_steps(e, asked))
 
-    def again(points, rung):
+    def solve_at(points, rung):
         return run(method, e[points], d1[points], d2[points], ladder.rungs[rung])
 
     def assess(points, results):
@@ -145,9 +145,9 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
     answers = Answers(e.size)
     answers.status[rung > ladder.top] = status.STEP_LIMIT
     first = np.flatnonzero(rung <= ladder.top)
-    results[first] = again(first, rung[first])
+    results[first] = solve_at(first, rung[first])
     answers.assess(results, rtol)
-    ladder.climb(rung, results, answers, again, assess)
+    ladder.climb(rung, results, answers, solve_at, assess)
     return answers
 
 

@@ -32,14 +32,14 @@ def at_times(found, those, points, times, drift):
     size = np.sqrt(np.abs(k))
     with np.errstate(all="ignore"):
         alpha, beta, t = a / size, b / size, times[rows] * (size / size_a)[:, None]
-        place, first, rate = _saddle(
+        saddle, first, rate = _saddle(
             alpha, beta, np.cos(theta), np.abs(p_theta) * np.sin(theta) / size
         )
         pole = np.where(theta == 0.0, 1.0, np.where(theta == np.pi, -1.0, 0.0))
         pole = np.where((k < 0.0) & (b == pole * a) & (p_theta == 0.0), pole, 0.0)
         up = pole != 0.0
-        place, first = (
-            np.where(up, pole, np.where(k > 0.0, place, np.nan)),
+        saddle, first = (
+            np.where(up, pole, np.where(k > 0.0, saddle, np.nan)),
             np.where(up, _first(pole), first),
         )
         rate = np.where(up, np.sqrt(np.maximum(4.0 - alpha**2, 0.0) + 8.0 * EPS), rate)
@@ -49,14 +49,14 @@ def at_times(found, those, points, times, drift):
         off = np.where(
             first[:, None] * grown <= REACH * rate[:, None] ** 2, first[:, None] * grown, np.nan
         )
-        one, two = 0.5 * _part(beta - alpha, 1.0 - place), 0.5 * _part(beta + alpha, 1.0 + place)
-        steep = _part(np.abs(one), np.abs(1.0 - place)) + _part(np.abs(two), np.abs(1.0 + place))
+        one, two = 0.5 * _part(beta - alpha, 1.0 - saddle), 0.5 * _part(beta + alpha, 1.0 + saddle)
+        steep = _part(np.abs(one), np.abs(1.0 - saddle)) + _part(np.abs(two), np.abs(1.0 + saddle))
         turned = 4.0 * steep[:, None] * off * np.minimum(np.abs(t), 1.0 / rate[:, None])
     own = drift[rows][:, None] * times[rows]
     psi, phi = (one + two)[:, None] * t, (two - one)[:, None] * t
     noise = 32.0 * EPS * (np.abs(one) + np.abs(two))[:, None] * np.abs(t) + turned
     answers = {
-        "u": (place[:, None] + 0.0 * off, off),
+        "u": (saddle[:, None] + 0.0 * off, off),
         "psi": (psi + 0.0 * off, noise),
         "phi": (phi + own + 0.0 * off, noise + 32.0 * EPS * np.abs(own)),
     }
@@ -70,12 +70,12 @@ def _saddle(alpha, beta, u, speed):
     """u0, a bound of what the state (u, |u'|) is off it, in u and u' over the rate, and a bound of
     the rate.
     """
-    place, bar = separatrix.saddles(alpha, beta)
+    saddle, bar = separatrix.saddles(alpha, beta)
     rate, width = separatrix.growth(alpha, beta, np.ones_like(alpha))
-    first = np.abs(u - place) + 4.0 * bar + 2.0 * EPS + 1.01 * speed / rate
+    first = np.abs(u - saddle) + 4.0 * bar + 2.0 * EPS + 1.01 * speed / rate
     # with the shift of L
     first = np.where(first <= REACH * rate**2, first * (1.0 + 8.0 * first), np.nan)
-    return place, first, rate + width
+    return saddle, first, rate + width
 
 
 def _first(pole):

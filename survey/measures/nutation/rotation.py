@@ -86,7 +86,7 @@ def at_times(rows, kinds, starts, periods, times, points, motion):
     size_a, size_c, a = (points[:, i, None] for i in (rc.SIZE_A, rc.SIZE_C, rc.P_PHI))
     some = np.empty((np.count_nonzero(turning), times.shape[1], 2, rt.PLACE))
     inside = np.ascontiguousarray((times / size_a)[turning])
-    rt.places(rows[turning], starts[turning], periods[turning], inside, some)
+    rt.fill_angles(rows[turning], starts[turning], periods[turning], inside, some)
     found[turning] = some
     still = kinds == nu.SEPARATRIX
     found[still] = resting.rotations(

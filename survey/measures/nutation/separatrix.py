@@ -71,7 +71,7 @@ def growth(alpha, beta, sign):
     u = np.where(sign > 0, u, np.nan)
     upright = (sign < 0) & (abs(alpha) == abs(beta)) & (abs(alpha) < 2.0)
     square = np.where(upright, (2.0 - alpha) * (2.0 + alpha), _square(u, alpha, beta, 1.0))
-    # to first order the energy of the saddle does not depend on its place
+    # to first order the energy of the saddle does not depend on its position
     off = np.where(upright, 0.0, 12.0 * (abs(u) + bar) * bar) + 32.0 * EPS * (
         1.0 + alpha**2 + beta**2
     )
@@ -116,7 +116,7 @@ class Loop:
         half = {1.0: 0.5 * (self.beta - self.alpha), -1.0: 0.5 * (self.beta + self.alpha)}
         parts = {end: end * c * self._integral(end, t) if c else 0.0 * t for end, c in half.items()}
         psi, phi = parts[1.0] + parts[-1.0], parts[-1.0] - parts[1.0] + self.drift * t
-        loss = (self.bar + 64.0 * EPS) / abs(self.kappa)  # of the rate and the place of u0
+        loss = (self.bar + 64.0 * EPS) / abs(self.kappa)  # of the rate and the position of u0
         off = loss * (1.0 + abs(t) * self.rate)
         turned = abs(parts[1.0]) + abs(parts[-1.0]) + abs(self.drift * t)
         steep = sum(2.0 * abs(c) / abs(end - u).min() ** 2 for end, c in half.items() if c)
@@ -161,11 +161,18 @@ def loop(alpha, beta, sign, drift):
             beta,
             drift,
         )
-    place, bar = (float(x[0]) for x in saddles(np.array([alpha]), np.array([beta])))
-    kappa = _square(place, alpha, beta, 1.0)
+    saddle, bar = (float(x[0]) for x in saddles(np.array([alpha]), np.array([beta])))
+    kappa = _square(saddle, alpha, beta, 1.0)
     if not kappa > 0.0:
         return None
-    side = 1.0 if place <= 0.0 else -1.0  # of the loop whose end is farther from u0
+    side = 1.0 if saddle <= 0.0 else -1.0  # of the loop whose end is farther from u0
     return Loop(
-        place, bar, kappa, 2.0 * place, side * np.sqrt(4.0 * place**2 + kappa), alpha, beta, drift
+        saddle,
+        bar,
+        kappa,
+        2.0 * saddle,
+        side * np.sqrt(4.0 * saddle**2 + kappa),
+        alpha,
+        beta,
+        drift,
     )

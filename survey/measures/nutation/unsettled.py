@@ -21,12 +21,12 @@ def settle(out, points, solver, valid, request, known=False):
     from a separatrix whose existence is in doubt.
     """
     doubt = np.isinf(out[f"{DISTANCE}_error"]) if DISTANCE in out else np.zeros(valid.size, bool)
-    again = valid & doubt
+    unsettled = valid & doubt
     if request.method == "auto":
-        again |= valid & _open(out, request)
+        unsettled |= valid & _open(out, request)
     if known:
-        again &= (out["status"] == OK) & (out["verdict"] >= nu.NUTATION)
-    for i in np.flatnonzero(again):
+        unsettled &= (out["status"] == OK) & (out["verdict"] >= nu.NUTATION)
+    for i in np.flatnonzero(unsettled):
         _solve(out, i, points[:, i], solver, request.method == "auto")
     if DISTANCE in out:
         out[f"{DISTANCE}_error"][np.isnan(out[DISTANCE])] = np.nan

@@ -50,8 +50,8 @@ def works():
     """Motions that share nothing, at the same times each; and one time each."""
     states = _states(NUMBER, 1)
     rows = {name: values[:, None] for name, values in states.items()}
-    whole = rows | {"t": np.linspace(0.0, LAST, TIMES)[None, :]}
-    return {f"{TIMES} times": (whole, {}), "one time": (states | {"t": np.full(NUMBER, LAST)}, {})}
+    grid = rows | {"t": np.linspace(0.0, LAST, TIMES)[None, :]}
+    return {f"{TIMES} times": (grid, {}), "one time": (states | {"t": np.full(NUMBER, LAST)}, {})}
 
 
 def system(point, options):

@@ -53,8 +53,8 @@ def works():
     """A line, a map, and points that share nothing."""
     random = np.random.default_rng(1)
     scattered = {"W": random.uniform(1.0, 2.6, 20_000), "e": random.uniform(0.0, 0.6, 20_000)}
-    line, whole = _map(np.array([0.3]), 10_000), _map(np.linspace(0.0, 0.6, 400), 600)
-    return {"line": (line, {}), "map 400x600": (whole, {}), "scattered": (scattered, {})}
+    line, grid = _map(np.array([0.3]), 10_000), _map(np.linspace(0.0, 0.6, 400), 600)
+    return {"line": (line, {}), "map 400x600": (grid, {}), "scattered": (scattered, {})}
 
 
 def _map(e, number):

@@ -40,8 +40,8 @@ def works():
     """A row, a map, and points that share nothing."""
     random = np.random.default_rng(1)
     scattered = {"mu": random.uniform(0.0, 0.05, 30_000), "e": random.uniform(0.0, LARGEST, 30_000)}
-    row, whole = _map(np.array([0.3]), 10_000), _map(np.linspace(0.0, LARGEST, 400), 600)
-    return {"row": (row, {}), "map 400x600": (whole, {}), "scattered": (scattered, {})}
+    row, grid = _map(np.array([0.3]), 10_000), _map(np.linspace(0.0, LARGEST, 400), 600)
+    return {"row": (row, {}), "map 400x600": (grid, {}), "scattered": (scattered, {})}
 
 
 def _map(e, number):

@@ -43,9 +43,9 @@ def works():
         "a": random.uniform(0.0, LARGE[1], 3_000),
         "q": random.uniform(0.0, LARGE[2] / 3, 3_000),
     }
-    whole = _map(np.linspace(0.0, SMALL[2], 400), 600)
+    grid = _map(np.linspace(0.0, SMALL[2], 400), 600)
     return {
-        "row": (_map(np.array([3.0]), 10_000), {}), "map 400x600": (whole, {}), "map 400x600, all outputs": (whole, {}),
+        "row": (_map(np.array([3.0]), 10_000), {}), "map 400x600": (grid, {}), "map 400x600, all outputs": (grid, {}),
         "scattered": (scattered, {}), "large a, q": (large, {}),
     }  # fmt: skip
 

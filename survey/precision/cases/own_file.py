@@ -30,11 +30,11 @@ def case(path):
     row |= {names[0]: found.values(names[0], ROW)[None, :]}
     works = {"row": (row, {}), "scattered": (scattered(SCATTERED, 1), {})}
     if len(names) > 1:
-        whole = {
+        grid = {
             names[1]: found.values(names[1], MAP[0])[:, None],
             names[0]: found.values(names[0], MAP[1])[None, :],
         }
-        works["map {}x{}".format(*MAP)] = (across | whole, {})
+        works["map {}x{}".format(*MAP)] = (across | grid, {})
     exact = known(truth, scattered(POINTS, 5), {}, ERROR)
     most = {"rk4": 500, "dop853": 500}
     return SimpleNamespace(
