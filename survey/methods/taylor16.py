@@ -22,6 +22,7 @@ from survey.kernels.jit import kernel, splice
 from survey.kernels.lanes import chain, scatter
 from survey.kernels.libration import danby
 from survey.kernels.libration.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
+from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.unroll import largest, unroll
 
 ORDER = 16
@@ -55,7 +56,7 @@ WIDTH = _DEGREE + 4
 _TAIL, _SIZE, _ALIAS = _DEGREE + 1, _DEGREE + 2, _DEGREE + 3
 # a faster fall than this of two Legendre coefficients to the next two is not trusted
 _SLOWEST = 0.02
-_ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
+_ROUNDING = 4.0 * ROUNDOFF  # of an entry of one step, about four roundings
 _ENDS = OWN + WIDTH
 
 

@@ -664,16 +664,16 @@ def _hill(
             f"PERIOD = {period!r}: it must be a positive number, or a function of p that returns one"
         )
     breaks = _checked_breaks(breaks, period, "u", refuse)
-    c, place = None, None
+    c, named = None, None
     if isinstance(damping, str) or damping != 0:
         from survey.request.damped_scene import DampedScene, checked_damping
 
-        c, place = checked_damping(damping, refuse)
-        if place is not None and place not in names:
-            parameters = _parameters((*parameters, place), monodromy.OUTPUTS, (), refuse)
-            names.append(place)
-    damped = c is not None or place is not None
-    equation = f"y'' + 2 {place or 'c'} y' + z(u, p) y = 0" if damped else "y'' + z(u, p) y = 0"
+        c, named = checked_damping(damping, refuse)
+        if named is not None and named not in names:
+            parameters = _parameters((*parameters, named), monodromy.OUTPUTS, (), refuse)
+            names.append(named)
+    damped = c is not None or named is not None
+    equation = f"y'' + 2 {named or 'c'} y' + z(u, p) y = 0" if damped else "y'' + z(u, p) y = 0"
     about, title = _titled(name, about, title, equation, parameters)
     known = (z, period, breaks, parameters, even, *([damping] if damped else []))
     shared = dict(
@@ -682,7 +682,7 @@ def _hill(
     )  # fmt: skip
     if damped:
         return DampedScene(
-            damping=c, place=names.index(place) if place else None, even=bool(even), **shared
+            damping=c, column=names.index(named) if named else None, even=bool(even), **shared
         )
     return HillScene(EVEN=bool(even), **shared)
 

@@ -18,12 +18,12 @@ import numpy as np
 
 from survey.kernels.jit import inline, splice
 from survey.kernels.libration.traces import A_BAR, B_BAR, C_BAR, D_BAR, T_BAR, A, B, C, D, T
-from survey.kernels.math.roundoff import EPS
+from survey.kernels.math.roundoff import EPS, ROUNDOFF
 from survey.kernels.unroll import largest, unroll
 
 TILE = 64
 VECTOR = 8
-ROUNDING = 4.4e-16  # of an entry of one step, about four roundings
+ROUNDING = 4.0 * ROUNDOFF  # of an entry of one step, about four roundings
 WORST = 300.0
 # Rows of the working table, lanes innermost: the propagator so far (4 x 4), V (upper triangle), the
 # sum of local errors; of each lane d1, d2, e; of each column forward (4), backward (4) and the
