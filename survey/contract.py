@@ -42,9 +42,10 @@ class Function:
 def check(module, table, where, elsewhere=lambda name: ""):
     """Raise BadInput, in one line, if the module does not keep to the table.
 
-    `table` is {name: Value | Function}, and `where` the file in which it stands; `elsewhere` says of a name where else
-    it has a meaning.
+    `table` is {name: Value | Function}; `where` is the file in which it stands, or {name: file};
+    `elsewhere` says of a name where else it has a meaning.
     """
+    files = where if isinstance(where, str) else " and ".join(dict.fromkeys(where.values()))
     for name in public(module.__file__):
         if name not in table:
             near = get_close_matches(name, table, n=1, cutoff=0.6)
@@ -52,7 +53,7 @@ def check(module, table, where, elsewhere=lambda name: ""):
             refuse(
                 module,
                 f"{name} is not in the table{hint} (a helper's name begins with an underscore)",
-                where,
+                files,
             )
     check_offered(module, table, where)
 
@@ -61,11 +62,13 @@ def check_offered(module, table, where):
     """As `check`, but the module may have other public names besides, which are not nearly those of
     entries that it lacks.
     """
+    files = dict.fromkeys(table, where) if isinstance(where, str) else where
     lacking = [name for name in table if not hasattr(module, name)]
     for name in public(module.__file__):
         if name not in table and (near := get_close_matches(name, lacking, n=1, cutoff=0.8)):
-            refuse(module, f"{name} is not in the table, but {near[0]!r} is", where)
+            refuse(module, f"{name} is not in the table, but {near[0]!r} is", files[near[0]])
     for name, entry in table.items():
+        where = files[name]
         if not hasattr(module, name):
             if entry.needed(module) if callable(entry.needed) else entry.needed:
                 refuse(module, f"{name} is missing: {entry.meaning}", where)
@@ -127,4 +130,5 @@ def _named(kind):
 
 def refuse(module, words, where):
     """Raise BadInput: the module does not keep to the table in `where`."""
-    raise BadInput(f"{module.__file__}: {words}; the table is in {where}")
+    verb = "tables are" if " and " in where else "table is"
+    raise BadInput(f"{module.__file__}: {words}; the {verb} in {where}")

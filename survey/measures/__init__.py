@@ -162,23 +162,23 @@ def _serving(scene, name):
 @cache
 def check(module):
     """Raise BadInput if the method does not keep to the tables of the families that it serves."""
-    where, table = ["survey/methods/__init__.py"], dict(methods.CONTRACT)
+    own, table = "survey/methods/__init__.py", dict(methods.CONTRACT)
+    where = dict.fromkeys(table, own)
     if not hasattr(module, "SERVES"):
-        contract.refuse(module, f"SERVES is missing: {table['SERVES'].meaning}", where[0])
+        contract.refuse(module, f"SERVES is missing: {table['SERVES'].meaning}", own)
     for family in module.SERVES:
         folder = _folder(family)
         if folder is None:
-            contract.refuse(module, f"SERVES names no family {family!r}", where[0])
+            contract.refuse(module, f"SERVES names no family {family!r}", own)
         table |= folder.METHODS[family]
-        where.append(f"survey/measures/{folder.__name__.rpartition('.')[2]}/__init__.py")
-    contract.check(module, table, " and ".join(where), _of_another_family)
+        file = f"survey/measures/{folder.__name__.rpartition('.')[2]}/__init__.py"
+        where |= dict.fromkeys(folder.METHODS[family], file)
+    contract.check(module, table, where, _of_another_family)
     for name in ("COST", "ABOUT"):
         if unknown := [
             family for family in getattr(module, name, ()) if family not in module.SERVES
         ]:
-            contract.refuse(
-                module, f"{name} has {unknown[0]!r}, which SERVES does not name", where[0]
-            )
+            contract.refuse(module, f"{name} has {unknown[0]!r}, which SERVES does not name", own)
 
 
 def _of_another_family(name):

@@ -38,7 +38,7 @@ METHODS["orbit"] = METHODS["floquet"] | {
             "order",
             "terms",
             "numbers",
-            "places",
+            "states_at",
             "x0",
             "span",
             "steps",
