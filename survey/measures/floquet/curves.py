@@ -28,7 +28,6 @@ from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
-from survey.measures.segments import UNKNOWN
 from survey.scene import Output, Request
 
 CLASSES = {
@@ -100,8 +99,11 @@ def searched(scene, square, axes, fixed, options):
     def nearly(function, x):
         return function(*roughly(x))
 
-    def draw(kind, x, error):
+    def draw(kind, x, error, counted=False):
         sure, angle, bar, outside = bifurcations.passing(*matrices(x, RTOL)[:2], kind, structure)
+        if counted:  # it is a curve, though several multipliers that pass together may be uncertain
+            angle, bar, outside = (np.where(sure, one, np.nan) for one in (angle, bar, outside))
+            sure = np.ones_like(sure)
         for part in contours.runs(sure):
             known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
             found.append((kind, square.parameters(x[part]), error[part], known))
@@ -153,8 +155,19 @@ def searched(scene, square, axes, fixed, options):
         passed = {
             kind: one.reshape(number, number) for kind, one in scene.passed(*on_lattice[2:]).items()
         }
-    curves = joined(found, [output.name for output in ALONG])
     counts = row_count.outside(*on_lattice[:2], structure).reshape(number, number)
+    if scene.FAMILY != "orbit":
+
+        def beyond(x):
+            return row_count.known(row_count.outside(*matrices(x, RTOL)[:2], structure))
+
+        def kind_of(x):
+            return counted_edges.kind(matrices(x[None], RTOL)[0][0], structure)
+
+        for kind, x, error in narrow.counted(beyond, kind_of, row_count.known(counts), drawn):
+            draw(kind, x, error + square.grain, counted=True)
+            drawn += [(kind, x)] * 2  # perhaps of two that pass together: see `segments`
+    curves = joined(found, [output.name for output in ALONG])
     curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
     return curves
 
@@ -170,8 +183,7 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
         return np.stack([x, np.full(x.size, square.across)], axis=1)
 
     def outside(x):
-        number = row_count.outside(*matrices(on_line(x), RTOL)[:2], structure)
-        return np.where(number >= 0, number, UNKNOWN)[0]
+        return row_count.known(row_count.outside(*matrices(on_line(x), RTOL)[:2], structure))[0]
 
     def kind_of(x):
         return counted_edges.kind(matrices(on_line(x), RTOL)[0][0], structure)
@@ -181,9 +193,9 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
         for kind, parameters, _error, _known in found
         for x in square.positions(parameters)[:, 0]
     ]
-    number = row_count.outside(*on_lattice[:2], structure)
+    number = row_count.known(row_count.outside(*on_lattice[:2], structure))
     ticks = np.linspace(0.0, 1.0, number.size)
-    counted = [(outside, kind_of, np.where(number >= 0, number, UNKNOWN), CLASSES.values())]
+    counted = [(outside, kind_of, number, CLASSES.values())]
     solved, names = indices
     on_ticks = solved(on_line(ticks)) if names else {}
     for kind, name in names.items():

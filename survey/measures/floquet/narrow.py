@@ -1,12 +1,15 @@
-"""Curves of tongues that a lattice does not see, and of closed ones, from the Maslov index.
+"""Curves that no function of `bifurcations` shows, from numbers that are counted: of tongues that a
+lattice does not see, and of closed ones, from the Maslov index; where two multipliers, or two
+pairs, pass the unit circle together, as those of two equal oscillators do, from the number outside.
 
 On both sides of a tongue that is narrower than the cells of the lattice a function of
 `bifurcations` has the same sign, and no curve is found; but where its two edges count the same way,
 the index has changed by 2. Segments between points of the lattice along which curves do not explain
 how it changes are halved, by the index in between, until each of them is short. A closed tongue, or
 one that is narrower still, keeps both edges in one segment, and is drawn by two curves at the same
-place. Places on neighbouring lines of the lattice belong to one curve where the index takes the
-same step.
+position. Points on neighbouring lines of the lattice belong to one curve where the index takes the
+same step. Where two multipliers pass together, a function touches zero without a change of sign,
+and the number outside the circle changes by twice as many.
 """
 
 from collections import Counter
@@ -14,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from survey.measures.floquet import row_count
 from survey.measures.segments import UNKNOWN, segments
 
 SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
@@ -61,13 +65,38 @@ def curves(index, function, passed, kind, drawn):
     `index(positions (N, 2))` is the index, `passed` (n, n) its values on the lattice, and
     `function(positions)` that of `bifurcations` with its bounds, which is 0 on the curves.
     """
-    own, found = [one for one in drawn if one[0] == kind], []
+
+    def passes(x):  # the index of a system that jumps does so without a passage
+        return abs(function(x)[0]) <= ZERO
+
+    own = [one for one in drawn if one[0] == kind]
+    return [piece[:2] for piece in _missing(index, passes, passed, own, {}, lambda x: kind)]
+
+
+def counted(outside, kind_of, counts, drawn):
+    """[(kind, positions (m, 2), errors (m))] of all curves that are missing among those `drawn`
+    [(kind, positions)].
+
+    `outside(positions (N, 2))` is the number of multipliers outside the unit circle, `counts`
+    (n, n) its values on the lattice, both UNKNOWN where it is not certain, and `kind_of(position)`
+    the kind of a curve there. A curve that several multipliers pass together is found once.
+    """
+    found = _missing(outside, None, counts, list(drawn), row_count.WEIGHTS, kind_of)
+    once = {x.tobytes(): (kind, x, error) for x, error, kind in found}
+    return list(once.values())
+
+
+def _missing(index, passes, passed, own, weights, kind_of):
+    """[(positions (m, 2), errors (m), kind)] of curves that are missing among its `own` [(kind,
+    positions)], to which they are added.
+    """
+    found = []
     ticks = np.linspace(0.0, 1.0, len(passed))
-    lost = _unexplained(passed, own)
+    lost = _unexplained(passed, own, weights)
     for axis, _number in Counter(axis for axis, *_ in lost).most_common():
         lines = passed if axis == 1 else passed.T
         if found:  # along the one axis, which explains most of the other
-            lost = _unexplained(passed, own)
+            lost = _unexplained(passed, own, weights)
         where = np.array([segment[1:] for segment in lost if segment[0] == axis], int).reshape(
             -1, 3
         )
@@ -75,22 +104,21 @@ def curves(index, function, passed, kind, drawn):
         segments = _shortened(index, segments, axis, ticks)
         if not segments.line.size:
             continue
-        values, _bars = function(_positions(segments, axis, ticks))
-        # the index of a system that jumps does so without a passage
-        segments = segments[abs(values) <= ZERO]
-        pieces = _linked(segments, axis, ticks)
-        found += pieces
-        own += [(kind, x) for x, _error in pieces]
+        if passes:
+            segments = segments[passes(_positions(segments, axis, ticks))]
+        for x, error in _linked(segments, axis, ticks):
+            found.append((x, error, kind_of(x[len(x) // 2])))
+            own.append((found[-1][2], x))
     return found
 
 
-def _unexplained(passed, own):
+def _unexplained(passed, own, weights):
     """The segments along which the index changes otherwise; the border's too, where no curve counts
     that ends there.
     """
     return [
         segment
-        for segment, explained in segments(passed, own, {}, border=0).items()
+        for segment, explained in segments(passed, own, weights, border=0).items()
         if not explained
     ]
 

@@ -29,9 +29,14 @@ def outside(M, E, structure):
         within = np.where(discs.together, high[:, None, :], 0.0).max(axis=2) < 1.0
         if structure != "none":
             within |= discs.on_circle
-        known = (beyond | within).all(axis=1)
-        found[i : i + CHUNK] = np.where(known, beyond.sum(axis=1), -1)
+        certain = (beyond | within).all(axis=1)
+        found[i : i + CHUNK] = np.where(certain, beyond.sum(axis=1), -1)
     return found
+
+
+def known(counts):
+    """The numbers of `outside`, UNKNOWN where they are not certain."""
+    return np.where(counts >= 0, counts, UNKNOWN)
 
 
 def unexplained(counts, curves, passed=None):
@@ -39,7 +44,7 @@ def unexplained(counts, curves, passed=None):
     lattice over the unit square, -1 where not known, and the curves [(kind, positions (m, 2))];
     `passed` {kind: (n, n)} are the Maslov indices of those kinds that have one.
     """
-    all_of = segments(np.where(counts >= 0, counts, UNKNOWN), curves, WEIGHTS)
+    all_of = segments(known(counts), curves, WEIGHTS)
     for kind, index in (passed or {}).items():
         for segment, explained in segments(
             index, [one for one in curves if one[0] == kind], {}

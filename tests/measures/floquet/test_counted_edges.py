@@ -5,18 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import survey
+from survey.request.workflow import check
+from survey.sweep import boundaries
 
 ROOT = Path(__file__).parents[3]
 
 
 def stiffness(t, p, out):
-    out[0, 0] = out[1, 1] = p[0] + p[1] * cos(2 * t)
+    for k in range(len(out)):
+        out[k, k] = p[0] + p[1] * cos(2 * t)
 
 
 def damping(t, p, out):
-    out[0, 0] = out[1, 1] = 2 * p[2]
+    for k in range(len(out)):
+        out[k, k] = 2 * p[2]
 
 
 @pytest.mark.parametrize("q", [0.3, 0.8])
@@ -32,6 +37,42 @@ def test_two_equal_damped_oscillators_have_the_edges_of_one(q):
     assert found.edge.size == known.edge.size == 1 and (found.edge_error < 1e-11).all()
     assert (abs(found.edge - known.edge) <= found.edge_error + known.edge_error).all()
     assert found.edge_class.values.tolist() == [2]  # minus_one
+
+
+def test_two_equal_damped_oscillators_have_the_curves_of_one():
+    """Every point has an edge of the one oscillator within its error, along an axis or the other."""
+    systems = [
+        survey.floquet(
+            K=stiffness, C=damping, period=pi, parameters=("a", "q", "c"), states=("x", "y")[:n]
+        )
+        for n in (2, 1)
+    ]
+    axes = {
+        "a": {"start": 0.0, "stop": 5.0, "num": 3},
+        "q": {"start": 0.0, "stop": 3.0, "num": 3},
+        "c": 0.05,
+    }
+    both, one = (
+        boundaries.find(check({"scene": s, "axes": axes, "boundaries": {}})) for s in systems
+    )
+    assert set(both.curve_class.values) == set(one.curve_class.values) == {1, 2}
+    assert both.curve_position_error.max() < 1e-8
+    assert both.curve_count.sum() > 0.8 * one.curve_count.sum()
+    assert both.attrs.get("curves_unexplained", 0) <= 10  # at the tips of the tongues; all: 273
+    held = np.zeros(both.curve_a.size, bool)
+    for axis, width in (("a", 5.0), ("q", 3.0)):
+        reach = (both.curve_position_error.values + 1e-13) * width
+        x = {name: both[f"curve_{name}"].values for name in ("a", "q")}
+        sides = [
+            survey.evaluate(
+                systems[1],
+                **{name: xr.DataArray(v + side * reach * (name == axis), dims="k") for name, v in x.items()},
+                c=0.05, rtol=1e-12, variables=["spectral_radius"],
+            ).spectral_radius.values
+            for side in (-1, 1)
+        ]  # fmt: skip
+        held |= (sides[0] - 1.0) * (sides[1] - 1.0) <= 0.0
+    assert held.all()
 
 
 def test_two_equal_undamped_oscillators_have_the_edges_of_one():
