@@ -72,3 +72,12 @@ def test_the_files_that_others_expect_are_there():
     for name in ("bug.yml", "scene.yml"):
         form = yaml.safe_load((ABOUT / "ISSUE_TEMPLATE" / name).read_text())
         assert {"name", "description", "body"} <= set(form)
+
+
+def test_a_tag_publishes_what_it_names():
+    release = yaml.safe_load((ABOUT / "workflows" / "release.yml").read_text())
+    assert release[True]["push"]["tags"] == ["v*"]  # YAML 1.1 reads the key `on` as true
+    assert release["jobs"]["publish"]["needs"] == "build"
+    steps = " ".join(step.get("run", "") for step in release["jobs"]["build"]["steps"])
+    assert f"dist/{PROJECT['name'].replace('-', '_')}-${{GITHUB_REF_NAME#v}}" in steps
+    assert PROJECT["urls"]["Package index"].endswith(f"/project/{PROJECT['name']}/")
