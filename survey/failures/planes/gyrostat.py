@@ -59,9 +59,9 @@ def _separatrix(six, phi0, saddle):
 def _ends(six, phi0, w0, angle=1e9):
     """(phi where each solution of w0 (N) turns, True where it turns before `angle`)."""
     points = np.array([(*six, phi0, w, angle) for w in w0])
-    out = np.empty((len(points), 6))
+    out = np.empty((len(points), gyrostat_flow.COLUMNS))
     gyrostat_flow.along(points, 1e-30, out)
-    return out[:, 0], out[:, 4] == 1.0
+    return out[:, gyrostat_flow.VALUE], out[:, gyrostat_flow.TURNED] == 1.0
 
 
 def _threshold(six, phi0, low, high):
