@@ -179,12 +179,13 @@ def found(method, s, rtol, whole):
     if not kb.numbers(pieces, falls, first, turning, resting):
         return None
     gaps = len(pieces) + keys
-    links, seeds = np.zeros((2 * gaps + keys, 4), np.int64), np.zeros(len(curves) + 1, np.int64)
+    links = np.zeros((2 * gaps + keys, kb.LINK), np.int64)
+    seeds = np.zeros(len(curves) + 1, np.int64)
     size, cuts = kb.neighbours(pieces, order, curve, falls, first, turning, links, seeds)
     if size < 0:
         return None
     parent, turns, counts, loops = (
-        np.zeros(shape, np.int64) for shape in (gaps, gaps, gaps, (gaps, 2))
+        np.zeros(shape, np.int64) for shape in (gaps, gaps, gaps, (gaps, kb.LOOPS))
     )
     open_ = np.zeros(gaps, dtype=bool)
     kb.regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
@@ -348,9 +349,13 @@ def _fates(method, s, rtol, lattice, regions):
     for members, (one, two) in zip(regions_of, rows, strict=True):
         winds, counts = one[rc.NET_TURNS] != kf.NO_TURNS, one[rc.TURNINGS] >= 0
         loops = regions.loops[regions.parent[members[0]]]
-        if one[rc.VERDICT] == kf.UNDECIDED or not np.array_equal(one, two) or (winds and loops[0]):
+        if (
+            one[rc.VERDICT] == kf.UNDECIDED
+            or not np.array_equal(one, two)
+            or (winds and loops[kb.BY_TURNS])
+        ):
             continue
-        if (counts and loops[1]) or one[rc.TURNINGS] == kf.UNDETERMINED:
+        if (counts and loops[kb.BY_TURNINGS]) or one[rc.TURNINGS] == kf.UNDETERMINED:
             continue
         out[members] = _moved(
             np.tile(one, (len(members), 1)), regions.turns[members], regions.counts[members]
