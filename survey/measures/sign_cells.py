@@ -18,6 +18,8 @@ from survey.kernels.hill.cells import (
     LEAF,
     PLACE_X,
     STABLE_PART,
+    TAIL_X,
+    TAIL_Y,
     UNSOLVED,
     UNSTABLE_PART,
     VERDICT,
@@ -43,7 +45,7 @@ def _descend(series, doubts, blocks, depth, halves):
         verdict = decided(own, slack[of])
         # a block whose own series is too loose is solved again, if it can be halved
         loose = (verdict == UNDECIDED) & (
-            doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)
+            doubts[of][:, :, [TAIL_X, TAIL_Y]].sum(axis=2) > ENOUGH * _sizes(own)
         ).any(axis=1)
         whole = (
             (where == blocks[of]).all(axis=1)

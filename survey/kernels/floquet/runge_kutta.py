@@ -8,7 +8,17 @@ import math
 
 import numpy as np
 
-from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, ROW, extend
+from survey.kernels.floquet.program import (
+    ADDED,
+    BASIS,
+    COLUMN,
+    FACTOR,
+    FIRST,
+    LAST,
+    NUMBER,
+    ROW,
+    extend,
+)
 from survey.kernels.floquet.steps import lanes_of
 from survey.kernels.jit import kernel
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
@@ -149,8 +159,8 @@ def motion(operations, signs, inside, order, terms, numbers, places, x0, span, s
                 own = K[stage]
                 own[:] = 0.0
                 for c in range(n):
-                    for k in range(operations[order[c], 3], operations[order[c], 4]):
-                        own[c, 0] += S[inside[k, 0], 0, 0] * V[inside[k, 1], 0]
+                    for k in range(operations[order[c], FIRST], operations[order[c], LAST]):
+                        own[c, 0] += S[inside[k, ADDED], 0, 0] * V[inside[k, FACTOR], 0]
                 for q in range(len(terms)):
                     value = S[terms[q, BASIS], 0, 0] * V[terms[q, NUMBER], 0]
                     for c in range(n):

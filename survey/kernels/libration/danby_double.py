@@ -45,27 +45,32 @@ SCALED, BEFORE, SUM, OTHER, OFF, SCALED_OFF, BEFORE_OFF, BOUND, TAIL, LIVE = (
 SIZE = LIVE + LANES
 # Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of
 # them, and BARS further on the bounds of their errors.
+# Of a point, each in two columns, high and low: d1 and d2 of `danby`; 1 + e and 1 - e.
+FIRST_RATE, SECOND_RATE = 0, 2
+ONE_PLUS, ONE_MINUS = 0, 2
 LOW, BARS, RESULTS = INVARIANTS, 2 * INVARIANTS, 3 * INVARIANTS
 
 
 @kernel
 def rates(mu, out):
-    """d1, d2 of `danby` as pairs, (N, 4): (3 / 2)(1 +- s) with s^2 = 1/4 + 3 (1/2 - mu)^2: nothing
+    """FIRST_RATE and SECOND_RATE, (N, 4): (3 / 2)(1 +- s) with s^2 = 1/4 + 3 (1/2 - mu)^2: nothing
     cancels.
     """
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
         d1 = dd.times(dd.shifted(dd.sqrt(square), 1.0), 1.5)
-        out[i, 0], out[i, 1] = d1
-        out[i, 2], out[i, 3] = dd.div(dd.times(dd.times(dd.two_sum(1.0, -mu[i]), mu[i]), 6.75), d1)
+        out[i, FIRST_RATE], out[i, FIRST_RATE + 1] = d1
+        out[i, SECOND_RATE], out[i, SECOND_RATE + 1] = dd.div(
+            dd.times(dd.times(dd.two_sum(1.0, -mu[i]), mu[i]), 6.75), d1
+        )
 
 
 @kernel
 def shapes(e, out):
-    """1 + e and 1 - e as pairs, (N, 4)."""
+    """ONE_PLUS and ONE_MINUS, (N, 4)."""
     for i in range(len(e)):
-        out[i, 0], out[i, 1] = dd.two_sum(1.0, e[i])
-        out[i, 2], out[i, 3] = dd.two_sum(1.0, -e[i])
+        out[i, ONE_PLUS], out[i, ONE_PLUS + 1] = dd.two_sum(1.0, e[i])
+        out[i, ONE_MINUS], out[i, ONE_MINUS + 1] = dd.two_sum(1.0, -e[i])
 
 
 @kernel
@@ -114,7 +119,7 @@ def chain(shapes, rates, out):
 @inline
 def nearest(shape):
     """How far off u = 0 the singularities of the second part are."""
-    return sqrt(shape[2] / shape[0])
+    return sqrt(shape[ONE_MINUS] / shape[ONE_PLUS])
 
 
 @inline
@@ -148,7 +153,8 @@ def prepare(left, right, shape, part, rates, work, lane):
     """The constants of a step in z, u = middle + half z, and the first coefficients, in the lanes
     of one point.
     """
-    more, less = (shape[0], shape[1]), (shape[2], shape[3])
+    more = shape[ONE_PLUS], shape[ONE_PLUS + 1]
+    less = shape[ONE_MINUS], shape[ONE_MINUS + 1]
     b0, b2 = (less, more) if part else (more, less)
     middle, half = dd.scaled(dd.two_sum(left, right), 0.5), dd.scaled(dd.two_sum(right, -left), 0.5)
     square, linear, last = dd.square(middle), dd.scaled(dd.mul(middle, half), 2.0), dd.square(half)
@@ -157,8 +163,8 @@ def prepare(left, right, shape, part, rates, work, lane):
     put(work, TURN + lane, dd.scaled(dd.div(half, a0), 2.0))
     put(work, TURN_1 + lane, dd.div(linear, a0))
     put(work, TURN_2 + lane, dd.div(last, a0))
-    put(work, RATE_G + lane, dd.mul(by_r, (-rates[2], -rates[3])))
-    put(work, RATE_K + lane, dd.mul(by_r, (rates[0], rates[1])))
+    put(work, RATE_G + lane, dd.mul(by_r, (-rates[SECOND_RATE], -rates[SECOND_RATE + 1])))
+    put(work, RATE_K + lane, dd.mul(by_r, (rates[FIRST_RATE], rates[FIRST_RATE + 1])))
     put(work, RATE_1 + lane, dd.div(dd.mul(b2, linear), c0))
     put(work, RATE_2 + lane, dd.div(dd.mul(b2, last), c0))
     for c in range(lane, lane + COLUMNS):

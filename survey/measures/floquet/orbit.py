@@ -10,6 +10,7 @@ made of all outputs, by `existence`.
 
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
                 equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False
             )
             for k in np.flatnonzero(found.good):
-                of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
+                of_point[own[k]].append(Seen.of(found, k, count + k))
             full = np.ones(len(own), bool)
             parts.append(found.outputs(full, rtol, wanted, callable(equation.period)))
             count += len(own)
@@ -113,29 +114,38 @@ def followed(equation, continued, points, reach):
         yield where, equation.pinned(points[where], x), T  # curves are cubics between their points
 
 
+class Seen(NamedTuple):
+    """An orbit that was found at a point: the mean square of its states, x0, T, and its number."""
+
+    square: float
+    x0: tuple
+    T: float
+    number: int
+
+    @classmethod
+    def of(cls, found, i, number):
+        """Orbit i of a Found."""
+        return cls(found.square[i], tuple(found.x[i]), found.T[i], number)
+
+
 def numbered(orbits, free):
-    """The numbers of different orbits, by the mean squares of their states, then x0, from (square,
-    x0, T, number).
-    """
+    """The numbers of different orbits that were Seen, by the mean squares of their states, then x0."""
     kept = []
     for one in sorted(orbits):
-        size = SAME * one[0] ** 0.5
-        same = (
-            abs(np.subtract(one[1], other[1])).max() <= size
-            for other in kept
-            if _near(one[0], other[0])
-        )
+        size = SAME * one.square**0.5
+        alike = [other for other in kept if _near(one.square, other.square)]
         if free:
-            same = (
-                abs(one[2] - other[2]) <= SAME * one[2] for other in kept if _near(one[0], other[0])
-            )
+            same = (abs(one.T - other.T) <= SAME * one.T for other in alike)
+        else:
+            same = (abs(np.subtract(one.x0, other.x0)).max() <= size for other in alike)
         if not any(same):
             kept.append(one)
     for i in range(1, len(kept)):
         for k in range(i, 0, -1):
-            if _near(kept[k][0], kept[k - 1][0]) and kept[k][1] < kept[k - 1][1]:
-                kept[k - 1], kept[k] = kept[k], kept[k - 1]
-    return [one[3] for one in kept]
+            before, after = kept[k - 1], kept[k]
+            if _near(after.square, before.square) and after.x0 < before.x0:
+                kept[k - 1], kept[k] = after, before
+    return [one.number for one in kept]
 
 
 def _near(a, b):

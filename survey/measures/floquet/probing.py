@@ -32,7 +32,7 @@ def suspects(program):
             code, a, b, first, last = program.operations[place]
             if code == pg.COMBINATION:
                 degree[place] = max(
-                    (visit(int(k)) for k in program.inside[first:last, 0]), default=0
+                    (visit(int(k)) for k in program.inside[first:last, pg.ADDED]), default=0
                 )
             elif code == pg.PRODUCT:
                 degree[place] = visit(int(a)) + visit(int(b))

@@ -568,8 +568,8 @@ class Program:
             if graph.numbers[number] != ("constant", 0.0)
         ]
         terms.sort()
-        self.terms = np.array(terms, dtype=np.int64).reshape(-1, 4)
-        self.used = np.unique(np.concatenate([[ONE], self.terms[:, 0]])).astype(np.int64)
+        self.terms = np.array(terms, dtype=np.int64).reshape(-1, pg.TERM)
+        self.used = np.unique(np.concatenate([[ONE], self.terms[:, pg.BASIS]])).astype(np.int64)
         rows, inside, weights = [], [], []
         for k, (operation, *operands) in enumerate(graph.series):
             code, a, b, first, last, sign = pg.CODES[operation], 0, 0, 0, 0, 1.0
@@ -593,7 +593,7 @@ class Program:
                     code += pg.OF_LINE
             rows.append((code, a, b, first, last))
             weights.append(sign)
-        self.operations = np.array(rows, dtype=np.int64).reshape(-1, 5)
+        self.operations = np.array(rows, dtype=np.int64).reshape(-1, pg.OPERATION)
         self.signs = np.array(weights)
         self.inside = np.array(inside, dtype=np.int64).reshape(-1, 2)
         self.order = self._order()
@@ -603,7 +603,7 @@ class Program:
         """Which numbers the kernel reads: those of the parameters on which nothing depends are not
         among them.
         """
-        return np.unique(np.concatenate([self.terms[:, 3], self.inside[:, 1]]))
+        return np.unique(np.concatenate([self.terms[:, pg.NUMBER], self.inside[:, pg.FACTOR]]))
 
     @property
     def analytic(self):
@@ -806,7 +806,7 @@ class Program:
         for k, place in enumerate(self.used):
             out[0, k], out[1, k] = found[place]
         terms = self.terms.copy()
-        terms[:, 0] = np.searchsorted(self.used, terms[:, 0])
+        terms[:, pg.BASIS] = np.searchsorted(self.used, terms[:, pg.BASIS])
         return terms, *out
 
     def holds(self, points, low, high):

@@ -22,6 +22,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from survey.kernels.hill import dop853, sampled_double
+from survey.kernels.hill.answers import SQUARES
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math import chebyshev
@@ -233,7 +234,7 @@ def walked(z, points, rows, steps, scale, tolerance):
 
 def solved_exactly(z, points, rows, steps, scale, even, exact, number):
     """The results of the `points`, each of one of the `rows`, in double-double, in its `number` of steps."""
-    out = np.full((rows.size, RESULTS + (0 if even else sampled_double.SQUARES)), np.nan)
+    out = np.full((rows.size, RESULTS + (0 if even else SQUARES)), np.nan)
     for i in np.flatnonzero(number <= EXACT_STEPS):
         start = steps.of(rows[i : i + 1], number[i])[0][0]
         with multiprecision.LOCK:
