@@ -153,10 +153,8 @@ def column(matrix, y, v, s, t, w):
     low, high = c * s + d * t, c * t + d * w
     # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose
     # its positive sign
-    round_y, round_v = (
-        ROUNDING * (a * (a * s) + b * (b * w)),
-        ROUNDING * (c * (c * s) + d * (d * w)),
-    )
+    round_y = ROUNDING * (a * (a * s) + b * (b * w))
+    round_v = ROUNDING * (c * (c * s) + d * (d * w))
     s = left * a + right * b + (error_y * error_y + LEAST + round_y)
     t = left * c + right * d
     w = low * c + high * d + (error_v * error_v + LEAST + round_v)

@@ -162,7 +162,8 @@ def _serving(scene, name):
 @cache
 def check(module):
     """Raise BadInput if the method does not keep to the tables of the families that it serves."""
-    where, table = ["survey/methods/__init__.py"], dict(methods.CONTRACT)
+    where = ["survey/methods/__init__.py"]
+    table = dict(methods.CONTRACT)
     if not hasattr(module, "SERVES"):
         contract.refuse(module, f"SERVES is missing: {table['SERVES'].meaning}", where[0])
     for family in module.SERVES:

@@ -40,7 +40,8 @@ def along(values, ticks, met, weights_of, optional=()):
     `ticks` of a line, or UNKNOWN, which meets curves at `met` [(kind, position)]; `weights_of` and
     `optional` as in `segments`. What is perhaps drawn twice may count or not.
     """
-    places, found = np.array([place for _, place in met]), {}
+    places = np.array([place for _, place in met])
+    found = {}
     weights = np.array([weights_of.get(kind, 1) for kind, _ in met], int)
     _, kinds = np.unique([kind for kind, _ in met], return_inverse=True)
     near = (abs(places[:, None] - places) < NEAR) & (kinds[:, None] == kinds)

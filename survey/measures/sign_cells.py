@@ -39,8 +39,11 @@ def find(solve, x, y, each, report, values):
 
 def _descend(series, doubts, blocks, depth, halves):
     """As `kernels.hill.cells.descend`: leaves (M, LEAF) of blocks, cells of one size halved together."""
-    leaves, slack = [], doubts.sum(axis=2)
-    own, where, of = series, blocks.astype(np.int64), np.arange(len(blocks))
+    leaves = []
+    slack = doubts.sum(axis=2)
+    own = series
+    where = blocks.astype(np.int64)
+    of = np.arange(len(blocks))
     while len(where):
         verdict = decided(own, slack[of])
         # a block whose own series is too loose is solved again, if it can be halved

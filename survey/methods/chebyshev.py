@@ -211,9 +211,9 @@ def _motion(row, start, n, noise, times, waves, out):
         up = side * here[_UP] - base_up + 2.0 * pi * turns * waves[_UP, 0]
         down = side * here[_DOWN] - base_down + 2.0 * pi * turns * waves[_DOWN, 0]
         delay = 2.0 * noise * (abs(times[j]) + half)
-        wide, bend = (
-            row[nu.WIDTH],
-            row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
+        wide = row[nu.WIDTH]
+        bend = row[nu.WIDTH] * (
+            row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]
         )
         speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[_TIME]
         rate_up, rate_down = value[_UP] / value[_TIME], value[_DOWN] / value[_TIME]

@@ -100,7 +100,10 @@ def solved(source, sides, rtol, budget=BUDGET, progress=None):
     `progress(done, total, 0, what)` is called with the part of the rectangle that is served or
     given up.
     """
-    left, found, spent, settled = deque([(tuple(sides), (0, 0))]), [], 0, 0.0
+    left = deque([(tuple(sides), (0, 0))])
+    found = []
+    spent = 0
+    settled = 0.0
     while left and spent < budget:
         if progress is not None:
             progress(max(int(PARTS * settled), min(spent, 1)), PARTS, 0, "parts of the map")
@@ -200,7 +203,9 @@ def _holds(source, panel, middle, radius):
 
 def _file(workflow, source, axes, sides, fixed, panels, proof):
     """The bytes of the file (the format: workflows/docs/model.md)."""
-    places, numbers, first = [], [], 0
+    places = []
+    numbers = []
+    first = 0
     for panel in panels:
         terms = []
         for own in panel.series:

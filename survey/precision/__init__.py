@@ -181,7 +181,9 @@ def measure(scene, case, peers=False, say=lambda line: None):
     ):
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
-    full, shared, whole = case.works(), _shared(module), getattr(case, "ALL", ())
+    full = case.works()
+    shared = _shared(module)
+    whole = getattr(case, "ALL", ())
     thinned = {work: (_thinned(point), options) for work, (point, options) in full.items()}
     records = []
     for (method, peer), (solve, most) in runs.items():
@@ -413,7 +415,9 @@ def _per_point(solve, point, options, rtol):
 
     Those that compile do not count, as for the first points that need double-double arithmetic.
     """
-    times, compiled, begin = [], [], time.perf_counter()
+    times = []
+    compiled = []
+    begin = time.perf_counter()
     while len(times + compiled) < REPEATS and (
         not times or time.perf_counter() - begin < ENOUGH_SECONDS
     ):
@@ -451,7 +455,8 @@ def _sample(point, most, shared=()):
             name: values[chosen] if len(values) == rows else values
             for name, values in point.items()
         }
-    names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]
+    names = list(point)
+    flat = [values.ravel() for values in np.broadcast_arrays(*point.values())]
     chosen = np.random.default_rng(0).permutation(flat[0].size)[:most]
     return {name: values[chosen] for name, values in zip(names, flat, strict=True)}
 

@@ -544,7 +544,8 @@ def _from_text(name: str, text: str) -> FunctionScene:
     _check_names(name, module, form)
     title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
     if form == "abel":
-        about, period = module.__doc__ or inspect.getdoc(module.f), getattr(module, "PERIOD", None)
+        about = module.__doc__ or inspect.getdoc(module.f)
+        period = getattr(module, "PERIOD", None)
         return _abel(
             module.f, module.g, period, module.PARAMETERS, name, text, title, about, references
         )

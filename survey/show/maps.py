@@ -104,10 +104,8 @@ def _shown(axes, ds, variable, state, dpi):
     """
     if max(variable.shape) <= MAX_DRAWN:
         return variable.compute(), state.compute(), {}
-    box, points = (
-        axes.get_window_extent(),
-        Points(variable, state, scene_statuses(ds), with_statuses=True),
-    )
+    box = axes.get_window_extent()
+    points = Points(variable, state, scene_statuses(ds), with_statuses=True)
     pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
     overview = Overview(
         points, np.clip(CELLS_PER_PIXEL * pixels, 1, MAX_CELLS).astype(int)

@@ -276,10 +276,8 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
             # still wanted: multiples of pi / n inside
             for j in range(1, n):
                 sin, cos = sine_cosine(times(PI, j / (2.0 * n)))
-                down, up = (
-                    times(mul(half, mul(sin, sin)), 2.0),
-                    times(mul(half, mul(cos, cos)), 2.0),
-                )
+                down = times(mul(half, mul(sin, sin)), 2.0)
+                up = times(mul(half, mul(cos, cos)), 2.0)
                 u = sub(uh, down) if abs(uh[0]) < abs(ul[0]) else add(ul, up)
                 v, w = add(vh, down), add(wl, up)
                 q = root(add(mul(add(mul(k, u), kS), u), q0))
@@ -398,12 +396,10 @@ def doubts(A, k, L, a, b, c, low, high, u0, e, work, found, o):
 def states(points, most, out):
     """points (N, STATE): SIZE_A to P_PHI of `records`; out (N, COLUMNS)."""
     work = (np.empty((5, 2)), np.empty((5, 2)), np.empty((5, 2)))
-    found, ends, c, one = (
-        np.empty((8, 2)),
-        np.empty((8, TURNING)),
-        np.empty((5, 2)),
-        np.empty(_WELL),
-    )
+    found = np.empty((8, 2))
+    ends = np.empty((8, TURNING))
+    c = np.empty((5, 2))
+    one = np.empty(_WELL)
     for i in range(len(points)):
         q, o = points[i], out[i]
         o[:] = np.nan
@@ -519,12 +515,10 @@ def integrals(points, sign, ratio, most, out):
     """points (N, INTEGRALS): ENERGY, ALPHA, BETA of `records`; out (N, 2, COLUMNS): of each well, lower u first."""
     work = (np.empty((5, 2)), np.empty((5, 2)), np.empty((5, 2)))
     marks = np.empty((8, 2))
-    found, ends, c, one = (
-        np.empty((8, 2)),
-        np.empty((8, TURNING)),
-        np.empty((5, 2)),
-        np.empty(_WELL),
-    )
+    found = np.empty((8, 2))
+    ends = np.empty((8, TURNING))
+    c = np.empty((5, 2))
+    one = np.empty(_WELL)
     for i in range(len(points)):
         q, o = points[i], out[i]
         o[:] = np.nan

@@ -54,7 +54,8 @@ def points(mu, e, tolerance, out):
         x[:] = 0.0
         for n in range(4):
             x[n, n, 0] = 1.0
-        at, steps, largest = (0.0, 0.0), 0, 1.0
+        at = (0.0, 0.0)
+        steps, largest = 0, 1.0
         left = PI
         while left[0] > 0.0 and steps < MOST:
             steps += 1

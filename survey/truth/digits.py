@@ -73,7 +73,8 @@ def _factors(scene, z, p):
     )
     end = period / 2 if scene.EVEN else period
     ends = [0.0, *sorted({x for x in breaks.tolist() if 0.0 < x < end}), end]
-    flow, doubt, steps, largest = (mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(1)), 0.0, 0, 1.0
+    flow = mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(1)
+    doubt, steps, largest = 0.0, 0, 1.0
     for low, high in pairwise(ends):
         flow, error, more, size = _piece(lambda u: z(u, exact), mp, flow, mp.mpf(low), mp.mpf(high))
         doubt, steps, largest = doubt + error, steps + more, max(largest, size)
@@ -91,7 +92,8 @@ def _piece(z, mp, flow, u, end):
     """The flow y1, y2, y1', y2' at the end of a smooth piece, the local errors' sum, steps, the
     largest entry.
     """
-    h, doubt, steps, largest = end - u, 0.0, 0, 1.0
+    h = end - u
+    doubt, steps, largest = 0.0, 0, 1.0
     # a jump at an end of the piece belongs to the other side
     inside = (end - u) * mp.mpf(2) ** -110
     low, high = u + inside, end - inside

@@ -111,11 +111,9 @@ def along(given, answer):
     found = {"wrong": {"turning": wrong}}
     for names, here in ((("w", "t"), true == 0), (("phi_turning", "t_turning"), true == 1)):
         for name, c, j in zip(names, (VALUE, TIME), (0, 1), strict=True):
-            value, low, d = (
-                _spread(ok, out[:, c]),
-                _spread(ok, out[:, c + 1]),
-                _spread(ok, doubt[:, j]),
-            )
+            value = _spread(ok, out[:, c])
+            low = _spread(ok, out[:, c + 1])
+            d = _spread(ok, doubt[:, j])
             said = np.isfinite(answer[name])
             found[name] = np.where(here & said, value, np.nan), low, d
     return found

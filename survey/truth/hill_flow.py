@@ -79,12 +79,10 @@ def rate(which, given, direction):
 @kernel
 def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, out):
     """Half-period factors of points, and T/2: out (N, COLUMNS)."""
-    w, w2, w3, z = (
-        np.zeros((2, TERMS)),
-        np.zeros((2, TERMS)),
-        np.zeros((2, TERMS)),
-        np.zeros((2, TERMS)),
-    )
+    w = np.zeros((2, TERMS))
+    w2 = np.zeros((2, TERMS))
+    w3 = np.zeros((2, TERMS))
+    z = np.zeros((2, TERMS))
     y = np.zeros((4, 2, TERMS))
     state = np.zeros((4, 4))
     for i in range(len(given)):

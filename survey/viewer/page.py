@@ -53,7 +53,10 @@ class Page:
     """One page in a browser, on the survey `shown` (a `shown.Map`)."""
 
     def __init__(self, shown, document):
-        self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
+        self.map = shown
+        self.document = document
+        self.waiting = set()
+        self.pointer = None
         self.share = 0.0  # of the map that had been read when it was last drawn
         # the Map of the window solved afresh, of which view, and when
         self.finer = self.finer_of = self.timer = None
@@ -145,7 +148,8 @@ class Page:
         }
         ds = boundaries.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
         x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
-        thin, found = max(1, x.size // CURVE_POINTS), boundaries.curves_of(ds)
+        thin = max(1, x.size // CURVE_POINTS)
+        found = boundaries.curves_of(ds)
         for name, curve in self.curves.items():
             parts = [slice(part.start, part.stop, thin) for part in found.get(name, [])]
             points = [x[part] for part in parts], [y[part] for part in parts]
@@ -424,7 +428,8 @@ class Page:
         coords, survey = self.map.coords(self.view), self.map.ds.survey
         try:
             if coords is None:
-                coords, survey = {}, finer.of_point(self.map, self.view).survey
+                coords = {}
+                survey = finer.of_point(self.map, self.view).survey
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
             survey.trajectory(figure=drawn, **coords)
             self.motion.text = widgets.picture(drawn)

@@ -60,7 +60,8 @@ class Map:
             for name, v in ds.data_vars.items()
             if dims <= set(v.dims) and not name.endswith("_error")
         ]
-        self.title, self.options = plain(ds.attrs.get("title", "")), options_in_words(ds)
+        self.title = plain(ds.attrs.get("title", ""))
+        self.options = options_in_words(ds)
         # further dimensions: of the survey, and of some outputs
         self.others = list(
             dict.fromkeys(

@@ -91,7 +91,10 @@ def _roots(n):
     x, away = two_sided("distance to the separatrix, $w_0 - w_s$", np.linspace(-15.5, -0.5, n))
     gaps, phi0, place = np.linspace(-6.0, 0.0, n), 0.3, 2.0
     s, c, s2, c2 = math.sin(place), math.cos(place), math.sin(2 * place), math.cos(2 * place)
-    d, c23, systems, speeds = 1.1, 0.3, [], []
+    d = 1.1
+    c23 = 0.3
+    systems = []
+    speeds = []
     for gap in 10.0**gaps:  # g(place) = 0, g'(place) = gap
         a, b = d * c * s + c23 * c2, d * c2 - 2 * c23 * s2 + gap
         systems.append((0.0, 0.0, d, c23, a * c - b * s, -a * s - b * c))

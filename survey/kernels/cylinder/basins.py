@@ -64,10 +64,8 @@ def _hermite(piece, x):
     size = piece[X1] - piece[X0]
     t = (x - piece[X0]) / size
     r = 1.0 - t
-    a, b = (
-        piece[Y0] * (1.0 + 2.0 * t) + size * piece[D0] * t,
-        piece[Y1] * (1.0 + 2.0 * r) - size * piece[D1] * r,
-    )
+    a = piece[Y0] * (1.0 + 2.0 * t) + size * piece[D0] * t
+    b = piece[Y1] * (1.0 + 2.0 * r) - size * piece[D1] * r
     return a * r * r + b * t * t
 
 
@@ -478,11 +476,9 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
 
     loops[root]: BY_TURNS, BY_TURNINGS.
     """
-    head, after, queue = (
-        np.full(gaps, -1),
-        np.empty(size, dtype=np.int64),
-        np.empty(gaps, dtype=np.int64),
-    )
+    head = np.full(gaps, -1)
+    after = np.empty(size, dtype=np.int64)
+    queue = np.empty(gaps, dtype=np.int64)
     for k in range(size):
         late = links[k, LATE]
         after[k], head[late] = head[late], k

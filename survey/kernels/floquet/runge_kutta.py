@@ -85,12 +85,10 @@ def factors(
             new = K[stage]
             new[:] = 0.0
             for q in range(len(terms)):
-                row, column, weight, basis = (
-                    terms[q, ROW] * n,
-                    terms[q, COLUMN] * n,
-                    W[q],
-                    S[terms[q, BASIS], 0],
-                )
+                row = terms[q, ROW] * n
+                column = terms[q, COLUMN] * n
+                weight = W[q]
+                basis = S[terms[q, BASIS], 0]
                 for c in range(n):
                     one, two = new[row + c], Y[column + c]
                     for lane in range(lanes):
@@ -128,12 +126,10 @@ def motion(operations, signs, inside, order, terms, numbers, places, x0, span, s
     `flow.flow`.
     """
     n = x0.shape[1]
-    S, V, t, zero = (
-        np.zeros((len(operations), 1, 1)),
-        np.empty((numbers.shape[1], 1)),
-        np.empty(1),
-        np.zeros(1),
-    )
+    S = np.zeros((len(operations), 1, 1))
+    V = np.empty((numbers.shape[1], 1))
+    t = np.empty(1)
+    zero = np.zeros(1)
     y, K, new = np.empty((n, n + 1)), np.empty((STAGES, n, n + 1)), np.empty((n, n + 1))
     for i in range(len(x0)):
         for k in range(numbers.shape[1]):

@@ -131,14 +131,10 @@ def _sure(sums, bars, f):
 @inline
 def decide(sums, bars):
     """The verdict of the cell: unstable <=> y1 y2' < 0 or y1' y2 > 0."""
-    first, second = (
-        _sure(sums, bars, 0) and _sure(sums, bars, 1),
-        _sure(sums, bars, 2) and _sure(sums, bars, 3),
-    )
-    cosine, sine = (
-        (sums[0, CONSTANT] > 0.0) == (sums[1, CONSTANT] > 0.0),
-        (sums[2, CONSTANT] > 0.0) != (sums[3, CONSTANT] > 0.0),
-    )
+    first = _sure(sums, bars, 0) and _sure(sums, bars, 1)
+    second = _sure(sums, bars, 2) and _sure(sums, bars, 3)
+    cosine = (sums[0, CONSTANT] > 0.0) == (sums[1, CONSTANT] > 0.0)
+    sine = (sums[2, CONSTANT] > 0.0) != (sums[3, CONSTANT] > 0.0)
     if (first and not cosine) or (second and not sine):
         return UNSTABLE
     return STABLE if first and second else UNDECIDED
@@ -161,10 +157,8 @@ def _too_short(sums, bars, doubt, here, block, depth):
     share = ENOUGH * 0.5 ** max(left_x, left_y) if full else BLURRED
     for f in range(4):
         if not _sure(sums, bars, f):
-            most, size = (
-                max(share * sums[f, REST], doubt[f, OTHER]),
-                abs(sums[f, CONSTANT]) + sums[f, REST],
-            )
+            most = max(share * sums[f, REST], doubt[f, OTHER])
+            size = abs(sums[f, CONSTANT]) + sums[f, REST]
             x |= not doubt[f, TAIL_X] <= most
             y |= not doubt[f, TAIL_Y] <= most
             hidden_x |= not doubt[f, TAIL_X] <= size

@@ -105,11 +105,9 @@ def _form(at, c0, rho, out):
     quartic = p * p / 3.0 - g / 6.0
     moved = 2.0 * p * slope - 2.0 * s * at[_COS_X] * xi
     # H2 = e11 c1^2 + 2 e12 c1 c2 + e22 c2^2
-    e11, e12, e22 = (
-        0.5 * (d1 * d1 + z * y1 * y1),
-        0.5 * (d1 * d2 + z * y1 * y2),
-        0.5 * (d2 * d2 + z * y2 * y2),
-    )
+    e11 = 0.5 * (d1 * d1 + z * y1 * y1)
+    e12 = 0.5 * (d1 * d2 + z * y1 * y2)
+    e22 = 0.5 * (d2 * d2 + z * y2 * y2)
     b11, b12, b22 = y1 * y1, y1 * y2, y2 * y2
     out[_C1_4] = quartic * b11 * b11 - 0.5 * moved * e11 * b11
     out[_C1_2_C2_2] = 6.0 * quartic * b11 * b22 - 0.5 * moved * (

@@ -101,10 +101,8 @@ def chain(shapes, rates, out):
                 for i in range(POINTS):
                     at = first + min(i, count - 1)
                     near = nearest(shapes[at]) if part else 1.0
-                    left, right = (
-                        step_end(n, numbers[part], near, part),
-                        step_end(n + 1, numbers[part], near, part),
-                    )
+                    left = step_end(n, numbers[part], near, part)
+                    right = step_end(n + 1, numbers[part], near, part)
                     prepare(left, right, shapes[at], part, rates[at], work, COLUMNS * i)
                 columns(work)
                 for i in range(count):
@@ -199,12 +197,10 @@ def extend(work, n):
     """Coefficient n + 1 of all series; the sum over its parity and the other one change places."""
     least = SMALL if n > FIRST else 0.0
     for i in range(LANES):
-        x, g, k, m = (
-            pair(work, NOW + X + i),
-            pair(work, NOW + G + i),
-            pair(work, NOW + K + i),
-            pair(work, NOW + M + i),
-        )
+        x = pair(work, NOW + X + i)
+        g = pair(work, NOW + G + i)
+        k = pair(work, NOW + K + i)
+        m = pair(work, NOW + M + i)
         off_x, off_g, off_k, off_m = (
             work[OFF + X + i],
             work[OFF + G + i],
@@ -289,10 +285,8 @@ def propagator(ends, doubt, step, off):
             s, bound = (0.0, 0.0), 0.0
             for n in range(4):
                 k, m, sign = (j + 2) % 4, (n + 2) % 4, 1.0 if (n < 2) == (j < 2) else -1.0
-                f, b = (
-                    (ends[0, 0, i, n], ends[0, 1, i, n]),
-                    (sign * ends[1, 0, k, m], sign * ends[1, 1, k, m]),
-                )
+                f = (ends[0, 0, i, n], ends[0, 1, i, n])
+                b = (sign * ends[1, 0, k, m], sign * ends[1, 1, k, m])
                 s = dd.add(s, dd.mul(f, b))
                 bound += (
                     doubt[0, i, n] * abs(b[0])
@@ -341,14 +335,10 @@ def finish(composed, spread, steps, out):
     row_bars(spread, steps, bars)
     for at in range(INVARIANTS - 1):
         i, j = 0 if at in (A, D) else 2, 0 if at in (A, C) else 2
-        a, b = (
-            (composed[0, i, j], composed[1, i, j]),
-            (composed[0, i, j + 1], composed[1, i, j + 1]),
-        )
-        c, d = (
-            (composed[0, i + 1, j], composed[1, i + 1, j]),
-            (composed[0, i + 1, j + 1], composed[1, i + 1, j + 1]),
-        )
+        a = (composed[0, i, j], composed[1, i, j])
+        b = (composed[0, i, j + 1], composed[1, i, j + 1])
+        c = (composed[0, i + 1, j], composed[1, i + 1, j])
+        d = (composed[0, i + 1, j + 1], composed[1, i + 1, j + 1])
         one, other = dd.mul(a, d), dd.mul(b, c)
         out[at], out[LOW + at] = dd.sub(one, other)
         bar = (
@@ -360,10 +350,8 @@ def finish(composed, spread, steps, out):
     t, bar = (0.0, 0.0), 0.0
     for i in range(2):
         for j in range(2):
-            a, b = (
-                (composed[0, i, j], composed[1, i, j]),
-                (composed[0, 2 + i, 2 + j], composed[1, 2 + i, 2 + j]),
-            )
+            a = (composed[0, i, j], composed[1, i, j])
+            b = (composed[0, 2 + i, 2 + j], composed[1, 2 + i, 2 + j])
             t = dd.add(t, dd.mul(a, b))
             bar += (
                 bars[i] * abs(b[0])

@@ -173,10 +173,8 @@ def solved(normal_forms, mu, order, remainders=False):
     norms (2, 3, N)}.
     """
     what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
-    values, norms = (
-        np.empty((3, len(what.diagonal), mu.size)),
-        np.empty((len(what.measured), 2, 3, mu.size)),
-    )
+    values = np.empty((3, len(what.diagonal), mu.size))
+    norms = np.empty((len(what.measured), 2, 3, mu.size))
     normal_forms(*what[:6], mu, values, norms)
     return values, dict(zip(what.measured, norms, strict=True))
 

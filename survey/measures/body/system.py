@@ -92,7 +92,8 @@ def _cross_matrix(v):
 
 def read(numbers):
     """The System of one row of NAMES; None where A is not positive definite or gamma is 0."""
-    entries, tensors = dict(zip(NAMES, numbers, strict=True)), []
+    entries = dict(zip(NAMES, numbers, strict=True))
+    tensors = []
     for tensor in TENSORS:
         matrix = np.empty((3, 3))
         for entry, (i, j) in ENTRIES.items():
@@ -144,10 +145,8 @@ class Placed:
 
         Each step of the flow counts four roundings of |f| |w| + |g|.
         """
-        b, c = (
-            np.hypot(*self.six[:2]),
-            np.hypot(0.5 * self.six[2], self.six[3]) + np.hypot(*self.six[4:]),
-        )
+        b = np.hypot(*self.six[:2])
+        c = np.hypot(0.5 * self.six[2], self.six[3]) + np.hypot(*self.six[4:])
         shares = [
             np.sum(bars) / size
             for bars, size in ((self.six_bars[:2], b), (self.six_bars[2:], c))
@@ -195,7 +194,8 @@ def frame(axis):
 def _placed(system, axis):
     Q = frame(axis)
     b = system.turned(Q)
-    a, norms = b.A[0, 0], [np.abs(x).max() for x in (b.A, b.B, b.C, b.moment, b.s)]
+    a = b.A[0, 0]
+    norms = [np.abs(x).max() for x in (b.A, b.B, b.C, b.moment, b.s)]
     cos, sin, phi0 = b.nu[0], math.hypot(b.nu[1], b.nu[2]), math.atan2(b.nu[1], b.nu[2])
     if abs(cos) <= ROUNDING:
         cos, sin = 0.0, 1.0

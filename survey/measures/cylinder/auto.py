@@ -78,7 +78,8 @@ def _trajectories(method, rtol, rows, times, served):
             results, _left_open(results, rtol), partial(solve, taylor_double), rows, times
         )
     results = solve(closed, rows, times)
-    missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
+    missed = solution.missed(results, rtol)
+    uncounted = results[1] == UNDETERMINED
     if uncounted.any():
         missed |= uncounted
         results[0][uncounted] = np.nan
@@ -117,7 +118,8 @@ def _left_open(results, rtol):
     """The points that double-double arithmetic may still answer: those that miss rtol, unless by
     too many steps or an overflow, and those that have turned an undetermined number of times.
     """
-    status, missed = results[-1], solution.missed(results, max(rtol, FINEST))
+    status = results[-1]
+    missed = solution.missed(results, max(rtol, FINEST))
     if missed.any():
         missed &= (
             (status == OK)

@@ -151,10 +151,8 @@ def found(method, s, rtol, whole):
     limits = _limits(s, scale)
     if limits is None:
         return None
-    top, most = (
-        min(max(whole.fastest, scale), 0.5 * limits.min()),
-        min(max(2 * whole.starts, PIECES[0]), PIECES[1]),
-    )
+    top = min(max(whole.fastest, scale), 0.5 * limits.min())
+    most = min(max(2 * whole.starts, PIECES[0]), PIECES[1])
     for cells in (COARSE, FINE):
         breaks, numbers, edges = _lattice(s, cells)
         falls = (_forces(s.p, 0.5 * (edges[1:] + edges[:-1])) < 0.0).astype(np.int64)
@@ -171,11 +169,9 @@ def found(method, s, rtol, whole):
     )
     pieces, curve = pieces[order], curve[order]
     keys = 2 * len(falls)
-    first, turning, resting = (
-        np.zeros(keys + 1, np.int64),
-        np.zeros(keys, np.int64),
-        np.zeros(keys, np.int64),
-    )
+    first = np.zeros(keys + 1, np.int64)
+    turning = np.zeros(keys, np.int64)
+    resting = np.zeros(keys, np.int64)
     if not kb.numbers(pieces, falls, first, turning, resting):
         return None
     gaps = len(pieces) + keys

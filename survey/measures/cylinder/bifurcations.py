@@ -200,7 +200,9 @@ def _run(plane, curve, kind, tests=()):
 
 def _drawn(plane, curve, kind, t):
     """One row of `found`."""
-    xy, bar, known = curve.xy(t), curve.bar(t), {}
+    xy = curve.xy(t)
+    bar = curve.bar(t)
+    known = {}
     # a point on the border to within its rounding is on it
     for border in (plane.square.low, plane.square.high):
         xy = np.where(abs(xy - border) <= bar, border, xy)
@@ -422,10 +424,8 @@ def _ends(plane):
     rest = _rest(plane)
     slopes = {"b12": rest["s3"], "b31": -rest["s2"], "s3": rest["b12"], "s2": -rest["b31"]}
     a, b = (slopes.get(name, 0.0) for name in plane.axes)
-    both, c = (
-        {("b12", "s3"): 1.0, ("b31", "s2"): -1.0}.get(tuple(sorted(plane.axes)), 0.0),
-        constant(rest),
-    )
+    both = {("b12", "s3"): 1.0, ("b31", "s2"): -1.0}.get(tuple(sorted(plane.axes)), 0.0)
+    c = constant(rest)
     if both:
         curves = _hyperbola(plane, both, c)
     elif a or b:
@@ -448,7 +448,8 @@ def _hyperbola(plane, both, c):
             _straight(plane, 1.0, 0.0, 0.0, _nothing),
             _straight(plane, 0.0, 1.0, 0.0, _nothing),
         ]
-    ratio, found = -c / both, []
+    ratio = -c / both
+    found = []
 
     def curve(side, low, high):
         def xy(t):
@@ -460,10 +461,8 @@ def _hyperbola(plane, both, c):
     for side in (1.0, -1.0):
         # log |x| where x has this sign, and where y has the sign that it has then, on the plane
         (x_low, x_high), (y_low, y_high) = _parts(plane, (side, math.copysign(side, side * ratio)))
-        low, high = (
-            max(x_low, math.log(abs(ratio)) - y_high),
-            min(x_high, math.log(abs(ratio)) - y_low),
-        )
+        low = max(x_low, math.log(abs(ratio)) - y_high)
+        high = min(x_high, math.log(abs(ratio)) - y_low)
         if low < high:
             beyond = 0.5 * (high - low)  # so that the borders are crossed
             found.append(curve(side, low - beyond, high + beyond))
@@ -483,7 +482,8 @@ def _parts(plane, signs):
 
 def _next_ends(plane, rest):
     """c23 (b12^2 - b31^2) - d b12 b31 = 0."""
-    axes, mine = plane.axes, [name for name in plane.axes if name in ("b12", "b31")]
+    axes = plane.axes
+    mine = [name for name in plane.axes if name in ("b12", "b31")]
     b12, b31, d, c23 = (rest[name] for name in ("b12", "b31", "d", "c23"))
     if not mine:
         slopes = {"d": -b12 * b31, "c23": (b12 - b31) * (b12 + b31)}

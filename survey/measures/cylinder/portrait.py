@@ -69,7 +69,8 @@ def solve(method, systems, rtol):
     of `ends`.
     """
     own = systems.shape[1] > COLUMNS
-    result, listed = empty(len(systems), OK, systems.shape[1]), []
+    result = empty(len(systems), OK, systems.shape[1])
+    listed = []
     for i, six in enumerate(systems):
         s = outline(six)
         (_ends_of_program if own else _ends)(s, six, result, i)
@@ -130,10 +131,8 @@ def _rests(s, result, i):
     """Equilibria with their types, and their numbers, of point i; in the stratum I0 every angle is one."""
     kinds = s.equilibria[:, eq.KIND]
     if s.stratum != I0:
-        result["equilibria"][i], result["saddles"][i] = (
-            len(kinds),
-            np.count_nonzero(kinds == eq.SADDLE),
-        )
+        result["equilibria"][i] = len(kinds)
+        result["saddles"][i] = np.count_nonzero(kinds == eq.SADDLE)
     for at, row in enumerate(s.equilibria):
         result["equilibrium_phi"][i, at] = row[eq.ANGLE]
         result["equilibrium_phi_error"][i, at] = row[eq.BAR] + 1e-15

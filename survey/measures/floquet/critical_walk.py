@@ -45,7 +45,10 @@ class Walk:
 
     def _half(self, seed, sense):
         """Points after the seed to one side, their borders, and whether the curve closes."""
-        y, step, found, borders = seed, FIRST_STEP, [], []
+        y = seed
+        step = FIRST_STEP
+        found = []
+        borders = []
         _value, slope, size = self.points.linearised(seed[None])
         slope, size = slope[0], size[0]
         tangent = self._tangent(y, slope, size, None)

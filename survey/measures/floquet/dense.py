@@ -146,7 +146,8 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
     `points` has the block's axes first; a parameter in `lines` varies along one of them.
     """
     axes, shape = axes_of(lines), points.shape[:-1]
-    index, along = np.arange(np.prod(shape)).reshape(shape), []
+    index = np.arange(np.prod(shape)).reshape(shape)
+    along = []
     for axis in axes:
         own = points[..., axis.column]
         varies = [k for k in range(len(shape)) if (own.take(0, k) != own.take(-1, k)).any()]
@@ -158,7 +159,8 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
     ]
     index = np.moveaxis(index, moved, range(-len(axes), 0))
     index = index.reshape(-1, *index.shape[-len(axes) :])
-    flat, left = points.reshape(-1, points.shape[-1]), np.ones(index.size, bool)
+    flat = points.reshape(-1, points.shape[-1])
+    left = np.ones(index.size, bool)
     for own in index:
         own = own.reshape(len(own), -1) if len(axes) == 2 else own.reshape(1, -1)
         fixed = flat[own[0, 0]].copy()
@@ -261,7 +263,8 @@ def panels(key):
     """The Panels of a Map, in which its points are looked for in this order: the same for all blocks."""
     number = [axis.number for axis in key.axes]
     budget = float(np.prod(number)) / POINTS_PER_NODE
-    left, found = [(tuple((axis.low, axis.high) for axis in key.axes), 0)], []
+    left = [(tuple((axis.low, axis.high) for axis in key.axes), 0)]
+    found = []
     while left:
         sides, depth = left.pop(0)
         share = [
@@ -324,7 +327,8 @@ def _degrees(key, middle, radius, budget):
     ends = [np.zeros(1)] if sides == 1 else [np.array([-0.97, 0.97])]
     if 2.0 * PROBED * sides * len(ends[0]) > budget:
         return None, 0
-    x, needed = chebyshev.symmetric_nodes(PROBED), []
+    x = chebyshev.symmetric_nodes(PROBED)
+    needed = []
     lines = [np.stack([x if k == side else np.full(PROBED, end) for k in range(sides)], axis=1)
              for side in range(sides) for end in ends[0]]  # fmt: skip
     known = _coefficients(key, middle, radius, np.concatenate(lines))
@@ -362,7 +366,9 @@ def at_points(system, structure, points):
         own = monodromy.Points(system, points, halves=True, paired=structure != "none")
         if not _is_analytic(own):
             return None
-        every, n, paired = np.arange(len(points)), system.n, structure != "none"
+        every = np.arange(len(points))
+        n = system.n
+        paired = structure != "none"
         out = np.empty(
             (2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n)
         )
@@ -403,7 +409,8 @@ def coefficients(M, E, scale, structure, steps_of=None):
     """
     N, n = M.shape[:2]
     m, one = n // 2, np.eye(n)
-    size, near = abs(M), 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
+    size = abs(M)
+    near = 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
     own = np.linalg.eigvals(M).astype(complex)
     c, moduli = np.zeros((N, n + 1), complex), np.zeros((N, n + 1))
     c[:, 0] = moduli[:, 0] = 1.0
@@ -411,17 +418,17 @@ def coefficients(M, E, scale, structure, steps_of=None):
         c[:, 1 : i + 2] -= own[:, i, None] * c[:, : i + 1]
         moduli[:, 1 : i + 2] += abs(own[:, i, None]) * moduli[:, : i + 1]
     c, bars, kept = c.real.copy(), 4 * n * EPS * moduli, n if structure == "none" else m
-    B, off, wide = np.broadcast_to(one, M.shape).copy(), np.zeros_like(M), np.zeros_like(M)
+    B = np.broadcast_to(one, M.shape).copy()
+    off = np.zeros_like(M)
+    wide = np.zeros_like(M)
     found, form = np.empty((N, kept, n, n)), np.zeros((2, N, n))  # form: tr(B_k J)
     J = symplectic_form(n) * (scale[:, None, :] / scale[:, :, None])
     for k in range(1, n + 1):
         # off: rounding of B; wide: the same, and what the error of M does to it
         MB, tall = M @ B, size @ abs(B)
         off, wide = size @ off + n * EPS * tall, size @ wide + E @ abs(B) + n * EPS * tall
-        direct, doubt = (
-            -np.trace(MB, axis1=1, axis2=2) / k,
-            np.trace(off, axis1=1, axis2=2) / k + n * EPS * abs(np.trace(MB, axis1=1, axis2=2)),
-        )
+        direct = -np.trace(MB, axis1=1, axis2=2) / k
+        doubt = np.trace(off, axis1=1, axis2=2) / k + n * EPS * abs(np.trace(MB, axis1=1, axis2=2))
         bars[:, k] += near * abs(B).sum(axis=(1, 2))
         sharper = doubt < bars[:, k]
         c[:, k], bars[:, k] = (
@@ -488,7 +495,8 @@ def _expanded(key, middle, radius, sizes, values, bars):
     K = values.shape[1]
     ulps = [(4 + abs(m) + r) / r for m, r in zip(middle, radius, strict=True)]
     n1, n2 = sizes if len(sizes) == 2 else (1, sizes[0])
-    series, doubts = np.empty((n1, K, n2)), []
+    series = np.empty((n1, K, n2))
+    doubts = []
     for k in range(K):
         grid = values[:, k].reshape(n1, n2)
         own, doubt = chebyshev.expand(grid, chebyshev.by_columns(n2), ulps[-1])

@@ -94,7 +94,8 @@ class Path:
         self.begin, self.t = begin, begin[:, None] + self.h[:, None] * NODES
         k = np.arange(ORDER + 1.0)
         moduli = abs(series)
-        self.X, self.noise_X = _sum(series), ROUNDOFF_UP * _sum(moduli * (2 * k + 2))
+        self.X = _sum(series)
+        self.noise_X = ROUNDOFF_UP * _sum(moduli * (2 * k + 2))
         dX = _sum((series * k)[:, :, 1:]) / self.h[:, None, None]
         noise = ROUNDOFF_UP * _sum((moduli * k * (2 * k + 2))[:, :, 1:]) / self.h[:, None, None]
         f, df = (one[..., 0].swapaxes(1, 2) for one in self.along(programs.f, self.noise_X))
@@ -155,7 +156,8 @@ class Path:
 
     def bars(self, dx):
         """Error bounds of the series X (tasks, n, NODES), if x(0) is known to within dx (N, n)."""
-        radius, delta = (dx / self.scale).max(axis=1), self.defect / self.scale[self.point]
+        radius = (dx / self.scale).max(axis=1)
+        delta = self.defect / self.scale[self.point]
         tube = self.tube(radius, delta, *self.spread_of(delta))[1]
         return self.noise_X + (tube[:, None] * self.scale[self.point])[:, :, None]
 
@@ -236,7 +238,8 @@ class Path:
         N, n = M.shape[:2]
         judged, bounds = (M, E) if f is None else deflated(M, E, f, df)
         found = monodromy.Matrices.plain(judged, bounds)
-        values, vectors = np.ones((N, n), complex), np.full((N, n, n), np.nan, complex)
+        values = np.ones((N, n), complex)
+        vectors = np.full((N, n, n), np.nan, complex)
         own, directions = np.linalg.eig(judged[which])
         if f is None:
             values[which], vectors[which] = own, directions

@@ -175,8 +175,6 @@ def _spline(ticks, values):
         return lambda x: np.where(
             np.interp(x[:, 0], ticks[0], hole[:, 0]) > 0.0, np.nan, along(x[:, 0])
         )
-    both, outside = (
-        RectBivariateSpline(*ticks, values),
-        RectBivariateSpline(*ticks, hole, kx=1, ky=1),
-    )
+    both = RectBivariateSpline(*ticks, values)
+    outside = RectBivariateSpline(*ticks, hole, kx=1, ky=1)
     return lambda x: np.where(outside.ev(*x.T) > HOLE, np.nan, both.ev(*x.T))

@@ -98,7 +98,9 @@ class Points:
         """Norm and noise of A on each piece of the points `own`, and the units of their states."""
         self.rough[own] = False
         n, N = self.n, len(own)
-        largest, scale, sampled = np.zeros((N, n, n)), np.empty((N, n)), []
+        largest = np.zeros((N, n, n))
+        scale = np.empty((N, n))
+        sampled = []
         for k, (program, (*numbers, images, late)) in enumerate(zip(programs, given, strict=True)):
             edges = self.edges[own[:1]] if self.system.same_ranges else self.edges[own]
             t = edges[:, k, None] + (edges[:, k + 1] - edges[:, k])[:, None] * TIMES
@@ -238,7 +240,8 @@ def solve(points, method, rtol, factor, those, sharp):
 
 
 def _call(points, method, those, place, group, count, sharp):
-    n, parts = points.n, np.array([images.parts for images in group.images])
+    n = points.n
+    parts = np.array([images.parts for images in group.images])
     count = -(-count // parts)  # of the first parts
     first = np.concatenate([[0], np.cumsum((count * parts).sum(axis=1))])
     F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])

@@ -35,8 +35,10 @@ class Discs:
     def __init__(self, matrices):
         M, E, known = matrices.M, matrices.E, matrices
         N, n = M.shape[:2]
-        self.centre, self.radius = np.zeros((N, n), complex), np.full((N, n), np.inf)
-        self.V, self.coupling = np.zeros((N, n, n), complex), np.full((N, n, n), np.inf)
+        self.centre = np.zeros((N, n), complex)
+        self.radius = np.full((N, n), np.inf)
+        self.V = np.zeros((N, n, n), complex)
+        self.coupling = np.full((N, n, n), np.inf)
         good = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
         some = np.flatnonzero(good & known.sharp)
         if some.size:

@@ -61,7 +61,8 @@ def curves(index, function, passed, kind, drawn):
     `index(positions (N, 2))` is the index, `passed` (n, n) its values on the lattice, and
     `function(positions)` that of `bifurcations` with its bounds, which is 0 on the curves.
     """
-    own, found = [one for one in drawn if one[0] == kind], []
+    own = [one for one in drawn if one[0] == kind]
+    found = []
     ticks = np.linspace(0.0, 1.0, len(passed))
     lost = _unexplained(passed, own)
     for axis, _number in Counter(axis for axis, *_ in lost).most_common():
@@ -104,7 +105,8 @@ def _shortened(index, segments, axis, ticks):
         segments = segments[long]
         if not segments.line.size:
             break
-        at, value = np.empty(segments.line.size), np.full(segments.line.size, UNKNOWN)
+        at = np.empty(segments.line.size)
+        value = np.full(segments.line.size, UNKNOWN)
         for share in SHARES:
             some = np.flatnonzero(value == UNKNOWN)
             if some.size:
@@ -128,8 +130,10 @@ def _linked(segments, axis, ticks):
     """[(positions (m, 2), errors (m))] of places on neighbouring lines at which the index takes the
     same step.
     """
-    middle, error = segments.ends.mean(axis=1), 0.5 * np.diff(segments.ends)[:, 0]
-    low, number = segments.index.min(axis=1), abs(np.diff(segments.index))[:, 0]
+    middle = segments.ends.mean(axis=1)
+    error = 0.5 * np.diff(segments.ends)[:, 0]
+    low = segments.index.min(axis=1)
+    number = abs(np.diff(segments.index))[:, 0]
     number[error > SURE] = 0
     k = np.repeat(np.arange(len(number)), number)
     step = low[k] + np.arange(k.size) - np.repeat(np.cumsum(number) - number, number)

@@ -61,7 +61,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     known = np.isfinite(points).all(axis=1) & (branch == np.floor(branch))
     different, place = np.unique(points[known], axis=0, return_inverse=True)
     place = place.reshape(-1)
-    parts, of_point = [], [[] for _ in different]
+    parts = []
+    of_point = [[] for _ in different]
     count = 0
     for where, x, T in followed(equation, continued, different, _reach(rtol)):
         for i in range(0, len(where), CHUNK):
@@ -222,7 +223,8 @@ class Found:
         self.x, self.dx, self.T, self.dT = (
             np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N)
         )
-        self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
+        self.M = np.full((N, 2, n, n), np.nan)
+        self.others = monodromy.Matrices.empty(N, m)
 
     def put(self, points, shown):
         """Keep what is Shown of these points."""
@@ -240,10 +242,8 @@ class Found:
         answer = stability.assess(matrices, self.structure, rtol, wanted)
         answer.status[~self.good] = NO_ORBIT
         answer.status[~known] = status.INVALID_PARAMETERS
-        answer.verdict[~self.good], answer.crossing[~self.good] = (
-            stability.UNDECIDED,
-            stability.UNDECIDED,
-        )
+        answer.verdict[~self.good] = stability.UNDECIDED
+        answer.crossing[~self.good] = stability.UNDECIDED
         out = stability.outputs(answer, matrices, self.T, computed, wanted)
         ok = answer.status == status.OK
         if "exponent" in wanted:

@@ -46,7 +46,8 @@ def searched(scene, square, axes, fixed):
     varied = [names.index(name) for name in axes if name in names]
     given = np.array([fixed.get(name, np.nan) for name in names])
     on_map = _Map(scene.equation, square, varied, given, scene.continued)
-    found, seeds = [], on_map.seeds()
+    found = []
+    seeds = on_map.seeds()
     for how in on_map.kinds:
         points = on_map.points(how)
         for y, border in on_map.followed(points, seeds[how]):
@@ -69,8 +70,12 @@ class _Map:
     """A map of the parameters number `varied`, the unit square `square`; `given`: the others."""
 
     def __init__(self, equation, square, varied, given, continued):
-        self.equation, self.square, self.varied, self.given = equation, square, list(varied), given
-        self.continued, self.reach = continued, monodromy.method_of("auto").floquet_reach(RTOL)
+        self.equation = equation
+        self.square = square
+        self.varied = list(varied)
+        self.given = given
+        self.continued = continued
+        self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
         self.kinds = [
             How(kind) for kind in KINDS if kind != NEIMARK_SACKER or equation.n - equation.free > 1
@@ -134,7 +139,8 @@ class _Map:
         """[(states, periods)] of the first, second, ... orbits at points (N, parameters), by the
         continuation.
         """
-        curves, n = Curves(self.equation, self.continued, points, self.reach), self.equation.n
+        curves = Curves(self.equation, self.continued, points, self.reach)
+        n = self.equation.n
         found = [
             curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)
         ]
@@ -217,10 +223,8 @@ class _Map:
                 if not np.isfinite(away[best]):
                     continue
                 z = vectors[:, best]
-                y[k, n : 3 * n], y[k, own.angle_at] = (
-                    np.concatenate([z.real, z.imag]),
-                    np.angle(values[best]),
-                )
+                y[k, n : 3 * n] = np.concatenate([z.real, z.imag])
+                y[k, own.angle_at] = np.angle(values[best])
             else:
                 matrix = M[k] + (1.0 if how.kind == MINUS_ONE or how.branching else -1.0) * np.eye(
                     n

@@ -22,7 +22,8 @@ def solve(equation, states, point, answer, time):
     T = T[:, 0]
     method = monodromy.method_of("auto")
     [(_own, programs)] = equation.traced(point, x)
-    numbers, reach = programs.numbers(point), method.floquet_reach(RTOL)
+    numbers = programs.numbers(point)
+    reach = method.floquet_reach(RTOL)
     steps = programs.flow(numbers, x, T, reach, derived=False)[3]
     path = existence.Path(programs, numbers, x, T, steps, reach)
     path.propagate(method)

@@ -81,7 +81,9 @@ def _product(A, B):
 
 
 def _motion(method, programs, numbers, x, T, steps):
-    X, M, A = np.empty_like(x), np.empty((*x.shape, x.shape[1])), programs.A
+    X = np.empty_like(x)
+    M = np.empty((*x.shape, x.shape[1]))
+    A = programs.A
     given = (
         np.ascontiguousarray(numbers[0]),
         programs.places,

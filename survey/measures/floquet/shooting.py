@@ -107,7 +107,9 @@ class _Half:
         path, N, last_steps = self.path, len(self.x), self.cuts[1:] - 1
         wide, off = np.empty((2, *delta.shape))
         spread(path.F, np.ascontiguousarray(delta), self.cuts, wide, off)
-        states, last, late = np.empty((len(self.F), path.n)), np.empty_like(self.x), np.empty(N)
+        states = np.empty((len(self.F), path.n))
+        last = np.empty_like(self.x)
+        late = np.empty(N)
         own = off[last_steps] + self.rounding * around[:, None]
         responses(
             self.F, own, self.first, self.back, self.symmetry.ends, at_end, states, last, late

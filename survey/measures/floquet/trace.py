@@ -294,7 +294,10 @@ class Graph:
     """
 
     def __init__(self, point, time):
-        self.numbers, self.series, self.guards, self.equalities = [], [("one",), ("time",)], [], []
+        self.numbers = []
+        self.series = [("one",), ("time",)]
+        self.guards = []
+        self.equalities = []
         self._number_places, self._series_places = {}, {}
         self.values = []  # of the numbers at the example
         self.shared = [True, True]  # does the basis function depend on t alone?
@@ -629,7 +632,9 @@ class Program:
         derivative may be made of what is being visited, as that of y = sqrt x is of 1 / y.
         """
         flow = self.graph.flow
-        found, begun, later = list(flow), set(flow), []
+        found = list(flow)
+        begun = set(flow)
+        later = []
 
         def visit(place):
             if place in begun:
@@ -701,7 +706,8 @@ class Program:
         The bounds hold for the kernels, whose functions are those of the C library, rounded to 1 or 2 ulp.
         """
         values, errors = numbers
-        u, found = ROUNDOFF_UP, {}
+        u = ROUNDOFF_UP
+        found = {}
         needed = self.needed(places)
         with np.errstate(all="ignore"):
             for k in needed:
@@ -746,7 +752,8 @@ class Program:
 
     def needed(self, places):
         """Places of what these basis functions are made of, in order."""
-        found, begun = [], set()
+        found = []
+        begun = set()
 
         def visit(place):
             if place in begun:

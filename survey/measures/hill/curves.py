@@ -289,7 +289,9 @@ def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
     x, along, line = (np.concatenate([getattr(p, name) for p in paths] or [np.zeros((0, 2))])
                       for name in ("x", "along", "line"))  # fmt: skip
     kind, index = seeds.kind[starts], seeds.index[starts]
-    new, error, sure = x.copy(), np.zeros(len(x)), np.zeros(len(x), bool)
+    new = x.copy()
+    error = np.zeros(len(x))
+    sure = np.zeros(len(x), bool)
 
     def task(own):
         def at(who, t, wanted):
@@ -304,11 +306,9 @@ def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
         )  # fmt: skip
         sides = t[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
         good &= tongue(at(slice(None), sides, COUNTS), mine) == index[whose[own]]
-        new[own], error[own], sure[own] = (
-            x[own] + t[:, None] * line[own],
-            width + square.grain,
-            good,
-        )
+        new[own] = x[own] + t[:, None] * line[own]
+        error[own] = width + square.grain
+        sure[own] = good
 
     _in_chunks(each, task, len(x), "parts of the curves")
     complete = np.array([path.complete for path in paths], bool)

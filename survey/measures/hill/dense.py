@@ -158,7 +158,9 @@ def scattered(box, method, asked, answers, position, p):
     """Answer points on their own (N each) from the series of their `box`; returns those (N, bool)
     to be solved.
     """
-    sought, axis, open_points = _sought(asked), _axis(box.line, box.even), np.ones(p.size, np.bool_)
+    sought = _sought(asked)
+    axis = _axis(box.line, box.even)
+    open_points = np.ones(p.size, np.bool_)
     served = _served_panels(box, method, asked, axis, sought)
     if not sought.factors and any(not bars[0] <= asked.rtol for _, _, _, bars, *_ in served):
         # where D varies by many powers of ten, bounds of the factors are nearer
@@ -170,10 +172,8 @@ def scattered(box, method, asked, answers, position, p):
         for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
             if not some.size:
                 continue
-            across, along = (
-                (position[some] - 0.5 * (low + high)) / (0.5 * (high - low)),
-                (p[some] - axis.middle) / axis.radius,
-            )
+            across = (position[some] - 0.5 * (low + high)) / (0.5 * (high - low))
+            along = (p[some] - axis.middle) / axis.radius
             alone = some[-1] - some[0] == some.size - 1
             found, first = (answers, some[0]) if alone else (Answers(some.size, asked), 0)
             if sought.factors:
@@ -243,7 +243,8 @@ def _shortened(series, bars):
 
 def _at_points(box, axis, series, number, bars, turns, across, along, position):
     """The results (N, RESULTS) at x `across` and `along` the rows of a panel."""
-    results, nodes = np.empty((position.size, RESULTS)), turns.shape[2] * (2 if axis.even else 1)
+    results = np.empty((position.size, RESULTS))
+    nodes = turns.shape[2] * (2 if axis.even else 1)
     *one, share = _between(across, turns.shape[1], turns.shape[1])
     *other, further = _between(abs(along) if axis.even else along, nodes, turns.shape[2])
     x = np.stack([across, along])
@@ -282,7 +283,8 @@ def _axis(line, symmetric):
 
 def _rows(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of the `chosen` rows, each by a series of its own."""
-    sought, degree = _sought(asked), np.full(problem.span.size, DEGREES.size)
+    sought = _sought(asked)
+    degree = np.full(problem.span.size, DEGREES.size)
     degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
     first = degree.copy()
     # a row whose series has not converged goes on to the next degree
@@ -333,7 +335,8 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
     padded[:, :, : series.shape[2]] = series
     number = turns.shape[2] * (2 if axis.even else 1)
     rule = None if problem.rule is None else problem.rule.reshape(-1)
-    most, apart = max(1, CALL_POINTS // x.size), np.flatnonzero(np.diff(rows) != 1) + 1
+    most = max(1, CALL_POINTS // x.size)
+    apart = np.flatnonzero(np.diff(rows) != 1) + 1
     for part in np.split(np.arange(rows.size), apart):
         for some in (part[i : i + most] for i in range(0, part.size, most)):
             some = slice(some[0], some[-1] + 1)
@@ -378,7 +381,9 @@ def _discriminants(answers, rows, series, bars, x, nodal):
     """D of the rows from their series at x, in place, within `bars`, or within what is `nodal`."""
     at_nodes, nodes = np.empty((len(series), 0)), 0
     if nodal is not None:
-        bars, at_nodes, nodes = nodal.doubts, _padded(nodal.bars), nodal.bars.shape[1]
+        bars = nodal.doubts
+        at_nodes = _padded(nodal.bars)
+        nodes = nodal.bars.shape[1]
     own = answers.asked.rtol, answers.floats, answers.verdict, answers.missed
     discriminants(rows, _padded(series), bars, at_nodes, nodes, x, *own)
 
@@ -425,13 +430,12 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
         chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((2, 0)), np.empty((0, 0)))
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
-    position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)
+    position = problem.positions[chosen]
+    left = np.ones(chosen.size, np.bool_)
     for low, high, series, bars, turns, of_nodes, nodal in served:
         inside = left & (position >= low) & (position <= high)
-        rows, own = (
-            chosen[inside],
-            np.empty((len(series), np.count_nonzero(inside), series.shape[2])),
-        )
+        rows = chosen[inside]
+        own = np.empty((len(series), np.count_nonzero(inside), series.shape[2]))
         if rows.size:
             x = (position[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
             for of, out in zip(series, own, strict=True):
@@ -492,7 +496,9 @@ def panels(row_axis, method, rtol, axis, sought):
     The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for
     it pays.
     """
-    left, found, budget = [(row_axis.low, row_axis.high, 1.0)], [], row_axis.number / ROWS_PER_NODE
+    left = [(row_axis.low, row_axis.high, 1.0)]
+    found = []
+    budget = row_axis.number / ROWS_PER_NODE
     while left:
         low, high, share = left.pop(0)
         if not high > low:
@@ -516,14 +522,17 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
     kind = np.abs(np.diff(ends.span * size))  # half the change of D's phase
     at = int(_enough(0.5 * kind if sought.factors else kind, rtol)[0])
-    degree, spent, doubt = int(_degrees(ends, axis, rtol, sought).max()), 0, np.inf
+    degree = int(_degrees(ends, axis, rtol, sought).max())
+    spent = 0
+    doubt = np.inf
     while at < DEGREES.size and degree < axis.most and spent + DEGREES[at] <= budget:
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = row_axis.at(middle + radius * chebyshev.symmetric_nodes(n))
         found = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis, sought)
         values, series, bars, turns, nodal = found
-        matrix, ulps = chebyshev.by_columns(n), (4 + abs(middle) + radius) / radius
+        matrix = chebyshev.by_columns(n)
+        ulps = (4 + abs(middle) + radius) / radius
         if sought.factors:
             odd = _odd(row_axis, axis, middle + radius * chebyshev.symmetric_nodes(n))
             series[DY2], bars[DY2] = series[DY2] / odd[:, None], bars[DY2] / odd
@@ -599,7 +608,8 @@ def _series(problem, method, rtol, rows, n, axis, sought):
             [found[kernels.ROTATION] if sought.turns else zeros[0], *np.repeat(zeros, 2, axis=0)]
         )
     ulps = (abs(axis.middle) + axis.radius) / axis.radius
-    matrix, odd = chebyshev.by_columns(x.size), sought.factors and axis.even
+    matrix = chebyshev.by_columns(x.size)
+    odd = sought.factors and axis.even
     if odd:
         y1, dy1, y2, dy2 = values
         values = np.stack([0.5 * (y1 + dy2), dy1, y2, 0.5 * (y1 - dy2)])

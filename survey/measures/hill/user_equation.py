@@ -225,7 +225,8 @@ def walked(z, points, rows, steps, scale, tolerance):
     """The results of the `points`, each of one of the `rows`, by DOP853, and which of them reached
     the end.
     """
-    out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
+    out = np.full((rows.size, RESULTS), np.nan)
+    reached = np.zeros(rows.size, np.bool_)
     stride = STRIDE / steps.rate[rows].max(axis=1)
     own = points, steps.edges[rows], steps.pieces[rows], steps.slack[rows], stride, scale[rows]
     kernels(z).walk(*own, tolerance, out, reached)
@@ -260,7 +261,8 @@ def unprobed(z, points, edges, slack, size):
     """
     if not len(points) or edges.shape[1] != 2 or slack.any():
         return np.zeros(len(points), np.bool_)
-    most, end = np.nan_to_num(abs(points)), float(np.nan_to_num(edges[:, -1]).max())
+    most = np.nan_to_num(abs(points))
+    end = float(np.nan_to_num(edges[:, -1]).max())
     found = bands.missed(z, tuple(most.max(axis=0).tolist()), end, SIZES[0])
     known = found <= 10 * RESOLVED * size
     if isfinite(found):  # where z is small by its parameters, each for itself
@@ -277,10 +279,8 @@ def measured(z, points, edges, period, slack, probes=PROBES):
     With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ.
     `probes` as PROBES.
     """
-    shape, owner = (
-        (len(points), edges.shape[1] - 1),
-        np.repeat(np.arange(len(points)), edges.shape[1] - 1),
-    )
+    shape = (len(points), edges.shape[1] - 1)
+    owner = np.repeat(np.arange(len(points)), edges.shape[1] - 1)
     left, right = edges[:, :-1].reshape(-1, 1), edges[:, 1:].reshape(-1, 1)
 
     def values(pieces, number, mirrored=False):
@@ -291,7 +291,8 @@ def measured(z, points, edges, period, slack, probes=PROBES):
 
     def probed(pieces):
         """The points, the ends (N, 2) and the number of probes of each piece."""
-        ends, own = np.concatenate([left[pieces], right[pieces]], axis=1), owner[pieces]
+        ends = np.concatenate([left[pieces], right[pieces]], axis=1)
+        own = owner[pieces]
         share = np.diff(ends, axis=1)[:, 0] / edges[own, -1]
         return (
             points[own],

@@ -185,7 +185,8 @@ def _real_roots(k, level, a, b):
             sign * z.sqrt() for z in _of_quadratic(HALF * p, r, positive=True) for sign in (1, -1)
         ]
     y = _largest(TWO * p, p * p - FOUR * r, -q * q)
-    w, found = y.sqrt(), []
+    w = y.sqrt()
+    found = []
     for side in (1, -1):
         found += _of_quadratic(
             HALF * side * w, HALF * (p + y) - side * q / (TWO * w), abs(p) + abs(q / w)

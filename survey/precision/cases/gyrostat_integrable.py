@@ -42,7 +42,8 @@ def references(work):
 def works():
     """Motions that share nothing."""
     random = np.random.default_rng(1)
-    time, start = np.full(NUMBER, LAST), random.uniform(-np.pi, np.pi, NUMBER)
+    time = np.full(NUMBER, LAST)
+    start = random.uniform(-np.pi, np.pi, NUMBER)
     moment = random.uniform(0.5, 2.0, NUMBER)
     five, rate = random.normal(size=(5, NUMBER)), random.normal(scale=1.5, size=NUMBER)
     elliptic = dict(zip(_ELLIPTIC, (moment, *five, start, rate), strict=True))

@@ -46,7 +46,8 @@ def references(_work=None):
 @cache
 def works():
     """Random systems that have a cycle."""
-    random, found = np.random.default_rng(1), []
+    random = np.random.default_rng(1)
+    found = []
     while len(found) < _POINTS:
         six = random.normal(size=6) * [1, 1, 2, 2, 3, 3]
         if _first(tuple(six.tolist())) is not None:

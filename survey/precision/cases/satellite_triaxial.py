@@ -87,11 +87,9 @@ def _slope(state, p, sin, cos):
     s, c, q = sin(state[0]), cos(state[0]), p[0] + state[1]
     both, square = s * c, q * q
     one, two = (1.0 - 0.5 * p[1]) * q, (1.0 - 0.5 * p[2]) * q
-    m1, m2, m3 = (
-        0.25 * p[2] * square + p[3] * (s * s),
-        0.25 * p[1] * square + p[4] * (c * c),
-        p[5] * both,
-    )
+    m1 = 0.25 * p[2] * square + p[3] * (s * s)
+    m2 = 0.25 * p[1] * square + p[4] * (c * c)
+    m3 = p[5] * both
 
     def column(e1, e2, p1, p2):
         return (
