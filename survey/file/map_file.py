@@ -28,7 +28,7 @@ class MapFile:
         self.file, self.published = None, False
         with refused(self.path):
             try:
-                self.file = netcdf.File(self.part)
+                self.file = netcdf.NewFile(self.part)
                 self._define_map(coordinates, variables, layout, shape, tile)
             except BaseException:
                 self.discard()

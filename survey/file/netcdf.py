@@ -103,7 +103,7 @@ class Sink:
             done += os.write(self.descriptor, content[done:])
 
 
-class File:
+class NewFile:
     """A new netCDF-4 file at `path`: `define` its variables, then `close` it. Raises OSError where
     the disk does.
 

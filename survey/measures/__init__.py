@@ -39,7 +39,7 @@ QUESTIONS = {
         "TITLE": Value("what a class is, one line", str),
         "ALONG": Value("survey.scene.Output of what is known at each point of a curve", tuple),
         "trace": Function(
-            "the Curves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",
+            "the FollowedCurves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",
             ("solve", "square", "seeds", "each"),
         ),
         "Seeds": Value(
@@ -77,7 +77,9 @@ QUESTIONS = {
     },
     # Where the curves of `trace` turn back.
     "folds": {
-        "find": Function("the Folds of the Curves", ("solve", "square", "curves"), needed=True),
+        "find": Function(
+            "the Folds of the FollowedCurves", ("solve", "square", "curves"), needed=True
+        ),
     },
     # The cells of [refine], decided everywhere in them.
     "cells": {

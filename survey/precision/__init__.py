@@ -65,7 +65,7 @@ TOGETHER = 5_000
 
 
 @dataclass
-class Record:
+class ChartRecord:
     """One measured point of the chart; `error` is the largest |error| / (1 + |value|) over the references."""
 
     work: str
@@ -216,7 +216,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 asked = solve if peer or work not in whole else partial(solve, everything=True)
                 seconds = _per_point(asked, *timed[work], setting)
                 records.append(
-                    Record(work, method, peer, setting, error, seconds, wrong, compile_seconds)
+                    ChartRecord(work, method, peer, setting, error, seconds, wrong, compile_seconds)
                 )
                 if time.process_time() - began > LONG:
                     slow.add(work)

@@ -227,7 +227,7 @@ class FloquetScene(TracedScene):
                 self._compare(programs, given[i], period[i], edges[i])
         if self.conserved is not None:
             self._check_conserved(given[known])
-        known = self._called(monodromy.Points, system, given)
+        known = self._called(monodromy.SystemPoints, system, given)
         self._known.update(_effort(known))
         spikes = self._called(probing.spikes, known)
         for i in np.flatnonzero(np.isfinite(spikes)):
@@ -302,7 +302,7 @@ class FloquetScene(TracedScene):
         """Refuse CONSERVED where w x is not the same a period later."""
         system, some = self._system, np.arange(len(given))
         w = self._called(system.weights, given)
-        points = self._called(monodromy.Points, system, given)
+        points = self._called(monodromy.SystemPoints, system, given)
         if not (np.isfinite(w).all() and (w != 0.0).any(axis=1).all()):
             self._refuse(
                 "CONSERVED must be numbers, not all 0", "name the coefficients of the states"
@@ -378,7 +378,7 @@ class FloquetScene(TracedScene):
 
 
 def _effort(points):
-    """{"series": functions of time in A, "steps": in a period}: the means over some Points, on
+    """{"series": functions of time in A, "steps": in a period}: the means over some SystemPoints, on
     which a point's cost depends."""
     reach = monodromy.method_of("auto").floquet_reach(1e-10)
     valid = np.flatnonzero(points.valid)

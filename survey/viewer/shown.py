@@ -36,7 +36,7 @@ class View:
     point: tuple | None = None
 
 
-class Map:
+class ShownMap:
     """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file
     without a map.
 

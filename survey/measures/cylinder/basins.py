@@ -81,7 +81,7 @@ class Basins:
 
 
 @dataclass(frozen=True)
-class Map:
+class StartRange:
     """What of a whole survey decides how far curves are followed: the starts of one system, their
     largest |w|.
     """
@@ -91,7 +91,7 @@ class Map:
 
 
 def asked(request, names):
-    """The Map of a request for fates of systems with the parameters `names`; None if they are few,
+    """The StartRange of a request for fates of systems with the parameters `names`; None if they are few,
     or not known.
     """
     own = [request.lines.get(name) for name in ("phi0", "w0")]
@@ -106,7 +106,7 @@ def asked(request, names):
         return None  # how many belong to one system depends on values
     if math.prod(request.lines[name][0] for name in names if name in request.lines) > SYSTEMS:
         return None
-    return Map(size, max(abs(last[1]), abs(last[2])))
+    return StartRange(size, max(abs(last[1]), abs(last[2])))
 
 
 def cost(starts, each, system):
@@ -117,7 +117,7 @@ def cost(starts, each, system):
 
 
 def followed(method, six, s, starts, rtol, whole=None):
-    """`fate.followed`, of as few starts as can be where the Map `whole` says that there are many."""
+    """`fate.followed`, of as few starts as can be where the StartRange `whole` says that there are many."""
     basins = None
     if whole is not None and hasattr(method, "flow_pieces"):
         with _LOCK:  # threads that wait find it done

@@ -42,7 +42,7 @@ LATTICE = 2048  # angles at which roots are looked for
 
 
 @dataclass(frozen=True)
-class Plane:
+class ParameterPlane:
     """A map of two parameters, `fixed` being the others."""
 
     square: Square
@@ -157,7 +157,7 @@ def _spread(x):
 
 
 @dataclass(frozen=True)
-class Curve:
+class EquilibriumCurve:
     """Parameters xy(t) (m, 2), low <= t <= high, their error bounds bar(t), and the angle phi(t) of
     the equilibrium.
     """
@@ -170,7 +170,7 @@ class Curve:
 
 
 def _straight(plane, a, b, c, noise, phi=None):
-    """The Curve a x + b y + c = 0; noise(xy): error bound of the left side."""
+    """The EquilibriumCurve a x + b y + c = 0; noise(xy): error bound of the left side."""
     low, high = plane.square.low, plane.square.high
     steep = abs(a) * (high[0] - low[0]) >= abs(b) * (high[1] - low[1])
     along, (own, other) = (1, (a, b)) if steep else (0, (b, a))
@@ -185,7 +185,7 @@ def _straight(plane, a, b, c, noise, phi=None):
         return of(0.0 * t, (noise(xy(t)) + 4.0 * ROUNDOFF * (abs(c) + abs(other * t))) / abs(own))
 
     angle = None if phi is None else (lambda t: np.full(np.shape(t), phi))
-    return Curve(xy, bar, angle, low[along], high[along])
+    return EquilibriumCurve(xy, bar, angle, low[along], high[along])
 
 
 def _run(plane, curve, kind, tests=()):
@@ -260,7 +260,7 @@ def _folds(plane):
     """g = g' = 0."""
     mine = [name for name in plane.axes if name in FORCES]
     if len(mine) == 2 and size(_rest(plane)) > 0.0:
-        curve = Curve(partial(_fold_at, plane), partial(_fold_bar, plane), np.asarray)
+        curve = EquilibriumCurve(partial(_fold_at, plane), partial(_fold_bar, plane), np.asarray)
         yield from _run(plane, curve, lambda t: "fold")
         yield from _marks(plane, curve, "cusp", partial(_bend, plane, curve))
     curves = [_all_at(plane, 0.5 * math.pi * k) for k in range(4)] if len(mine) == 2 else []
@@ -371,7 +371,7 @@ def _hopf_of_both(plane, name, side):
             0.0 * t, BARS * ROUNDOFF * size(plane.system(xy(t))) / abs(parts(other, phi(t))[0])
         )
 
-    return Curve(xy, bar, phi, plane.square.low[at], plane.square.high[at])
+    return EquilibriumCurve(xy, bar, phi, plane.square.low[at], plane.square.high[at])
 
 
 def _hopfs_at_rest(plane):
@@ -456,7 +456,7 @@ def _hyperbola(plane, both, c):
             x = side * np.exp(t)
             return np.stack([x, ratio / x], axis=-1)
 
-        return Curve(xy, lambda t: 8.0 * ROUNDOFF * abs(xy(t)), None, low, high)
+        return EquilibriumCurve(xy, lambda t: 8.0 * ROUNDOFF * abs(xy(t)), None, low, high)
 
     for side in (1.0, -1.0):
         # log |x| where x has this sign, and where y has the sign that it has then, on the plane
@@ -510,4 +510,4 @@ def _next_ends(plane, rest):
         return np.stack(np.broadcast_arrays(*((t, value) if at == 0 else (value, t))), axis=-1)
 
     bar = lambda t: 16.0 * ROUNDOFF * abs(xy(t))  # noqa: E731
-    return [Curve(xy, bar, None, plane.square.low[at], plane.square.high[at])]
+    return [EquilibriumCurve(xy, bar, None, plane.square.low[at], plane.square.high[at])]

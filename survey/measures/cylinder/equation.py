@@ -81,7 +81,7 @@ class Angle:
     ) = _rough
 
 
-class Record:
+class AngleRecord:
     """The operations on phi: a context for `multiprecision.lift`, with mpmath's functions where phi
     does not enter.
     """
@@ -311,7 +311,7 @@ def program(f, g, point, on_circle):
     or Raised.
     """
     with LOCK:
-        record = Record()
+        record = AngleRecord()
         p = [record.mp.mpf(value) for value in point]
         found = [recorded(h, name, record, p) for h, name in ((f, "f"), (g, "g"))]
         forces = len(record.operations)

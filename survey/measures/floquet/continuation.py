@@ -49,7 +49,7 @@ class Range(NamedTuple):
 
 
 @dataclass
-class Curve:
+class ContinuedCurve:
     """Points y (K, m) of a curve, its tangents, and the sizes that lengths are relative to. y ends with l."""
 
     y: np.ndarray
@@ -109,7 +109,7 @@ def _bisected(c, values, low, high):
     return 0.5 * (low + high)
 
 
-class Curves:
+class ContinuedCurves:
     """The curves of each of R rows, sets of parameters whose continued one does not matter.
 
     begin(points) gives [(states (R, n), periods (R))] from which Newton's method begins; the start
@@ -154,7 +154,7 @@ class Curves:
             joined = [np.concatenate([b[:0:-1], a]) for a, b in zip(there, back, strict=True)]
             joined[1][: max(len(back[0]) - 1, 0)] *= -1.0
             if len(joined[0]) > 1:
-                self.of_row[i].append(Curve(*joined))
+                self.of_row[i].append(ContinuedCurve(*joined))
 
     def _known(self, i, share, orbits, k):
         for curve in self.of_row[i]:

@@ -27,7 +27,7 @@ CHUNK = 64  # orbits that are shown to exist together
 
 
 @dataclass
-class Shown:
+class ShownCritical:
     """Which orbits exist; bounds of their y; their M by x(0) alone, with bounds, and f at x(0),
     with bounds.
     """
@@ -41,7 +41,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Points:
+class CriticalPoints:
     """Of one `critical` equation; `given`: all parameters. The varied ones change by `scale`,
     relative if `log`.
     """
@@ -204,9 +204,9 @@ class Points:
         return y, found, slopes, sizes
 
     def shown(self, y, rows, values):
-        """Shown of the orbits near y under these conditions too."""
+        """ShownCritical of the orbits near y under these conditions too."""
         n, (N, size) = self.critical.n, y.shape
-        out = Shown(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
+        out = ShownCritical(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
                     *np.full((2, N, n), np.nan))  # fmt: skip
         own_rows, own_values = self.conditions(y)
         rows, values = (
@@ -229,7 +229,7 @@ class Points:
             return
         which, y, rows, values = which[there], y[there], rows[there], values[there]
         numbers = existence.chosen(numbers, there)
-        path = existence.Path(programs, numbers, y, span[there], counts[there], self.reach)
+        path = existence.OrbitSteps(programs, numbers, y, span[there], counts[there], self.reach)
         path.enough = existence.WIDEST * path.extent
         path.propagate(self.method)
         left = np.arange(len(y))

@@ -17,7 +17,7 @@ CUSP = 1e-3  # of the map: the longest chord across a cusp
 
 
 class Walk:
-    """Follows curves of `points` (a `critical_points.Points`); positions(y) are those on the map."""
+    """Follows curves of `points` (`CriticalPoints`); positions(y) are those on the map."""
 
     def __init__(self, points, square, positions):
         self.points, self.square, self.positions = points, square, positions

@@ -59,7 +59,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Map:
+class SeriesMap:
     """What series are made for: they are the same for equal maps. `fixed`: values of all parameters."""
 
     system: object
@@ -83,7 +83,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Panel:
+class RootPanel:
     """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds (K, PARTS
     n1, PARTS n2), where n1 is 1 (K, 1, PARTS n2), and roots at the nodes.
     """
@@ -167,7 +167,7 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
         fixed[[axis.column for axis in axes]] = 0.0
         if not np.isfinite(fixed).all():
             continue
-        key = Map(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+        key = SeriesMap(system, structure, rtol, flags(wanted), axes, tuple(fixed))
         with _ONE_AT_A_TIME:
             found = panels(key)
         rows = flat[own[:, 0], axes[0].column] if len(axes) == 2 else np.zeros(1)
@@ -198,7 +198,7 @@ def scattered(system, structure, points, rtol, wanted, ranges, answer):
     fixed[column] = 0.0
     if not np.isfinite(fixed).all():
         return left
-    key = Map(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+    key = SeriesMap(system, structure, rtol, flags(wanted), axes, tuple(fixed))
     with _ONE_AT_A_TIME:
         found = panels(key)
     for panel in found:
@@ -260,7 +260,7 @@ def _part(x, n):
 
 @lru_cache(maxsize=32)
 def panels(key):
-    """The Panels of a Map, in which its points are looked for in this order: the same for all blocks."""
+    """The RootPanels of a SeriesMap, in which its points are looked for in this order: the same for all blocks."""
     number = [axis.number for axis in key.axes]
     budget = float(np.prod(number)) / POINTS_PER_NODE
     left = [(tuple((axis.low, axis.high) for axis in key.axes), 0)]
@@ -283,7 +283,7 @@ def panels(key):
 
 
 def _panel(key, sides, budget):
-    """(the Panel or None, points solved, the side to be cut or None) of a part of the map, within a
+    """(the RootPanel or None, points solved, the side to be cut or None) of a part of the map, within a
     budget.
     """
     middle = tuple(0.5 * (a + b) for a, b in sides)
@@ -363,7 +363,7 @@ def at_points(system, structure, points):
     if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(system, points, halves=True, paired=structure != "none")
+        own = monodromy.SystemPoints(system, points, halves=True, paired=structure != "none")
         if not _is_analytic(own):
             return None
         every = np.arange(len(points))
@@ -391,7 +391,7 @@ def is_analytic(system, points):
     if not system.smooth(points[0]):
         return False
     with np.errstate(all="ignore"):
-        return _is_analytic(monodromy.Points(system, points))
+        return _is_analytic(monodromy.SystemPoints(system, points))
 
 
 def _is_analytic(own):
@@ -491,7 +491,7 @@ def _sums(m):
 
 
 def _expanded(key, middle, radius, sizes, values, bars):
-    """The Panel of values (nodes, K) at the nodes; None if a bound is not finite."""
+    """The RootPanel of values (nodes, K) at the nodes; None if a bound is not finite."""
     K = values.shape[1]
     ulps = [(4 + abs(m) + r) / r for m, r in zip(middle, radius, strict=True)]
     n1, n2 = sizes if len(sizes) == 2 else (1, sizes[0])
@@ -517,7 +517,9 @@ def _expanded(key, middle, radius, sizes, values, bars):
     companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
     roots = np.linalg.eigvals(companion)
     starts = np.stack([roots.real, roots.imag], axis=-1).reshape(n1, n2, d, 2)
-    return Panel(middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts))
+    return RootPanel(
+        middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts)
+    )
 
 
 def _in_parts(bars):

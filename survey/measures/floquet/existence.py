@@ -41,7 +41,7 @@ WIDEST = 1e-3  # of the tube, relative to the largest state
 
 
 @dataclass
-class Shown:
+class ShownOrbits:
     """Orbits that exist: states, periods, M and what their multipliers follow from, each with
     bounds; mean squares of the states, without."""
 
@@ -63,11 +63,11 @@ class Shown:
 
 
 def certified(programs, numbers, x, T, guess, plane, counts, method, reach):
-    """Shown, of orbits near (x, T); see the head of the module. All is in the units that balance A,
+    """ShownOrbits, of orbits near (x, T); see the head of the module. All is in the units that balance A,
     but the results.
     """
     with np.errstate(all="ignore"):
-        path = Path(programs, numbers, x, T, counts, reach)
+        path = OrbitSteps(programs, numbers, x, T, counts, reach)
         path.enough = WIDEST * np.maximum(path.extent, (abs(guess) / path.scale).max(axis=1))
         path.propagate(method)
         shown = path.certify(x, T, plane, RADII[0])
@@ -77,7 +77,7 @@ def certified(programs, numbers, x, T, guess, plane, counts, method, reach):
         return shown
 
 
-class Path:
+class OrbitSteps:
     """The Taylor series of the steps along N orbits, whose bounds follow."""
 
     def __init__(self, programs, numbers, x, T, counts, reach):
@@ -162,7 +162,7 @@ class Path:
         return self.noise_X + (tube[:, None] * self.scale[self.point])[:, :, None]
 
     def certify(self, x, T, plane, factor):
-        """Shown of the orbits near x (N, n), T (N), within `factor` |B G|."""
+        """ShownOrbits of the orbits near x (N, n), T (N), within `factor` |B G|."""
         n, N, point, last, s = self.n, len(x), self.point, self.last, self.scale
         delta = self.defect / s[point]
         wide, off = self.spread_of(delta)
@@ -226,7 +226,9 @@ class Path:
             M, E, R, error, doubt, WIDER * shift * a_end, np.flatnonzero(shown), f, df
         )
         back = s[:, :, None] / s[:, None, :]
-        return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others)
+        return ShownOrbits(
+            shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others
+        )
 
     def _sharp(self, M, E, R, error, doubt, late, which, f, df):
         """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but

@@ -44,7 +44,7 @@ def indices(system, points):
     """The index relative to each of GOALS (2, N) of a symplectic System at points (N, parameters);
     else UNKNOWN.
     """
-    own = monodromy.Points(system, points, halves=True)
+    own = monodromy.SystemPoints(system, points, halves=True)
     method = monodromy.method_of("auto")
     found = np.full((2, len(points)), UNKNOWN, dtype=np.int32)
     left, m = np.flatnonzero(own.valid), system.n // 2

@@ -45,7 +45,7 @@ class Group:
     images: list
 
 
-class Points:
+class SystemPoints:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
     `halves`: is no more integrated than symmetries of A require? `growth` (2, N): the integral of
@@ -148,7 +148,7 @@ class Points:
 
 
 def _of_those(piece, those):
-    """A piece of `Points._alike`, of some of its points."""
+    """A piece of `SystemPoints._alike`, of some of its points."""
     values, errors, images, late = piece
     # what is the same for all points has one row
     late = late and {place: bars if len(bars) == 1 else bars[those] for place, bars in late.items()}
@@ -209,7 +209,7 @@ class Matrices:
 
 
 def solve(points, method, rtol, factor, those, sharp):
-    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see
+    """The Matrices of some of the SystemPoints, in `factor` (K) times the steps asked for; `sharp`: see
     Matrices.
 
     A function `sharp` takes, for some of `those` (their places there), the Matrices in the balanced

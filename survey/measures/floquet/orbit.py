@@ -17,7 +17,7 @@ import numpy as np
 from survey import status
 from survey.kernels.floquet.flow import ORDER
 from survey.measures.floquet import existence, monodromy, shooting, stability
-from survey.measures.floquet.continuation import Curves
+from survey.measures.floquet.continuation import ContinuedCurves
 from survey.measures.floquet.newton import chosen, located
 from survey.measures.floquet.recomputed import recomputed
 from survey.scene import Output
@@ -103,7 +103,7 @@ def followed(equation, continued, points, reach):
     rows, row = np.unique(others, axis=0, return_inverse=True)
     row = row.reshape(-1)
     for first in range(0, len(rows), ROWS):
-        curves = Curves(equation, continued, rows[first : first + ROWS], reach)
+        curves = ContinuedCurves(equation, continued, rows[first : first + ROWS], reach)
         where, x, T = [], [], []
         for k in range(len(curves.rows)):
             mine = np.flatnonzero(row == first + k)
@@ -227,7 +227,7 @@ class Found:
         self.others = monodromy.Matrices.empty(N, m)
 
     def put(self, points, shown):
-        """Keep what is Shown of these points."""
+        """Keep the ShownOrbits of these points."""
         to = points[shown.good]
         self.good[to] = True
         for name in ("x", "dx", "T", "dT", "square"):

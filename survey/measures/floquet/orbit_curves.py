@@ -23,9 +23,9 @@ import numpy as np
 from survey.kernels.math.roundoff import EPS
 from survey.measures import contours
 from survey.measures.floquet import bifurcations, existence, monodromy
-from survey.measures.floquet.continuation import Curves, Range, floored, rough_flow, slopes
+from survey.measures.floquet.continuation import ContinuedCurves, Range, floored, rough_flow, slopes
 from survey.measures.floquet.critical import Critical
-from survey.measures.floquet.critical_points import RTOL, Points
+from survey.measures.floquet.critical_points import RTOL, CriticalPoints
 from survey.measures.floquet.critical_walk import NEAREST, Walk
 from survey.measures.floquet.multipliers import MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
 from survey.measures.floquet.newton import bordered
@@ -98,7 +98,7 @@ class _Map:
             scale = np.where(
                 log, np.log(np.where(log, high, 1.0) / np.where(log, low, 1.0)), high - low
             )
-            self._points[how] = Points(
+            self._points[how] = CriticalPoints(
                 Critical.of(self.equation, self.varied, *how), self.given, scale, log
             )
         return self._points[how]
@@ -130,7 +130,7 @@ class _Map:
             rows[:, other] = self.square.parameters(lines)[:, k]
         elsewhere = self.continued is not None and self.continued.index not in self.varied
         begin = self._continued if elsewhere else None
-        curves = Curves(self.equation, Range(index, low, high), rows, self.reach, begin)
+        curves = ContinuedCurves(self.equation, Range(index, low, high), rows, self.reach, begin)
         for row, of_row in enumerate(curves.of_row):
             for curve in of_row:
                 yield from self._of_curve(curves, row, curve.finer(FINER), axis)
@@ -139,7 +139,7 @@ class _Map:
         """[(states, periods)] of the first, second, ... orbits at points (N, parameters), by the
         continuation.
         """
-        curves = Curves(self.equation, self.continued, points, self.reach)
+        curves = ContinuedCurves(self.equation, self.continued, points, self.reach)
         n = self.equation.n
         found = [
             curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)

@@ -95,7 +95,7 @@ def combined(few, *given):
 
 
 def spikes(points):
-    """Where far more samples show a spike than those of a run (N; NaN: nowhere), of `monodromy.Points`."""
+    """Where far more samples show a spike than those of a run (N; NaN: nowhere), of `monodromy.SystemPoints`."""
     found = np.full(len(points.points), np.nan)
     for group in points.groups:
         own = group.own

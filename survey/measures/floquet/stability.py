@@ -64,7 +64,7 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     wanted.
 
     `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of
-    `monodromy.Points`.
+    `monodromy.SystemPoints`.
     """
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
@@ -194,7 +194,7 @@ def _solve_some(system, structure, given, method, rtol, wanted, places, answer, 
     """Answer points (N, parameters), each from its own monodromy matrix, at their `places`."""
     # another method is asked to answer a second way: without what symmetries tell
     paired = structure != "none"
-    points = monodromy.Points(
+    points = monodromy.SystemPoints(
         system, given, halves=method is monodromy.method_of("auto"), paired=paired
     )
     where = np.flatnonzero(points.valid)

@@ -31,7 +31,7 @@ ROUNDING = EPS * (8.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
 PAIR_ROUNDING = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, NODES + 1) ** 3
 
 
-class Panel(NamedTuple):
+class TracePanel(NamedTuple):
     """Series on one panel; bars (5) are what A to t, divided by their growth, may be off."""
 
     middle: np.ndarray  # see `kernels.libration.panels.position` (4)
@@ -44,7 +44,7 @@ class Panel(NamedTuple):
 
 @lru_cache(maxsize=64)
 def panel(number):
-    """The Panel of this number."""
+    """The TracePanel of this number."""
     shapes, weights, middle = nodes(number)
     rates, matrix = tables()
     results = np.empty((NODES**2, kernels.RESULTS))
@@ -62,7 +62,7 @@ def panel(number):
     left_out = magnitudes.copy()
     left_out[:, : panels.TERMS, : traces.NODES][:, IN_S < lengths[:, None]] = 0.0
     short_bars = bars + left_out.sum(axis=(1, 2)) + (ROUNDING * abs(short)).sum(axis=(1, 2))
-    return Panel(middle, series, bars, short, lengths, short_bars)
+    return TracePanel(middle, series, bars, short, lengths, short_bars)
 
 
 def rows(e):

@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 from mpmath import mp
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 SCENE = "brun"
 ERROR = "u"
@@ -66,7 +66,7 @@ def system(point, options):
     a, b, p = values["p_phi"], values["p_psi"], values["p_theta0"]
     L = p**2 + ((b - a * u0) / sin) ** 2 - k * u0 * u0 + a * a
     rates = np.column_stack([-2.0 * k, k - L, a * b]) / (A * A)[:, None]
-    return System(
+    return PeerSystem(
         _slope,
         np.column_stack([u0, -sin * p / A]),
         rates,

@@ -8,7 +8,7 @@ from importlib import resources
 
 import numpy as np
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "phi"
 LAST, NUMBER = 20.0, 10_000
@@ -64,7 +64,7 @@ def system(point, options):
     else:
         parameters = [(p["C22"] - p["C33"]) * over, p["C23"] * over, p["S2"] * over, p["S3"] * over]
         start = [p["phi0"], p["w0"]]
-    return System(
+    return PeerSystem(
         slope=_inclined if inclined else _elliptic,
         start=np.column_stack(start),
         parameters=np.column_stack(parameters),

@@ -14,7 +14,7 @@ import numpy as np
 from survey.measures.cylinder import motion
 from survey.measures.cylinder.fate import remembered
 from survey.methods import taylor
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 SCENE = "gyrostat"
 ERROR = "cycle_multiplier"
@@ -68,7 +68,7 @@ def system(point, options):
         [np.ravel(values) for values in np.broadcast_arrays(*(point[name] for name in _NAMES))]
     )
     first = np.array([_first(tuple(row)) for row in rows.tolist()])
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.column_stack([first[:, :2], np.zeros(len(first))]),
         parameters=rows.astype(float),

@@ -11,7 +11,7 @@ from importlib import resources
 import numpy as np
 from scipy.special import ellipk
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "spectral_radius"
 MOST = {"taylor16": 2_000, "dop853": 300, "rk4": 30}  # points that a slow method is timed on
@@ -71,7 +71,7 @@ def system(point, options):
     a, b, off = (1.0 - roll) / rest, (1.0 - yaw) / rest, (roll - yaw) / rest
     columns = np.tile(np.eye(4).ravel(), (k.size, 1))
     span = 4.0 * ellipk(k * k)
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.column_stack([0.0 * k, k, columns]),
         parameters=np.column_stack([
