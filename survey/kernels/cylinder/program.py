@@ -28,7 +28,7 @@ from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 # vanishes within rounding.
 REVERSED, ON_CIRCLE, MIRRORED, AT_REST, MEAN = 0, 2, 3, 4, 5
 BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(6, 10)  # as in `flow`
-_OF_F, _OF_G, _OF_DG, _OF_DDG = range(4)  # the same from BOUND_F on
+_ON_F, _ON_G, _ON_DG, _ON_DDG = range(4)  # the same from BOUND_F on
 _BOUNDS = 4
 COLUMNS = 10  # of a row of `flow`; what has more is a program
 SLOTS, FORCES, F_AT, G_AT, DG_AT, RADIUS, OPERATIONS = range(10, 17)
@@ -287,10 +287,10 @@ def bounds(p, phi, radius, B, out):
     ball(p, phi, 0.0, 1, B)
     rounded_f, rounded_g = B[f, 0, 1] / ROUNDOFF_UP, B[g, 0, 1] / ROUNDOFF_UP
     ball(p, phi, radius, 3, B)
-    out[_OF_F] = max(out[_OF_F], rounded_f, 1.0001 * max(_largest(B, f, 0), _largest(B, f, 1)))
-    out[_OF_G] = max(out[_OF_G], rounded_g, 1.0001 * _largest(B, g, 0))
-    out[_OF_DG] = max(out[_OF_DG], 1.0001 * _largest(B, g, 1))
-    out[_OF_DDG] = max(out[_OF_DDG], 2.0001 * _largest(B, g, 2))
+    out[_ON_F] = max(out[_ON_F], rounded_f, 1.0001 * max(_largest(B, f, 0), _largest(B, f, 1)))
+    out[_ON_G] = max(out[_ON_G], rounded_g, 1.0001 * _largest(B, g, 0))
+    out[_ON_DG] = max(out[_ON_DG], 1.0001 * _largest(B, g, 1))
+    out[_ON_DDG] = max(out[_ON_DDG], 2.0001 * _largest(B, g, 2))
 
 
 @kernel

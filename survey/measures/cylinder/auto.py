@@ -79,11 +79,12 @@ def _trajectories(method, rtol, rows, times, served):
         )
     results = solve(closed, rows, times)
     missed = solution.missed(results, rtol)
-    uncounted = results[1] == UNDETERMINED
+    floats, turnings, status = results
+    uncounted = turnings == UNDETERMINED
     if uncounted.any():
         missed |= uncounted
-        results[0][uncounted] = np.nan
-        results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
+        floats[uncounted] = np.nan
+        status[uncounted & (status == OK)] = closed.NO_CONVERGENCE
     return _further(solve, method, rtol, results, missed, rows, times)
 
 
@@ -128,7 +129,8 @@ def _left_open(results, rtol):
             | (status == SEPARATRIX)
         )
     if len(results) == 3:
-        missed |= (results[1] == UNDETERMINED) & (status == OK)
+        _floats, turnings, _status = results
+        missed |= (turnings == UNDETERMINED) & (status == OK)
     return missed
 
 
@@ -141,7 +143,8 @@ def _completed(results, missed, solve, rows, columns):
     old = [result[some] for result in results]
     take = missed[some] & (solution.badness(others) <= solution.badness(old))
     if len(others) == 3:  # turnings that either knows are certain
-        np.copyto(others[1], old[1], where=others[1] == UNDETERMINED)
+        (_floats, known, _status), (_others, turnings, _other_status) = old, others
+        np.copyto(turnings, known, where=turnings == UNDETERMINED)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held

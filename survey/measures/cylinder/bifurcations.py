@@ -412,7 +412,8 @@ def _hopf(plane, curve):
     yield from _run(plane, curve, kind, (lambda t: slope(t)[0] < 0.0, lambda t: ends(t)[0] < 0.0))
     yield from _marks(plane, curve, "bogdanov_takens", slope)
     for mark in _marks(plane, curve, "generalised_hopf", ends):
-        if force(plane.system(mark[1]), mark[3]["equilibrium_phi"][0])[1][0] < 0.0:
+        _kind, xy, _error, known = mark
+        if force(plane.system(xy), known["equilibrium_phi"][0])[1][0] < 0.0:
             yield mark
 
 

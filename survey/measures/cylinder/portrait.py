@@ -8,6 +8,7 @@ cycle is followed again for its period, and the branches of the saddles are foll
 
 import math
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,17 @@ COUNTS = ("equilibria", "saddles", "rotations_plus", "rotations_minus", "librati
 MEANS = ("mean_f", "mean_g")
 ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
 TINY = 1e-300
+
+
+class Listed(NamedTuple):
+    """A cycle: number `at` of point `i`, of a kind, its row of `returns`, and its system."""
+
+    i: int
+    at: int
+    kind: int
+    row: np.ndarray
+    skeleton: object
+    system: np.ndarray
 
 
 def empty(count, status, columns=0):
@@ -96,12 +108,12 @@ def solve(method, systems, rtol):
         ]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
-        listed += [(i, at, kind, row, s, six) for at, (kind, row) in enumerate(cycles[:CYCLES])]
+        listed += [Listed(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
     for kinds, timed in (
         ((ROTATION_PLUS, ROTATION_MINUS), _rotations),
         ((LIBRATION,), _librations),
     ):
-        some = [cycle for cycle in listed if cycle[2] in kinds]
+        some = [cycle for cycle in listed if cycle.kind in kinds]
         if some:
             _write(some, timed(method, some, rtol), result)
     return result
