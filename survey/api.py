@@ -534,9 +534,7 @@ def _unit(units: str, module: Any, ratio: bool = False) -> str:
 
 def _method_line(module: Any, name: str) -> str:
     method = measures.method(name)
-    docstring, when = (
-        inspect.cleandoc(method.__doc__),
-        condition(module, getattr(method, "WHEN", {})),
-    )
+    docstring = inspect.cleandoc(method.__doc__)
+    when = condition(module, getattr(method, "WHEN", {}))
     first = getattr(method, "ABOUT", {}).get(module.FAMILY, summary(docstring))
     return first.removesuffix(".") + when if when else first

@@ -57,10 +57,8 @@ def main(arguments=None):
 
 def _usage(error):
     """What is wrong with the command line, and where to find its usage, in one line."""
-    message, context = (
-        error.format_message().replace("\n", " ").removesuffix("."),
-        getattr(error, "ctx", None),
-    )
+    message = error.format_message().replace("\n", " ").removesuffix(".")
+    context = getattr(error, "ctx", None)
     message = re.sub(r"is not a valid (integer|float) range", r"is not a valid \1", message)
     message = re.sub(r"is not in the range (\S+)<=x<=(\S+)", r"is not from \1 to \2", message)
     message = re.sub(r"is not in the range x>=(\S+)", r"is below \1", message)
@@ -692,10 +690,8 @@ def _carry_out(checked, quiet, start, further=()):
     """
     from survey.sweep.progress import Progress
 
-    finished, resume_command = (
-        None,
-        shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")]),
-    )
+    finished = None
+    resume_command = shlex.join(["survey", *(word for word in sys.argv[1:] if word != "--fresh")])
     _stop_on_sigterm()
     try:
         with Progress(err, checked, silent=quiet) as progress:

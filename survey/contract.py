@@ -90,7 +90,8 @@ def check_offered(module, table, where):
 @lru_cache(maxsize=256)
 def public(path):
     """The public names of the module in the file `path`, in their order."""
-    names, nodes = [], ast.parse(Path(path).read_text(encoding="utf-8")).body
+    names = []
+    nodes = ast.parse(Path(path).read_text(encoding="utf-8")).body
     while nodes:
         node, *nodes = nodes
         if isinstance(node, (ast.If, ast.Try, ast.With)):

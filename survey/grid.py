@@ -118,7 +118,8 @@ def lines(parameters):
 
 def ranges(parameters):
     """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`."""
-    alone, found = lines(parameters), {}
+    alone = lines(parameters)
+    found = {}
     for name, (dims, values) in parameters.items():
         if dims and name not in alone:
             found[name] = np.size(values), *_ends(values)

@@ -170,7 +170,8 @@ def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") ->
     """When the parameter `own` exists, in words: `; only with l; only when question = fate |
     portrait`; or nothing.
     """
-    words, options = [], {option.name: option for option in scene.OPTIONS}
+    words = []
+    options = {option.name: option for option in scene.OPTIONS}
     for name, allowed in when.items():
         beside = options[name].only_with
         if not any(allowed):

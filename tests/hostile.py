@@ -335,7 +335,7 @@ def questions(ds, path, solve, draw):
     """{what is asked: a call that returns text}."""
     from matplotlib.figure import Figure
 
-    from survey.viewer.shown import Map
+    from survey.viewer.shown import ShownMap
 
     def middle():
         return {dim: float(ds[dim].values[ds.sizes[dim] // 2]) for dim in ds.status.dims}
@@ -350,7 +350,7 @@ def questions(ds, path, solve, draw):
         ds.survey.zoom(num=2, **{dim: (float(ds[dim].min()), float(ds[dim].max()))})
 
     def under():
-        shown = Map(path)
+        shown = ShownMap(path)
         return "\n".join(shown.under(shown.read(""), (0, 0))).replace("\n", " ")
 
     def reused():
@@ -392,12 +392,12 @@ def page(path):
     from bokeh.models import Div
 
     from survey.viewer.page import Page
-    from survey.viewer.shown import Map
+    from survey.viewer.shown import ShownMap
 
     document = Document()
     context = SimpleNamespace(request=SimpleNamespace(arguments={}))
     document._session_context = lambda: context
-    shown = Page(Map(path), document)
+    shown = Page(ShownMap(path), document)
     shown.pointer = shown.map.position((0, 0))
     for dim in ("inner_width", "inner_height"):
         shown.plot.set_from_json(dim, 200)

@@ -177,14 +177,14 @@ def test_the_browser_page_of_a_hostile_file_holds_text_only(folder):
     import urllib.request
 
     from survey.viewer.server import start
-    from survey.viewer.shown import Map
+    from survey.viewer.shown import ShownMap
 
     path = changed(
         folder, title="</title><script>alert(1)</script>", options=f"a={HTML.replace('=', '')}"
     )
 
     async def page():
-        server, address = start(Map(path), 0)
+        server, address = start(ShownMap(path), 0)
         try:
             return await asyncio.to_thread(
                 lambda: urllib.request.urlopen(address, timeout=20).read().decode()

@@ -9,7 +9,7 @@ import xarray as xr
 
 import survey
 from survey.errors import BadInput, SurveyError
-from survey.viewer.shown import Map
+from survey.viewer.shown import ShownMap
 
 matplotlib.use("Agg")
 
@@ -141,7 +141,7 @@ def test_what_evaluate_returns_is_a_file_like_others_once_saved(bodies, grid, tm
     with pytest.raises(
         BadInput, match="the axis body holds names, and a viewer shows axes of numbers"
     ):
-        Map(tmp_path / "two.nc")
+        ShownMap(tmp_path / "two.nc")
     done = program("verify", "grid.nc", "--points", "3")
     assert (
         "sound except for the digest" in done.stdout

@@ -56,7 +56,8 @@ def audit(ds, points, seed=0):
     outputs, report["complaints"] = _stored_as_declared(flat, outputs, module)
     answered = np.zeros(flat.status.size, bool)
     decided = any(o.name == "verdict" and exists(o, options) for o in module.OUTPUTS)
-    rtol, wanted = max(ds.attrs["rtol"] / 100, 1e-13), [o.name for o in outputs]
+    rtol = max(ds.attrs["rtol"] / 100, 1e-13)
+    wanted = [o.name for o in outputs]
     for method in used:
         solved = evaluate(name, method=method, rtol=rtol, variables=wanted, **options, **arrays)
         solved = solved.transpose("_point", ...)
@@ -144,7 +145,8 @@ def _vertices(module, options, methods, rtol, ds, chosen, _solve, _random):
     """Complaints about vertices of surfaces where the function of their class certainly has the
     same sign on both sides."""
     schema.surfaces(ds)
-    measure, names = measures.question(module.FAMILY, "surfaces"), list(ds.status.dims)
+    measure = measures.question(module.FAMILY, "surfaces")
+    names = list(ds.status.dims)
     if (
         measure is None
         or not np.isin(ds.surface_class.values, list(measure.CLASSES.values())).all()
@@ -160,14 +162,16 @@ def _vertices(module, options, methods, rtol, ds, chosen, _solve, _random):
     }
     functions = measure.Functions(module, box, names, fixed, options, *methods, rtol)
     numbers = np.searchsorted(np.cumsum(ds.surface_vertices.values), chosen, side="right")
-    kinds, axis = ds.surface_class.values[numbers], ds.surface_axis.values[chosen].astype(int)
+    kinds = ds.surface_class.values[numbers]
+    axis = ds.surface_axis.values[chosen].astype(int)
     point = {name: ds[f"surface_{name}"].values[chosen] for name in names}
     middle = box.positions(np.stack([*point.values()], axis=1))
     off = np.zeros_like(middle)
     off[np.arange(chosen.size), axis] = ds.surface_position_error.values[chosen]
     words = {code: word for word, code in measure.CLASSES.items()}
     for kind in np.unique(kinds):
-        own, signs = np.flatnonzero(kinds == kind), []
+        own = np.flatnonzero(kinds == kind)
+        signs = []
         for side in (-1.0, 1.0):
             values, bars = functions.sharp(middle[own] + side * off[own], int(kind))
             signs.append(np.where(abs(values) > bars, np.sign(values), 0.0))
@@ -178,7 +182,8 @@ def _vertices(module, options, methods, rtol, ds, chosen, _solve, _random):
 def _cells(ds, chosen, solve, random):
     """Complaints about decided cells that contain a point of the other verdict."""
     schema.cells(ds)
-    names, part = ds.attrs["refine"].split(", "), random.uniform(0.0, 1.0, (2, chosen.size))
+    names = ds.attrs["refine"].split(", ")
+    part = random.uniform(0.0, 1.0, (2, chosen.size))
     ends = [[ds[f"cell_{name}_{end}"].values[chosen] for end in ("low", "high")] for name in names]
     point = {
         name: low + (high - low) * p for name, (low, high), p in zip(names, ends, part, strict=True)

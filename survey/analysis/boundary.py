@@ -75,7 +75,8 @@ def _surfaces(ds):
 def _edges(ds):
     """Every edge of every row."""
     schema.edges(ds)
-    count, axis = ds.edge_count, ds.attrs.get("boundaries", ds.status.dims[-1])
+    count = ds.edge_count
+    axis = ds.attrs.get("boundaries", ds.status.dims[-1])
     found = {}
     for dim, values in zip(
         count.dims, np.meshgrid(*(ds[dim].values for dim in count.dims), indexing="ij"), strict=True
@@ -92,10 +93,8 @@ def _edges(ds):
 def _undecided_cells(ds):
     """The centres of the cells that [refine] left undecided: every boundary lies in one of them."""
     schema.cells(ds)
-    left, found = (
-        np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"]),
-        {},
-    )
+    left = np.flatnonzero(ds.cell_verdict.values == flag_codes(ds.cell_verdict.attrs)["undecided"])
+    found = {}
     for dim in ds.attrs["refine"].split(", "):
         low, high = (ds[f"cell_{dim}_{end}"].values[left] for end in ("low", "high"))
         label = {"long_name": f"error bound of {dim}: half the width of the cell"}

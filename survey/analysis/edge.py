@@ -226,10 +226,8 @@ def _together(parts):
 def _piece(parameter, near):
     """The part of the domain around `near` that does not contain an excluded value."""
     low, high = parameter.minimum, parameter.maximum
-    below, above = (
-        [x for x in parameter.excluded if x < near],
-        [x for x in parameter.excluded if x > near],
-    )
+    below = [x for x in parameter.excluded if x < near]
+    above = [x for x in parameter.excluded if x > near]
     if below or parameter.open_minimum:
         low = max([low, *below])
         low += INSIDE * (near - low)
@@ -241,10 +239,8 @@ def _piece(parameter, near):
 
 def _nearest(found, index, complete, near):
     """Only the last boundary below `near`, and the first above."""
-    below, above = (
-        np.flatnonzero(found.position <= near)[-1:],
-        np.flatnonzero(found.position > near)[:1],
-    )
+    below = np.flatnonzero(found.position <= near)[-1:]
+    above = np.flatnonzero(found.position > near)[:1]
     chosen = np.concatenate([below, above])
     return (
         boundaries.OnLine(

@@ -26,7 +26,8 @@ def solve(point, time=None):
         raise BadInput(
             f"the scene {name} has no trajectory; its file would have to define that function"
         )
-    options, symbols = options_at(point, scene), {p.name: p.symbol for p in scene.PARAMETERS}
+    options = options_at(point, scene)
+    symbols = {p.name: p.symbol for p in scene.PARAMETERS}
     given = {key: value for key, value in parameters(point).items() if key in symbols}
     # solved again: a motion is computed from parameters, never from other values in a file
     known = api.evaluate(user_scene.of_dataset(point), **given, **options)

@@ -47,7 +47,8 @@ def where(ds, name):
 
 def _kinds(ds):
     """{verdict, then status of points without an answer: where it is}."""
-    dims, kinds = ds.status.dims, {}
+    dims = ds.status.dims
+    kinds = {}
     statuses = {code: name for name, code in flag_codes(ds.status.attrs).items()}
     open_ = np.ones(ds.status.shape, bool)
     if "verdict" in ds:

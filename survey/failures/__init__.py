@@ -27,7 +27,7 @@ from survey.truth import kept
 
 
 @dataclass(frozen=True)
-class Record:
+class PlaneRecord:
     """One method on one plane; counts of points."""
 
     name: str
@@ -115,12 +115,12 @@ def measure(planes, say=lambda line: None):
 def record(plane, method, found):
     """What the picture shows, in numbers."""
     if found is None:
-        return Record(
+        return PlaneRecord(
             plane.name, method, plane.size, plane.size, 0, 0, 0, 0, np.nan, np.nan, np.nan, np.nan
         )
     known = found.error[found.answered & np.isfinite(found.error)]
     met = found.error[found.answered & ~found.missed & np.isfinite(found.error)]
-    return Record(
+    return PlaneRecord(
         plane.name, method, found.answered.size, int((~found.answered).sum()), int(found.missed.sum()),
         int(found.undecided.sum()), int(found.unchecked.sum()), int(found.lie.sum()),
         float(np.median(known)) if known.size else np.nan, float(known.max(initial=0.0)),

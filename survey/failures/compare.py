@@ -102,7 +102,8 @@ def judged(plane, answer, rtol):
     for mask in truth.pop("wrong", {}).values():
         lie |= mask
     checked = np.zeros(answered.shape, bool) | truth.pop("checked", False)
-    error, ratio = np.full(answered.shape, np.nan), np.zeros(answered.shape)
+    error = np.full(answered.shape, np.nan)
+    ratio = np.zeros(answered.shape)
     for name, (value, low, doubt) in truth.items():
         said, bar = answer[name], answer[f"{name}_error"].astype(float)
         with np.errstate(all="ignore"):

@@ -19,7 +19,8 @@ def draw(planes, results, path):
     figure, axes = plt.subplots(
         len(planes), len(methods), figsize=size, squeeze=False, layout="constrained"
     )
-    norm, shown = BoundaryNorm(np.arange(-17, -3), 256, extend="both"), None
+    norm = BoundaryNorm(np.arange(-17, -3), 256, extend="both")
+    shown = None
     for ax, method in zip(axes[0], methods, strict=True):
         ax.set_title(method, fontsize=9)
     for line, plane, of in zip(axes, planes, results, strict=True):

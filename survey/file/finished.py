@@ -67,7 +67,8 @@ def refuse(path, found, workflow, code, scene_hash):
     """Raise BadInput: the file at `path` is of another workflow, or of other code than this
     (`code`: its versions).
     """
-    causes, differences = [], changes(found, workflow)
+    causes = []
+    differences = changes(found, workflow)
     if differences:
         causes.append(f"of another workflow ({unfinished.listed(differences)})")
     if found.get("scene_hash", "") != scene_hash:

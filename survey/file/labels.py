@@ -127,7 +127,8 @@ def _variable(dims, values, attributes):
     """An xarray.Variable; integers that do not apply are masked."""
     import xarray as xr
 
-    encoding, fill = {}, attributes.get(FILL)
+    encoding = {}
+    fill = attributes.get(FILL)
     if fill is not None:
         encoding = {"dtype": values.dtype, FILL: fill}
         attributes = {key: value for key, value in attributes.items() if key != FILL}

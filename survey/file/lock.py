@@ -37,7 +37,9 @@ class Lock:
 
     def __init__(self, path, name):
         self.path, self.name = str(path), name
-        self.descriptor, self.ended, self.heart = None, threading.Event(), None
+        self.descriptor = None
+        self.ended = threading.Event()
+        self.heart = None
 
     def acquire(self):
         """Acquire the lock; returns the name that an interrupted run has left in it, else {}.
@@ -126,7 +128,8 @@ class Lock:
         message = "%s names host %s, pid %s; waiting up to %d s to see whether it is still running"
         details = before.get("host"), before.get("pid"), GONE_SECONDS
         logging.getLogger("survey").warning(message, self.path, *details)
-        first, deadline = _beat_of(self.path), time.monotonic() + GONE_SECONDS
+        first = _beat_of(self.path)
+        deadline = time.monotonic() + GONE_SECONDS
         while time.monotonic() < deadline:
             time.sleep(BEAT_SECONDS / 8)
             if _beat_of(self.path) != first:

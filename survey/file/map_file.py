@@ -22,11 +22,13 @@ class MapFile:
     def __init__(self, path, folder, coordinates, variables, layout, shape, tile):
         from survey.file import netcdf
 
-        self.path, self.part, self.auxiliary = Path(path), folder / "output.nc", {}
+        self.path = Path(path)
+        self.part = folder / "output.nc"
+        self.auxiliary = {}
         self.file, self.published = None, False
         with refused(self.path):
             try:
-                self.file = netcdf.File(self.part)
+                self.file = netcdf.NewFile(self.part)
                 self._define_map(coordinates, variables, layout, shape, tile)
             except BaseException:
                 self.discard()

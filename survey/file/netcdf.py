@@ -27,7 +27,10 @@ class Sink:
         # that one on Windows
         flags = os.O_RDWR | os.O_CREAT | os.O_TRUNC | getattr(os, "O_BINARY", 0)
         self.descriptor = os.open(path, flags, 0o666)
-        self.at, self.size, self.error, self.unwritten = 0, 0, None, []
+        self.at = 0
+        self.size = 0
+        self.error = None
+        self.unwritten = []
 
     def seek(self, offset, whence=os.SEEK_SET):
         self.at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self.at, os.SEEK_END: self.size}[whence]
@@ -45,7 +48,8 @@ class Sink:
         count = max(0, min(len(buffer), self.size - self.at))
         self._try(self._read, buffer[:count])
         for at, content in self.unwritten:
-            first, end = max(at, self.at), min(at + len(content), self.at + count)
+            first = max(at, self.at)
+            end = min(at + len(content), self.at + count)
             if first < end:
                 buffer[first - self.at : end - self.at] = content[first - at : end - at]
         self.at += count
@@ -99,7 +103,7 @@ class Sink:
             done += os.write(self.descriptor, content[done:])
 
 
-class File:
+class NewFile:
     """A new netCDF-4 file at `path`: `define` its variables, then `close` it. Raises OSError where
     the disk does.
 
@@ -107,7 +111,9 @@ class File:
     """
 
     def __init__(self, path):
-        self.sink, self.dimensions, self.variables = Sink(path), {}, {}
+        self.sink = Sink(path)
+        self.dimensions = {}
+        self.variables = {}
         self.file = h5py.File(self.sink, "w", track_order=True, libver=VERSIONS, locking=False)
         try:
             self.describe(

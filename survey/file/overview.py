@@ -23,7 +23,7 @@ PIECE = 2**22  # points that are read at once, at most
 STRIDE = 8  # rounds in which pieces are read; each round spans the map
 
 
-class Points:
+class VariablePoints:
     """One variable of a survey over two of its axes, and its status `state`: DataArrays, possibly
     lazy.
 

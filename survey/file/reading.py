@@ -151,7 +151,8 @@ def check(path, ds=None):
     """
     ds = load(path) if ds is None else ds
     complaints = undigested(path)
-    recount, wrong = tally(ds), {}
+    recount = tally(ds)
+    wrong = {}
     for arrays in pieces(ds):
         recount.add(arrays)
         wrong |= dict.fromkeys(_unsound(path, arrays))

@@ -115,12 +115,11 @@ def options(given):
 
 def flags(attributes):
     """{flag meaning: code} from the attributes of a CF flag variable; raises Damaged."""
-    meanings, codes = (
-        attributes.get("flag_meanings"),
-        np.atleast_1d(attributes.get("flag_values", ())),
-    )
+    meanings = attributes.get("flag_meanings")
+    codes = np.atleast_1d(attributes.get("flag_values", ()))
     if not isinstance(meanings, str) or codes.dtype.kind not in "iu" or codes.ndim != 1:
-        meanings, codes = "", np.zeros(0, int)
+        meanings = ""
+        codes = np.zeros(0, int)
     return dict(_flags(meanings, tuple(codes.tolist())))
 
 

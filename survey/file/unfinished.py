@@ -40,11 +40,9 @@ def summary(path):
     {} if there is none.
     """
     folder = folder_of(path)
-    known, holder, files = (
-        table(folder / "manifest.json"),
-        table(folder / "holder.json"),
-        _blocks(folder),
-    )
+    known = table(folder / "manifest.json")
+    holder = table(folder / "holder.json")
+    files = _blocks(folder)
     if "blocks" not in known:
         return {}
     active = lock.holder(f"{path}.lock")
@@ -91,7 +89,9 @@ def drift(path, old, new, changed, workflow):
     workflow.
     """
     folder = folder_of(path)
-    done, causes, ways_back = counted(len(_blocks(folder)), "finished block"), [], []
+    done = counted(len(_blocks(folder)), "finished block")
+    causes = []
+    ways_back = []
     if CODE & set(changed):
         causes.append(f"from another version of the code ({_code(old, new)})")
         ways_back.append("that version")
@@ -177,7 +177,8 @@ def _resume_command(path, holder):
     """The command that resumes: the one that started the run, or else one with the workflow that
     the folder keeps.
     """
-    words, folder = _words(holder.get("resume_command")), holder.get("folder")
+    words = _words(holder.get("resume_command"))
+    folder = holder.get("folder")
     if words[:2] != ["survey", "run"]:  # another program: the folder may be untrusted
         return f"survey run {shlex.quote(str(folder_of(path) / 'workflow.toml'))} -o {shlex.quote(str(path))}"
     elsewhere = isinstance(folder, str) and folder != os.getcwd()

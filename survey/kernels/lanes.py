@@ -26,9 +26,12 @@ from survey.kernels.unroll import changes_sign, unroll
 # bounds, and the numbers of zeros of y1 and of y2 on the way.
 Y1, DY1, Y2, DY2, Y1_BAR, DY1_BAR, Y2_BAR, DY2_BAR, Y1_ZEROS, Y2_ZEROS = range(10)
 RESULTS = 10
+# The state of a lane: Y1 to DY2 so far, S of either column (three numbers), the zeros of y1 and of y2,
+# and M.
+_ELLIPSE_1, _ELLIPSE_2, _ZEROS_1, _ZEROS_2, _SUM = 4, 7, 10, 11, 12
+STATE = 13
 TILE = 64
 VECTOR = 8
-STATE = 13
 WORST = 300.0
 ROUNDING = 1.8e-15  # of the products that carry an error ellipse, relative
 SCALE = 2.0**350  # bars of 1e-259 to 1e48 have squares within the range of float64
@@ -116,29 +119,28 @@ def _start(state, count):
         for i in range(count):
             state[k, i] = 0.0
     for i in range(count):
-        state[0, i] = 1.0
-        state[3, i] = 1.0
+        state[Y1, i] = 1.0
+        state[DY2, i] = 1.0
 
 
 @unroll
 def _advance(matrix, h, state, i):
-    """One step of lane i. State: y1, y1', y2, y2', S of column 1 (3), S of column 2 (3), zeros of
-    y1, y2, M.
-    """
-    for at, ellipse, zeros in ((0, 4, 10), (2, 7, 11)):
+    """One step of lane i."""
+    for at, ellipse, zeros in ((Y1, _ELLIPSE_1, _ZEROS_1), (Y2, _ELLIPSE_2, _ZEROS_2)):
         before = state[at, i]
         ends = column(matrix, before, state[at + 1, i], *(state[ellipse + k, i] for k in range(3)))
         state[zeros, i] = state[zeros, i] + changes_sign(before, ends[0])
         state[at, i], state[at + 1, i] = ends[:2]
         for k in range(3):
             state[ellipse + k, i] = ends[2 + k]
-    state[12, i] = state[12, i] + relative(matrix, h)
+    state[_SUM, i] = state[_SUM, i] + relative(matrix, h)
 
 
 @unroll
 def relative(matrix, h):
     """The local error bounds of a step as one number without units."""
-    return matrix[4] + (matrix[5] / h + matrix[6] * h)
+    _a, _b, _c, _d, diagonal, upper, lower = matrix
+    return diagonal + (upper / h + lower * h)
 
 
 @unroll
@@ -151,10 +153,8 @@ def column(matrix, y, v, s, t, w):
     low, high = c * s + d * t, c * t + d * w
     # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose
     # its positive sign
-    round_y, round_v = (
-        ROUNDING * (a * (a * s) + b * (b * w)),
-        ROUNDING * (c * (c * s) + d * (d * w)),
-    )
+    round_y = ROUNDING * (a * (a * s) + b * (b * w))
+    round_v = ROUNDING * (c * (c * s) + d * (d * w))
     s = left * a + right * b + (error_y * error_y + LEAST + round_y)
     t = left * c + right * d
     w = low * c + high * d + (error_v * error_v + LEAST + round_v)
@@ -165,8 +165,10 @@ def column(matrix, y, v, s, t, w):
 def _finish(state, i, steps, out):
     for k in range(4):
         out[Y1 + k] = state[k, i]
-    bars(state[4, i], state[6, i], state[7, i], state[9, i], steps, state[12, i], out)
-    out[Y1_ZEROS], out[Y2_ZEROS] = state[10, i], state[11, i]
+    s1, w1 = state[_ELLIPSE_1, i], state[_ELLIPSE_1 + 2, i]
+    s2, w2 = state[_ELLIPSE_2, i], state[_ELLIPSE_2 + 2, i]
+    bars(s1, w1, s2, w2, steps, state[_SUM, i], out)
+    out[Y1_ZEROS], out[Y2_ZEROS] = state[_ZEROS_1, i], state[_ZEROS_2, i]
 
 
 @splice

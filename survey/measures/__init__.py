@@ -39,7 +39,7 @@ QUESTIONS = {
         "TITLE": Value("what a class is, one line", str),
         "ALONG": Value("survey.scene.Output of what is known at each point of a curve", tuple),
         "trace": Function(
-            "the Curves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",
+            "the FollowedCurves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",
             ("solve", "square", "seeds", "each"),
         ),
         "Seeds": Value(
@@ -77,7 +77,9 @@ QUESTIONS = {
     },
     # Where the curves of `trace` turn back.
     "folds": {
-        "find": Function("the Folds of the Curves", ("solve", "square", "curves"), needed=True),
+        "find": Function(
+            "the Folds of the FollowedCurves", ("solve", "square", "curves"), needed=True
+        ),
     },
     # The cells of [refine], decided everywhere in them.
     "cells": {
@@ -162,7 +164,8 @@ def _serving(scene, name):
 @cache
 def check(module):
     """Raise BadInput if the method does not keep to the tables of the families that it serves."""
-    own, table = "survey/methods/__init__.py", dict(methods.CONTRACT)
+    own = "survey/methods/__init__.py"
+    table = dict(methods.CONTRACT)
     where = dict.fromkeys(table, own)
     if not hasattr(module, "SERVES"):
         contract.refuse(module, f"SERVES is missing: {table['SERVES'].meaning}", own)

@@ -72,7 +72,8 @@ def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
         return once(f"surfaces-{LINES}-{i}", make)
 
     planes = each(lattice, range(LINES), "planes of the surfaces' lattice")
-    parts, left_out = [], 0
+    parts = []
+    left_out = 0
     for kind in map(int, planes[0]):
         values = _told(
             np.stack([plane[str(kind)] for plane in planes]).reshape(LINES, LINES, LINES)
@@ -167,7 +168,8 @@ def marched(values):
     code = sum(at_corner(negative, k).astype(np.int16) << k for k in range(8))
     cut = np.logical_and.reduce([at_corner(known, k) for k in range(8)]) & (code > 0) & (code < 255)
     cubes, codes = np.argwhere(cut), code[cut]
-    strides, found = np.array([size[1] * size[2], size[2], 1]), [np.zeros((0, 3), np.int64)]
+    strides = np.array([size[1] * size[2], size[2], 1])
+    found = [np.zeros((0, 3), np.int64)]
     for own in np.unique(codes):
         table = polygons(int(own))
         corner = (cubes[codes == own][:, None, None] + CORNERS[table % 8]) @ strides
@@ -186,7 +188,8 @@ def _sharpened(functions, kind, values, cut, grain):
     x = nodes * step
     low = x[rows, axis]
     high = low + step
-    start, error = low + step * _crossing(values, nodes, axis), np.full(len(cut), np.inf)
+    start = low + step * _crossing(values, nodes, axis)
+    error = np.full(len(cut), np.inf)
 
     def at(left, who, t):
         here = np.repeat(x[left[who], None], t.shape[1], axis=1)

@@ -44,7 +44,8 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
         )
     terms = abs(matrices).max(axis=1) if terms is None else terms
     halves = [_step(matrices[:, 3 * i : 3 * i + 3], 0.5 * h) for i in range(2)]
-    steps, units = halves[1] @ halves[0], np.divide.outer(scale * np.ones(n), scale * np.ones(n))
+    steps = halves[1] @ halves[0]
+    units = np.divide.outer(scale * np.ones(n), scale * np.ones(n))
     off = abs(steps - _step(matrices[:, 6:], h)) / units
     # an entry's difference may vanish by symmetry: the largest stands for all
     local = SAFETY * off.max(axis=(1, 2), keepdims=True) * units + EPS * (

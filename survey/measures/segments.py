@@ -42,7 +42,8 @@ def along(values, ticks, met, weights_of, optional=()):
     `ticks` of a line, or UNKNOWN, which meets curves at `met` [(kind, position)]; `weights_of` and
     `optional` as in `segments`. What is perhaps drawn twice may count or not.
     """
-    positions, found = np.array([position for _, position in met]), {}
+    positions = np.array([position for _, position in met])
+    found = {}
     weights = np.array([weights_of.get(kind, 1) for kind, _ in met], int)
     _, kinds = np.unique([kind for kind, _ in met], return_inverse=True)
     near = (abs(positions[:, None] - positions) < NEAR) & (kinds[:, None] == kinds)

@@ -18,6 +18,8 @@ from survey.kernels.hill.cells import (
     INDEX_X,
     LEAF,
     STABLE_PART,
+    TAIL_X,
+    TAIL_Y,
     UNSOLVED,
     UNSTABLE_PART,
     VERDICT,
@@ -37,13 +39,16 @@ def find(solve, x, y, each, report, values):
 
 def _descend(series, doubts, blocks, depth, halves):
     """As `kernels.hill.cells.descend`: leaves (M, LEAF) of blocks, cells of one size halved together."""
-    leaves, slack = [], doubts.sum(axis=2)
-    own, where, of = series, blocks.astype(np.int64), np.arange(len(blocks))
+    leaves = []
+    slack = doubts.sum(axis=2)
+    own = series
+    where = blocks.astype(np.int64)
+    of = np.arange(len(blocks))
     while len(where):
         verdict = decided(own, slack[of])
         # a block whose own series is too loose is solved again, if it can be halved
         loose = (verdict == UNDECIDED) & (
-            doubts[of][:, :, :2].sum(axis=2) > ENOUGH * _sizes(own)
+            doubts[of][:, :, [TAIL_X, TAIL_Y]].sum(axis=2) > ENOUGH * _sizes(own)
         ).any(axis=1)
         to_split = (
             (where == blocks[of]).all(axis=1)

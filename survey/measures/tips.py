@@ -26,12 +26,12 @@ class _End:
     """
 
     def __init__(self, x, error):
-        self.x, self.error, self.own = [*x], [*error], len(x)
-        self.step, self.going, self.side = (
-            max(LEAST, min(np.hypot(*(x[-1] - x[-2])), 0.25 * LONGEST)),
-            True,
-            0.0,
-        )
+        self.x = [*x]
+        self.error = [*error]
+        self.own = len(x)
+        self.step = max(LEAST, min(np.hypot(*(x[-1] - x[-2])), 0.25 * LONGEST))
+        self.going = True
+        self.side = 0.0
 
     @property
     def ahead(self):
@@ -90,7 +90,8 @@ def _merged(pieces):
     np.fill_diagonal(met, False)
     partner = np.where(met.sum(axis=0) == 1, met.argmax(axis=0), -1)
     partner = np.where((partner >= 0) & (partner[partner] == np.arange(len(ends))), partner, -1)
-    done, left = [], set(range(len(pieces)))
+    done = []
+    left = set(range(len(pieces)))
 
     def chain(end):
         """The pieces from this end on: [(number, is it taken backwards?)]."""
@@ -138,7 +139,8 @@ def _steps(function, going, ends, grain):
     """One step of all ends that are going; those that cannot take it try a shorter one next, or stop."""
     goals, met = zip(*(_goal(end, ends) for end in going), strict=True)
     ahead, goals = np.array([end.ahead for end in going]), np.array(goals)
-    axis, rows = np.argmin(abs(ahead), axis=1), np.arange(len(going))
+    axis = np.argmin(abs(ahead), axis=1)
+    rows = np.arange(len(going))
     left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1)
     slope = np.array([end.side for end in going]) * np.sign(left[rows, axis])
     length = np.hypot(*(goals - [end.x[-1] for end in going]).T)

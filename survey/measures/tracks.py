@@ -50,10 +50,8 @@ class Track:
         low, chord = self.x[:-1], np.diff(self.x, axis=0)
         share = ((u[1:] - low) * chord).sum(axis=1) / np.maximum((chord * chord).sum(axis=1), TINY)
         off = abs(low + np.clip(share, 0.0, 1.0)[:, None] * chord - u[1:]).max(axis=1)
-        least, most = (
-            np.minimum(self.coordinate[:-1], self.coordinate[1:]),
-            np.maximum(self.coordinate[:-1], self.coordinate[1:]),
-        )
+        least = np.minimum(self.coordinate[:-1], self.coordinate[1:])
+        most = np.maximum(self.coordinate[:-1], self.coordinate[1:])
         return bool(
             ((off < SAME) & ((u[0] - least + APART) % turn < most - least + 2.0 * APART)).any()
         )
@@ -142,7 +140,9 @@ class Follower:
 
     def _half(self, found, sense):
         """The rows after the first point to one side, and whether the curve closes."""
-        (u, slopes), rows, step = found, [], 0.25 * LONGEST
+        (u, slopes) = found
+        rows = []
+        step = 0.25 * LONGEST
         first, tangent = u, sense * _tangent(slopes)
         while len(rows) < MOST and step > LEAST:
             new = self._corrected(u + step * tangent, tangent)

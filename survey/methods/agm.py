@@ -66,12 +66,10 @@ def _fine_parts(row):
     """The sum of the parts of both poles and their difference, where one of these is next to
     nothing (fast spin).
     """
-    k, total, near, far = (
-        nu.pair(row, nu.K),
-        nu.pair(row, nu.SUM),
-        nu.pair(row, nu.Q_HIGH),
-        nu.pair(row, nu.Q_LOW),
-    )
+    k = nu.pair(row, nu.K)
+    total = nu.pair(row, nu.SUM)
+    near = nu.pair(row, nu.Q_HIGH)
+    far = nu.pair(row, nu.Q_LOW)
     high, low = dd.sqrt(near), dd.sqrt(far)
     g = dd.mul(high, low)
     above, n = dd.add(nu.pair(row, nu.MIDDLE), g), nu.pair(row, nu.BEND)
@@ -109,12 +107,10 @@ def _blurred(row, roots, up, down, period, x, y):
     """Errors of precession and spin (S23) due to those of Q at the turning points and of s + g;
     advances up, down.
     """
-    share, low, high, above = (
-        _shares(x, y),
-        row[nu.NOISE_LOW],
-        row[nu.NOISE_HIGH],
-        row[nu.NOISE_ABOVE],
-    )
+    share = _shares(x, y)
+    low = row[nu.NOISE_LOW]
+    high = row[nu.NOISE_HIGH]
+    above = row[nu.NOISE_ABOVE]
     full, rest, time = abs(up) + abs(down), min(x, y) / max(x, y), 0.5 * period
     if x < y:  # the motion is slow where Q is least
         to_plus = (row[nu.LOW_PLUS] * roots[1] + row[nu.HIGH_PLUS] * roots[0]) / (
@@ -179,10 +175,8 @@ def _periods_of(row, out):
         pi * (turns_down - turns_up) + difference,
     )
     turned = 2.0 * ROUNDOFF * pi
-    turned_psi, turned_phi = (
-        turned * abs(turns_down + turns_up),
-        turned * abs(turns_down - turns_up),
-    )
+    turned_psi = turned * abs(turns_down + turns_up)
+    turned_phi = turned * abs(turns_down - turns_up)
     out[rc.PRECESSION_BAR] = (
         error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned_psi
     )

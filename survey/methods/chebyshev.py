@@ -24,6 +24,13 @@ SERVES = ("nutation",)
 _FIRST, _MOST = 8, 2**15
 _LONGEST = 512  # terms of the series in time
 _FULL = 38.0  # the first neglected coefficient is exp(-FULL)
+# Sums over nodes: T/A, the halves of the advances, the action, and the rounding of Q relative to it.
+_TIME, _UP, _DOWN, _ACTION, _ROUGH = range(5)
+_SUMS = 5
+# Integrands: dt/dx / A, the rates of both angles, then u and Q; the integrals are those of the first
+# three.
+_HERE, _SQUARE = 3, 4
+_INTEGRANDS, _INTEGRALS = 5, 3
 
 
 @inline
@@ -64,9 +71,7 @@ def _gathered(total, term):
 
 @inline
 def _sums(row, n, out):
-    """T/A, the halves of the advances, the action, and the rounding of Q relative to it, by n nodes
-    in x = 0..pi.
-    """
+    """Fill `out` (_SUMS), by n nodes in x = 0..pi."""
     low, high, bow = row[nu.Q_LOW], row[nu.Q_HIGH], row[nu.K] * row[nu.WIDTH] ** 2
     minus, plus = row[nu.MINUS], row[nu.PLUS]
     # sums and their roundings: of thousands of nodes near poles
@@ -86,12 +91,12 @@ def _sums(row, n, out):
         action = _gathered(action, s * c * root / (to_plus * to_minus))
         rough = max(rough, (low * s + high * c + abs(bow) * s * c) / square)
     step = pi / n
-    out[0], out[1], out[2] = (
+    out[_TIME], out[_UP], out[_DOWN] = (
         2.0 * step * (time[0] + time[1]),
         step * (up[0] + up[1]) * minus,
         step * (down[0] + down[1]) * plus,
     )
-    out[3], out[4] = row[nu.WIDTH] ** 2 * step * (action[0] + action[1]) / pi, rough
+    out[_ACTION], out[_ROUGH] = row[nu.WIDTH] ** 2 * step * (action[0] + action[1]) / pi, rough
 
 
 @inline
@@ -99,25 +104,25 @@ def _periods_of(row, n, speed, coarse, fine, out):
     """See `agm._periods_of`; the error of n nodes follows from the difference to half of them."""
     _sums(row, n // 2, coarse)
     _sums(row, n, fine)
-    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * fine[4]
+    noise = row[nu.NOISE_LOW] + row[nu.NOISE_HIGH] + 16.0 * ROUNDOFF * fine[_ROUGH]
     seen, missed = exp(-speed * n), exp(-2.0 * speed * n)
-    for i in range(4):
+    for i in range(_ROUGH):
         coarse[i] = 10.0 * (abs(fine[i] - coarse[i]) * seen + abs(fine[i]) * missed) + noise * abs(
             fine[i]
         )
-    coarse[1] += row[nu.NOISE_ENDS] * abs(fine[1])
-    coarse[2] += row[nu.NOISE_ENDS] * abs(fine[2])
-    coarse[3] += 2.5 * row[nu.NOISE_WIDTH] * fine[3]
-    out[rc.PERIOD], out[rc.ACTION] = fine[0], fine[3]
-    out[rc.PRECESSION], out[rc.SPIN] = fine[1] + fine[2], fine[2] - fine[1]
-    out[rc.PERIOD_BAR], out[rc.ACTION_BAR] = coarse[0], coarse[3]
-    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = coarse[1] + coarse[2]
+    coarse[_UP] += row[nu.NOISE_ENDS] * abs(fine[_UP])
+    coarse[_DOWN] += row[nu.NOISE_ENDS] * abs(fine[_DOWN])
+    coarse[_ACTION] += 2.5 * row[nu.NOISE_WIDTH] * fine[_ACTION]
+    out[rc.PERIOD], out[rc.ACTION] = fine[_TIME], fine[_ACTION]
+    out[rc.PRECESSION], out[rc.SPIN] = fine[_UP] + fine[_DOWN], fine[_DOWN] - fine[_UP]
+    out[rc.PERIOD_BAR], out[rc.ACTION_BAR] = coarse[_TIME], coarse[_ACTION]
+    out[rc.PRECESSION_BAR] = out[rc.SPIN_BAR] = coarse[_UP] + coarse[_DOWN]
 
 
 @kernel
 def nutation_periods(rows, kinds, tolerance, out):
     """See `agm.nutation_periods`."""
-    coarse, fine = np.empty(5), np.empty(5)
+    coarse, fine = np.empty(_SUMS), np.empty(_SUMS)
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             speed = _rate(rows[i])
@@ -130,15 +135,15 @@ def nutation_periods(rows, kinds, tolerance, out):
 
 @inline
 def _integrands(row, x, out):
-    """dt/dx / A at u = ul + (uh - ul) sin^2(x/2), the rates of both angles, u and Q."""
+    """Fill `out` (_INTEGRANDS) at u = ul + (uh - ul) sin^2(x/2)."""
     s, c = sin(0.5 * x) ** 2, cos(0.5 * x) ** 2
     q = row[nu.Q_LOW] * c + row[nu.Q_HIGH] * s - row[nu.K] * row[nu.WIDTH] ** 2 * s * c
     to_plus = row[nu.LOW_PLUS] * c + row[nu.HIGH_PLUS] * s
     to_minus = row[nu.LOW_MINUS] * c + row[nu.HIGH_MINUS] * s
-    out[0] = 1.0 / sqrt(q)
-    out[1] = 0.5 * row[nu.MINUS] / to_plus * out[0] if row[nu.MINUS] != 0.0 else 0.0
-    out[2] = 0.5 * row[nu.PLUS] / to_minus * out[0] if row[nu.PLUS] != 0.0 else 0.0
-    out[3], out[4] = row[nu.LOW] * c + row[nu.HIGH] * s, q
+    out[_TIME] = 1.0 / sqrt(q)
+    out[_UP] = 0.5 * row[nu.MINUS] / to_plus * out[_TIME] if row[nu.MINUS] != 0.0 else 0.0
+    out[_DOWN] = 0.5 * row[nu.PLUS] / to_minus * out[_TIME] if row[nu.PLUS] != 0.0 else 0.0
+    out[_HERE], out[_SQUARE] = row[nu.LOW] * c + row[nu.HIGH] * s, q
 
 
 @inline
@@ -150,14 +155,14 @@ def _series(row, n, waves, value):
         _integrands(row, x, value)
         for j in range(n):
             wave = cos(j * x) * (2.0 / n if j else 1.0 / n) / (j if j else 1.0)
-            for m in range(3):
+            for m in range(_INTEGRALS):
                 waves[m, j] += wave * value[m]
 
 
 @inline
 def _integrals(waves, n, x, out):
-    """t/A and both angles at x in [0, pi] since u = ul."""
-    for m in range(3):
+    """Fill `out` (_INTEGRALS) at x in [0, pi] since u = ul."""
+    for m in range(_INTEGRALS):
         total = 0.0
         for j in range(n - 1, 0, -1):
             total += waves[m, j] * sin(j * x)
@@ -167,7 +172,7 @@ def _integrals(waves, n, x, out):
 @inline
 def _when(row, waves, n, time, value, out):
     """x at which `time` is reached; `out` as `_integrals`."""
-    first, given = pi * time / (pi * waves[0, 0]), (row, waves, n, time, value, out)
+    first, given = pi * time / (pi * waves[_TIME, 0]), (row, waves, n, time, value, out)
     return bracketed(_to_time, _integrals, given, first, (0.0, pi), (0.0, 4.0 * ROUNDOFF), 100)[0]
 
 
@@ -176,46 +181,46 @@ def _to_time(integrals, given, x):
     row, waves, n, time, value, out = given
     integrals(waves, n, x, out)
     _integrands(row, x, value)
-    return out[0] - time, value[0], not (out[0] - time) / value[0] > 0.0
+    return out[_TIME] - time, value[_TIME], not (out[_TIME] - time) / value[_TIME] > 0.0
 
 
 @inline
 def _motion(row, start, n, noise, times, waves, out):
     """See `kernels.nutation.motion.motion`."""
-    value, here = np.empty(5), np.empty(3)
+    value, here = np.empty(_INTEGRANDS), np.empty(_INTEGRALS)
     _series(row, n, waves, value)
-    half = pi * waves[0, 0]
-    size = pi * (abs(waves[1, 0]) + abs(waves[2, 0]))
+    half = pi * waves[_TIME, 0]
+    size = pi * (abs(waves[_UP, 0]) + abs(waves[_DOWN, 0]))
     x = 2.0 * atan2(sqrt(start[rc.DONE]), sqrt(start[rc.LEFT]))
     _integrals(waves, n, x, here)
     _integrands(row, x, value)
     start_delay = (
         start[rc.START_BAR]
-        * value[0]
+        * value[_TIME]
         / max(row[nu.WIDTH] * abs(sin(0.5 * x) * cos(0.5 * x)), nu.TINY)
     )
-    first_up, first_down = value[1] / value[0], value[2] / value[0]
+    first_up, first_down = value[_UP] / value[_TIME], value[_DOWN] / value[_TIME]
     side = start[rc.DIRECTION]
-    first, base_up, base_down = side * here[0], side * here[1], side * here[2]
+    first, base_up, base_down = side * here[_TIME], side * here[_UP], side * here[_DOWN]
     for j in range(len(times)):
         turns = np.floor((first + times[j]) / (2.0 * half) + 0.5)
         time = first + times[j] - turns * 2.0 * half
         side = 1.0 if time >= 0.0 else -1.0
         x = _when(row, waves, n, min(abs(time), half), value, here)
         _integrands(row, x, value)
-        up = side * here[1] - base_up + 2.0 * pi * turns * waves[1, 0]
-        down = side * here[2] - base_down + 2.0 * pi * turns * waves[2, 0]
+        up = side * here[_UP] - base_up + 2.0 * pi * turns * waves[_UP, 0]
+        down = side * here[_DOWN] - base_down + 2.0 * pi * turns * waves[_DOWN, 0]
         delay = 2.0 * noise * (abs(times[j]) + half)
-        wide, bend = (
-            row[nu.WIDTH],
-            row[nu.WIDTH] * (row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]),
+        wide = row[nu.WIDTH]
+        bend = row[nu.WIDTH] * (
+            row[nu.Q_LOW] + row[nu.Q_HIGH] + 4.0 * abs(row[nu.K]) * row[nu.WIDTH]
         )
-        speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[0]
-        rate_up, rate_down = value[1] / value[0], value[2] / value[0]
+        speed = wide * abs(sin(0.5 * x) * cos(0.5 * x)) / value[_TIME]
+        rate_up, rate_down = value[_UP] / value[_TIME], value[_DOWN] / value[_TIME]
         change = abs(rate_up - first_up) + abs(rate_down - first_down)
         moved = (abs(rate_up) + abs(rate_down)) * delay + change * start_delay
         delay += start_delay
-        out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = value[3], up + down, down - up
+        out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = value[_HERE], up + down, down - up
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH])
         out[j, rc.U_BAR] = speed * delay + bend * delay * delay + rounding + 8.0 * ROUNDOFF * wide
         out[j, rc.PSI_BAR] = out[j, rc.PHI_BAR] = (
@@ -226,7 +231,7 @@ def _motion(row, start, n, noise, times, waves, out):
 @kernel
 def nutation_motions(rows, kinds, starts, periods, times, out):
     """See `agm.nutation_motions`; by Fourier series of the integrals, of at most LONGEST terms."""
-    waves = np.empty((3, _LONGEST))
+    waves = np.empty((_INTEGRALS, _LONGEST))
     for i in range(len(rows)):
         if kinds[i] >= nu.NUTATION:
             speed = _rate(rows[i])

@@ -177,10 +177,8 @@ def _elliptic(kind, side, data, phi0, x, out):
         out[rc.VALUE], out[rc.TIME], out[rc.VALUE_BAR], out[rc.TIME_BAR] = phi0, 0.0, 0.0, 0.0
         return TURNING
     if kind == closed.LIBRATION:
-        edge, right = (
-            data[closed.BAR_RIGHT] + 4.0 * ROUNDOFF_UP * (abs(phi0) + abs(x)),
-            data[closed.RIGHT],
-        )
+        edge = data[closed.BAR_RIGHT] + 4.0 * ROUNDOFF_UP * (abs(phi0) + abs(x))
+        right = data[closed.RIGHT]
         if x >= right - edge:
             t, bar = closed.flight(data, math.pi, 0.0)
             if not bar < math.inf:

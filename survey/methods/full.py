@@ -67,12 +67,10 @@ def _read(state, squares, n, near, out):
 @kernel
 def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
     """As `steps.trajectory`, by the full equations."""
-    free, G, squares, axis = (
-        np.empty(8),
-        np.empty((gyrostat.ROWS, 3)),
-        np.zeros((6, 6)),
-        gyrostat.FRAME[:, 0].copy(),
-    )
+    free = np.empty(8)
+    G = np.empty((gyrostat.ROWS, 3))
+    squares = np.zeros((6, 6))
+    axis = gyrostat.FRAME[:, 0].copy()
     T, V = np.zeros((gyrostat.LAST + 1, 12)), np.zeros((LOW + 1, 6, 12))
     state, new, J, work = np.empty(6), np.empty(6), np.empty((6, 6)), np.empty((6, 6))
     here, there = np.empty(rc.STATE), np.empty((6, 6))

@@ -11,7 +11,7 @@ Source: A. P. Markeev, Libration Points (1978), ch. 8; algorithm: `kernels/libra
 import numpy as np
 
 from survey.kernels.libration.lie import normal_forms
-from survey.kernels.libration.lie_plan import solved
+from survey.kernels.libration.lie_plan import COEFFICIENT_BAR, REAL, solved
 from survey.kernels.libration.monomials import monomials
 
 ORDER = 0  # no steps: each order's sum is finite
@@ -23,7 +23,7 @@ def coefficients(mu, order):
     at N values of mu.
     """
     values, _norms = solved(normal_forms, mu, order)
-    return values[0], values[2]
+    return values[REAL], values[COEFFICIENT_BAR]
 
 
 def labels(order):

@@ -8,7 +8,7 @@ Source: that of `lie`.
 """
 
 from survey.kernels.libration.lie_double import normal_forms
-from survey.kernels.libration.lie_plan import solved
+from survey.kernels.libration.lie_plan import COEFFICIENT_BAR, REAL, solved
 from survey.methods.lie import labels as labels
 
 ORDER = 0  # no steps: each order's sum is finite
@@ -18,7 +18,7 @@ SERVES = ("normal_form",)
 def coefficients(mu, order):
     """As `lie.coefficients`."""
     values, _norms = solved(normal_forms, mu, order)
-    return values[0], values[2]
+    return values[REAL], values[COEFFICIENT_BAR]
 
 
 def remainders(mu, order):

@@ -38,7 +38,7 @@ TRIED = np.array([-0.934, -0.551, 0.137, 0.862])  # points that are no nodes
 
 
 @dataclass(frozen=True)
-class Panel:
+class ModelPanel:
     """`series` (F, n, n): coefficients of T_j in x by T_k in y, within `bars` (F)."""
 
     low: tuple[float, float]
@@ -100,7 +100,10 @@ def solved(source, sides, rtol, budget=BUDGET, progress=None):
     `progress(done, total, 0, what)` is called with the part of the rectangle that is served or
     given up.
     """
-    left, found, spent, settled = deque([(tuple(sides), (0, 0))]), [], 0, 0.0
+    left = deque([(tuple(sides), (0, 0))])
+    found = []
+    spent = 0
+    settled = 0.0
     while left and spent < budget:
         if progress is not None:
             progress(max(int(PARTS * settled), min(spent, 1)), PARTS, 0, "parts of the map")
@@ -120,7 +123,7 @@ def solved(source, sides, rtol, budget=BUDGET, progress=None):
 
 
 def _panel(source, sides, rtol, depth):
-    """(the Panel, None), or (None, the side to be halved)."""
+    """(the ModelPanel, None), or (None, the side to be halved)."""
     middle = [0.5 * (low + high) for low, high in sides]
     radius = [0.5 * (high - low) for low, high in sides]
     longer = int(depth[1] < depth[0])
@@ -143,7 +146,7 @@ def _panel(source, sides, rtol, depth):
             values, longer
         )
     kept, dropped = _shortened(series, DROPPED * total)
-    panel = Panel(
+    panel = ModelPanel(
         tuple(s[0] for s in sides), tuple(s[1] for s in sides), kept, 1.001 * (total + dropped)
     )
     held = _holds(source, panel, middle, radius)
@@ -200,7 +203,9 @@ def _holds(source, panel, middle, radius):
 
 def _file(workflow, source, axes, sides, fixed, panels, proof):
     """The bytes of the file (the format: workflows/docs/model.md)."""
-    entries, numbers, first = [], [], 0
+    entries = []
+    numbers = []
+    first = 0
     for panel in panels:
         terms = []
         for own in panel.series:

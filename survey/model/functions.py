@@ -136,7 +136,8 @@ def _floquet(workflow, names, fixed):
             f"{scene.structure!r}; they can for at most {4 if paired else dense.LARGEST} states"
         )
     columns = [p.name for p in scene.PARAMETERS]
-    system, others = scene._system, tuple(float(fixed.get(name, 0.0)) for name in columns)
+    system = scene._system
+    others = tuple(float(fixed.get(name, 0.0)) for name in columns)
 
     def at(x, y):
         points = np.tile(np.array(others), (x.size * y.size, 1))

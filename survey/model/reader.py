@@ -263,7 +263,8 @@ def _read(path):
             for member in (TABLE, SERIES):
                 if archive.getinfo(member).file_size > BYTES:
                     raise ValueError(f"{member} would unpack to more than {BYTES:,} bytes")
-            table, series = json.loads(archive.read(TABLE)), archive.read(SERIES)
+            table = json.loads(archive.read(TABLE))
+            series = archive.read(SERIES)
         if not isinstance(table, dict):
             raise ValueError(f"{TABLE} holds no object")
     except (
@@ -340,10 +341,13 @@ class _Panel:
     """One panel: `series` (F, n, m) of T_j in x by T_k in y, and `bars` (F)."""
 
     def __init__(self, table, numbers):
-        self.low, self.high, self.bars = table["low"], table["high"], np.array(table["bars"])
+        self.low = table["low"]
+        self.high = table["high"]
+        self.bars = np.array(table["bars"])
         n = max(1, max(map(len, table["terms"])))
         m = max(max(terms, default=1) for terms in table["terms"])
-        self.series, at = np.zeros((len(table["terms"]), n, m)), table["first"]
+        self.series = np.zeros((len(table["terms"]), n, m))
+        at = table["first"]
         for own, terms in zip(self.series, table["terms"], strict=True):
             for j, count in enumerate(terms):
                 own[j, :count] = numbers[at : at + count]
@@ -412,10 +416,8 @@ class _Cells:
             shape = (number, along) if axis == 1 else (across, number)
             self.middle.append(np.broadcast_to(np.expand_dims(middle, axis), shape).reshape(-1))
             self.inverse.append(np.broadcast_to(np.expand_dims(inverse, axis), shape).reshape(-1))
-        self.series, self.bars = (
-            np.zeros((across, along, 3, q, q)),
-            np.full((across, along), np.nan),
-        )
+        self.series = np.zeros((across, along, 3, q, q))
+        self.bars = np.full((across, along), np.nan)
         theta = np.pi * (np.arange(q) + 0.5) / q
         matrix = 2.0 / q * np.cos(np.outer(np.arange(q), theta))
         matrix[0] /= 2
@@ -459,7 +461,8 @@ class _Cells:
     def _shorten(self, series, bars):
         """Leave out of each cell the highest degrees, as long as they add to its bound by a tenth at most."""
         q = series.shape[-1]
-        degree, size = np.maximum.outer(np.arange(q), np.arange(q)), abs(series[:, 0])
+        degree = np.maximum.outer(np.arange(q), np.arange(q))
+        size = abs(series[:, 0])
         layers = np.stack(
             [size[:, degree == k].sum(axis=1) for k in range(q)] + [np.zeros(bars.size)], axis=1
         )
@@ -488,10 +491,8 @@ class _Cells:
             for first in range(ends[c], ends[c + 1], PART):
                 part = slice(first, min(first + PART, ends[c + 1]))
                 n = part.stop - first
-                table, sums = (
-                    tables[: 2 * q * n].reshape(q, 2, n),
-                    products[: parts * q * n].reshape(parts * q, n),
-                )
+                table = tables[: 2 * q * n].reshape(q, 2, n)
+                sums = products[: parts * q * n].reshape(parts * q, n)
                 for values, side in ((x, 0), (y, 1)):
                     np.subtract(values[part], self.middle[side][c], out=table[1, side])
                     table[1, side] *= self.inverse[side][c]

@@ -65,7 +65,7 @@ TOGETHER = 5_000
 
 
 @dataclass
-class Record:
+class ChartRecord:
     """One measured point of the chart; `error` is the largest |error| / (1 + |value|) over the references."""
 
     work: str
@@ -181,7 +181,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
     ):
         peer = modules.load(programs, name, "peer")
         runs["", name] = _peer(case, peer), peer.POINTS
-    full, shared = case.works(), _shared(module)
+    full = case.works()
+    shared = _shared(module)
     with_all_outputs = getattr(case, "ALL", ())
     thinned = {work: (_thinned(point), options) for work, (point, options) in full.items()}
     records = []
@@ -219,7 +220,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 )
                 seconds = _per_point(asked, *timed[work], setting)
                 records.append(
-                    Record(work, method, peer, setting, error, seconds, wrong, compile_seconds)
+                    ChartRecord(work, method, peer, setting, error, seconds, wrong, compile_seconds)
                 )
                 if time.process_time() - began > LONG:
                     slow.add(work)
@@ -418,7 +419,9 @@ def _per_point(solve, point, options, rtol):
 
     Those that compile do not count, as for the first points that need double-double arithmetic.
     """
-    times, compiled, begin = [], [], time.perf_counter()
+    times = []
+    compiled = []
+    begin = time.perf_counter()
     while len(times + compiled) < REPEATS and (
         not times or time.perf_counter() - begin < ENOUGH_SECONDS
     ):
@@ -456,7 +459,8 @@ def _sample(point, most, shared=()):
             name: values[chosen] if len(values) == rows else values
             for name, values in point.items()
         }
-    names, flat = list(point), [values.ravel() for values in np.broadcast_arrays(*point.values())]
+    names = list(point)
+    flat = [values.ravel() for values in np.broadcast_arrays(*point.values())]
     chosen = np.random.default_rng(0).permutation(flat[0].size)[:most]
     return {name: values[chosen] for name, values in zip(names, flat, strict=True)}
 

@@ -103,10 +103,8 @@ def _line(axes, records, style):
     has any.
     """
     method, peer = records[0].method, records[0].peer
-    seconds, errors = (
-        [r.seconds_per_point for r in records],
-        [max(r.error, LEAST_ERROR) for r in records],
-    )
+    seconds = [r.seconds_per_point for r in records]
+    errors = [max(r.error, LEAST_ERROR) for r in records]
     name = f"peer {peer}" if peer else method
     style |= (
         {"ls": "--", "mfc": "white", "lw": 1.2}

@@ -29,13 +29,15 @@ def formula(z, names, piece):
     low, high = piece
     samples = tuple(low + (high - low) * (i + 0.5) / TRIED for i in range(TRIED))
     try:
-        found = lift(z, _Functions())(Symbol("u", samples), [Symbol(name) for name in names])
+        found = lift(z, _Functions())(
+            FormulaText("u", samples), [FormulaText(name) for name in names]
+        )
     except Unsupported:
         raise
     except Exception as error:
         raise Unsupported(f"{type(error).__name__}: {error}") from None
     return ast.unparse(
-        ast.parse(found.text if isinstance(found, Symbol) else number(found), mode="eval")
+        ast.parse(found.text if isinstance(found, FormulaText) else number(found), mode="eval")
     )
 
 
@@ -52,25 +54,25 @@ def number(value):
     return repr(value + 0) if value >= 0 else f"({value + 0!r})"
 
 
-class Symbol:
+class FormulaText:
     """A formula; `samples`: its values at some u, where it depends on u alone."""
 
     def __init__(self, text, samples=None):
         self.text, self.samples = text, samples
 
     def _with(self, other, operator, own, swapped=False):
-        if not isinstance(other, (Symbol, bool, int, float)):
+        if not isinstance(other, (FormulaText, bool, int, float)):
             return NotImplemented
-        text = other.text if isinstance(other, Symbol) else number(other)
+        text = other.text if isinstance(other, FormulaText) else number(other)
         first, second = (text, self.text) if swapped else (self.text, text)
-        values = other.samples if isinstance(other, Symbol) else (float(other),) * TRIED
+        values = other.samples if isinstance(other, FormulaText) else (float(other),) * TRIED
         samples = None
         if self.samples and values:
             pairs = zip(
                 *((values, self.samples) if swapped else (self.samples, values)), strict=True
             )
             samples = tuple(own(x, y) for x, y in pairs)
-        return Symbol(f"({first} {operator} {second})", samples)
+        return FormulaText(f"({first} {operator} {second})", samples)
 
     def __add__(self, other):
         return self._with(other, "+", lambda x, y: x + y)
@@ -97,20 +99,20 @@ class Symbol:
         return self._with(other, "/", _quotient, True)
 
     def __neg__(self):
-        return Symbol(f"(-{self.text})", self.samples and tuple(-x for x in self.samples))
+        return FormulaText(f"(-{self.text})", self.samples and tuple(-x for x in self.samples))
 
     def __pos__(self):
         return self
 
     def __pow__(self, exponent):
-        if not isinstance(exponent, Symbol) and exponent == 0.5:
+        if not isinstance(exponent, FormulaText) and exponent == 0.5:
             return _Functions().sqrt(self)
-        if isinstance(exponent, Symbol) or exponent != int(exponent) or abs(exponent) > 64:
+        if isinstance(exponent, FormulaText) or exponent != int(exponent) or abs(exponent) > 64:
             raise Unsupported("it raises to a power that is not a whole number of at most 64")
         text = f"({self.text})**{abs(int(exponent))}"
         samples = self.samples and tuple(_quotient(1, x ** -int(exponent)) if exponent < 0 else x ** int(exponent)
                                          for x in self.samples)  # fmt: skip
-        return Symbol(f"(1/{text})" if exponent < 0 else text, samples)
+        return FormulaText(f"(1/{text})" if exponent < 0 else text, samples)
 
     def __rpow__(self, base):
         return _Functions().exp(self * math.log(base))
@@ -174,9 +176,9 @@ class _Functions:
 
 def _call(name, x):
     own = getattr(math, name)
-    if not isinstance(x, Symbol):
+    if not isinstance(x, FormulaText):
         return own(x)
     text = f"({x.text})" if "-{0}" in FUNCTIONS[name] or "*{0}" in FUNCTIONS[name] else x.text
-    return Symbol(
+    return FormulaText(
         FUNCTIONS[name].format(text), x.samples and tuple(own(value) for value in x.samples)
     )

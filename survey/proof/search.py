@@ -65,10 +65,8 @@ def _scale(equation, sides):
 
 def _ellipse(equation, sides, name, allowed):
     """(number of nodes, r, least w) for one parameter: the fewest nodes."""
-    tried, why = (
-        [],
-        checker.Failed("no ellipse has a small enough bound: smaller panels are needed"),
-    )
+    tried = []
+    why = checker.Failed("no ellipse has a small enough bound: smaller panels are needed")
     for r in map(arb, ELLIPSES):
         length, entries = _sampled(equation, sides, name, r)
         if not np.isfinite(entries).all():  # they are singular in this ellipse, and in larger ones
@@ -232,7 +230,10 @@ class Search:
     """
 
     def __init__(self, panel, floats, margins, rounding, depth):
-        self.panel, self.depth, self.margins, self.rounding = panel, depth, margins, list(rounding)
+        self.panel = panel
+        self.depth = depth
+        self.margins = margins
+        self.rounding = list(rounding)
         self.largest = [abs(values).max() for values in floats]
         self.halves = [_halving(n) for n in panel.counts]
         self.signs = np.zeros((1, len(floats)), np.int8)
@@ -292,7 +293,8 @@ def _text_of(levels):
     """The letters of the levels as a text in which a split cell is followed by its quarters."""
     texts = levels[-1].tolist()
     for letters in reversed(levels[:-1]):
-        below, found = iter(texts), []
+        below = iter(texts)
+        found = []
         for letter in letters.tolist():
             found.append(
                 letter + "".join(next(below) for _ in range(4))

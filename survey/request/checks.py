@@ -165,7 +165,8 @@ def methods_of(scene, options=None):
 
 
 def _fits(scene, method, options):
-    when, own = getattr(method, "WHEN", {}), {option.name for option in scene.OPTIONS}
+    when = getattr(method, "WHEN", {})
+    own = {option.name for option in scene.OPTIONS}
     if options is None:
         return all(name in own or "" in allowed for name, allowed in when.items())
     return all(options.get(name, "") in allowed for name, allowed in when.items())

@@ -86,10 +86,8 @@ class DampedScene(FunctionScene):
         wanted = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
         out = self._inner.solve(point, replace(request, variables=wanted))
         c, turn, bar = self._loss(point, out)
-        exponent, off = (
-            out["exponent"] - turn,
-            out["exponent_error"] + bar + EPS * abs(out["exponent"]),
-        )
+        exponent = out["exponent"] - turn
+        off = out["exponent_error"] + bar + EPS * abs(out["exponent"])
         certain = np.where(exponent + off < 0.0, 1, np.where(exponent - off > 0.0, 0, -1))
         verdict = np.where(
             c == 0.0, out["verdict"], np.where(out["status"] == status.OK, certain, -1)

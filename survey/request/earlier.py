@@ -25,7 +25,8 @@ def find(workflow, path, fresh=False):
     taken from it and the run would replace it without being `fresh`.
     """
     ds = reading.load(Path(path))
-    found, why = None, _unlike(workflow, ds.attrs)
+    found = None
+    why = _unlike(workflow, ds.attrs)
     if not why:
         found, why = _common(workflow, ds, Path(path))
     if why and not (fresh or finished.lost(ds.attrs)) and _is_output(workflow, path):

@@ -187,7 +187,8 @@ class FloquetScene(TracedScene):
         if "multiplier_re_error" not in answer:
             return False
         value = np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"])
-        bar, one = np.asarray(answer["multiplier_re_error"]), np.eye(value.size, dtype=bool)
+        bar = np.asarray(answer["multiplier_re_error"])
+        one = np.eye(value.size, dtype=bool)
         return bool((~one & (abs(value[:, None] - value) <= bar[:, None] + bar)).any())
 
     def trajectory(self, point, answer, options, time=None):
@@ -226,7 +227,7 @@ class FloquetScene(TracedScene):
                 self._compare(programs, given[i], period[i], edges[i])
         if self.conserved is not None:
             self._check_conserved(given[known])
-        known = self._called(monodromy.Points, system, given)
+        known = self._called(monodromy.SystemPoints, system, given)
         self._known.update(_effort(known))
         spikes = self._called(probing.spikes, known)
         for i in np.flatnonzero(np.isfinite(spikes)):
@@ -239,7 +240,11 @@ class FloquetScene(TracedScene):
         """Refuse what the recorded operations show: another value than the code's, no period, no
         structure.
         """
-        n, size, plain, recorded, bars = len(self.states), 0.0, [], [], []
+        n = len(self.states)
+        size = 0.0
+        plain = []
+        recorded = []
+        bars = []
         for k, program in enumerate(programs):
             t = edges[k] + (edges[k + 1] - edges[k]) * (0.01 + 0.98 * TRIED)
             A, E = program.at(point[None], t[None], n)
@@ -297,7 +302,7 @@ class FloquetScene(TracedScene):
         """Refuse CONSERVED where w x is not the same a period later."""
         system, some = self._system, np.arange(len(given))
         w = self._called(system.weights, given)
-        points = self._called(monodromy.Points, system, given)
+        points = self._called(monodromy.SystemPoints, system, given)
         if not (np.isfinite(w).all() and (w != 0.0).any(axis=1).all()):
             self._refuse(
                 "CONSERVED must be numbers, not all 0", "name the coefficients of the states"
@@ -373,9 +378,10 @@ class FloquetScene(TracedScene):
 
 
 def _effort(points):
-    """{"series": functions of time in A, "steps": in a period}: the means over some Points, on
+    """{"series": functions of time in A, "steps": in a period}: the means over some SystemPoints, on
     which a point's cost depends."""
-    reach, valid = monodromy.method_of("auto").floquet_reach(1e-10), np.flatnonzero(points.valid)
+    reach = monodromy.method_of("auto").floquet_reach(1e-10)
+    valid = np.flatnonzero(points.valid)
     if not valid.size:
         return {}
     steps = points.steps(reach, np.ones(valid.size), valid).sum(axis=1).mean()

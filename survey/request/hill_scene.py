@@ -137,10 +137,8 @@ class HillScene(FunctionScene):
             return problem
 
         box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
-        position, p = (
-            np.ascontiguousarray(points[:, axes.across]),
-            np.ascontiguousarray(points[:, axes.lane]),
-        )
+        position = np.ascontiguousarray(points[:, axes.across])
+        p = np.ascontiguousarray(points[:, axes.lane])
         out = self._called(
             monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables
         )
@@ -187,7 +185,8 @@ class HillScene(FunctionScene):
         block = Rows(
             [point[name] for i, name in enumerate(names) if i != axes.lane], point[names[axes.lane]]
         )
-        lanes, points = block.per_point(point[names[axes.lane]]), np.zeros((block.rows, len(names)))
+        lanes = block.per_point(point[names[axes.lane]])
+        points = np.zeros((block.rows, len(names)))
         for i, name in enumerate(names):
             points[:, i] = axes.line[1] if i == axes.lane else block.per_row(point[name])
         out = {}
@@ -246,7 +245,8 @@ class HillScene(FunctionScene):
         if not lanes:
             return None
         # of long ones the last: blocks cut it last, and each has to solve all rows' nodes
-        order, most = list(request.lines), max(lines[i][0] for i in lanes)
+        order = list(request.lines)
+        most = max(lines[i][0] for i in lanes)
         lane = max(
             (i for i in lanes if 2 * lines[i][0] >= most), key=lambda i: order.index(names[i])
         )

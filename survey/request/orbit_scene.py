@@ -201,7 +201,9 @@ class OrbitScene(TracedScene):
 
     def _check_symmetry(self, programs, point, x):
         """Refuse REVERSED, TRANSVERSE and START where f contradicts them, at states about the start."""
-        symmetry, n, here = self.symmetry, len(self.states), self._where(point)
+        symmetry = self.symmetry
+        n = len(self.states)
+        here = self._where(point)
         for key, some in (("REVERSED", symmetry.odd), ("TRANSVERSE", symmetry.transverse)):
             for k in some:
                 if x[k] != 0.0:

@@ -35,7 +35,8 @@ def check_path(path):
 
 def _checked(path):
     folder = path.parent
-    key, where = f"output.path = {shown(str(path), 120)}", shown(str(folder), 120)
+    key = f"output.path = {shown(str(path), 120)}"
+    where = shown(str(folder), 120)
     if path.suffix.lower() in OTHER_KINDS:
         raise BadInput(f"{key} must be a netCDF file; name one, such as {shown(path.stem + '.nc')}")
     if path.is_file() and not _is_netcdf(path):

@@ -46,13 +46,10 @@ def of(path):
     else:
         _, scene = user_scene.find(path)
         axes = {p.name: np.array(starter.ends(p)) for p in scene.PARAMETERS}
-        fixed, options = (
-            {
-                p.name: starter.inside(p) if p.default is None else p.default
-                for p in scene.PARAMETERS
-            },
-            {},
-        )
+        fixed = {
+            p.name: starter.inside(p) if p.default is None else p.default for p in scene.PARAMETERS
+        }
+        options = {}
     if not axes:
         raise BadInput(f"{path}: it has no axis; a chart needs a range of a parameter at least")
     chosen = dict(list(axes.items())[:2])

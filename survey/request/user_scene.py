@@ -544,7 +544,8 @@ def _from_text(name: str, text: str) -> FunctionScene:
     _check_names(name, module, form)
     title, references = getattr(module, "TITLE", None), getattr(module, "REFERENCES", ())
     if form == "abel":
-        about, period = module.__doc__ or inspect.getdoc(module.f), getattr(module, "PERIOD", None)
+        about = module.__doc__ or inspect.getdoc(module.f)
+        period = getattr(module, "PERIOD", None)
         return _abel(
             module.f, module.g, period, module.PARAMETERS, name, text, title, about, references
         )
@@ -905,7 +906,7 @@ def _symmetry(
 
     odd, held, transverse = mirror
     given = {"REVERSED": odd, "TRANSVERSE": transverse}
-    places = {}
+    numbers_of = {}
     for key, value in given.items():
         some = (
             (value,)
@@ -917,8 +918,8 @@ def _symmetry(
         for one in some:
             if one not in names or some.count(one) > 1:
                 refuse(f"{key} names {one!r}; name states, each once: {', '.join(names)}")
-        places[key] = tuple(sorted(names.index(one) for one in some))
-    odd, transverse = places["REVERSED"], places["TRANSVERSE"]
+        numbers_of[key] = tuple(sorted(names.index(one) for one in some))
+    odd, transverse = numbers_of["REVERSED"], numbers_of["TRANSVERSE"]
     if not odd:
         if held is not None or transverse:
             refuse(

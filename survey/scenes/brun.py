@@ -181,7 +181,8 @@ def solve(point, request):
     shared = {p.name: point[p.name] for p in PARAMETERS if p.name in point and p.name != "t"}
     block = Rows(tuple(shared.values()), *([point["t"]] if "t" in point else []))
     columns = block.columns(shared.values())
-    given, valid = dict(zip(shared, columns, strict=True)), np.isfinite(columns).all(axis=0)
+    given = dict(zip(shared, columns, strict=True))
+    valid = np.isfinite(columns).all(axis=0)
     wanted = request.variables or {"action", "separatrix_distance"}
     times = block.per_point(point["t"]) if "t" in point else None
     if "l" in given:

@@ -181,7 +181,8 @@ def _trajectories(point, request):
     names = (*_MOMENTS, "epsilon", *_STATE)
     shared = [point[name] for name in names]
     block = Rows(tuple(shared), point["t"])
-    rows, times = dict(zip(names, block.columns(shared), strict=True)), block.per_point(point["t"])
+    rows = dict(zip(names, block.columns(shared), strict=True))
+    times = block.per_point(point["t"])
     moments, w, nu = (
         np.stack([rows[name] for name in part], axis=1)
         for part in (_MOMENTS, _STATE[:3], _STATE[3:])
@@ -209,10 +210,8 @@ def _trajectories(point, request):
     found = {
         name: Bounded(floats[..., at], floats[..., STATE + at]) for name, at in columns.items()
     }
-    inertia, field = (
-        [bounded.of(moments[:, i, None]) for i in range(3)],
-        bounded.of(epsilon[:, None]),
-    )
+    inertia = [bounded.of(moments[:, i, None]) for i in range(3)]
+    field = bounded.of(epsilon[:, None])
     first = [
         Bounded(x[:, i, None], width) for x, width in ((w, 0.0), (nu, 4e-16)) for i in range(3)
     ]
@@ -288,7 +287,8 @@ def _start(point, answer, options):
 def _on_level(D, y):
     """A unit vector nu with nu.D nu = y, between the least and the largest of D."""
     low, middle, high = np.argsort(D)
-    nu, pair = np.zeros(3), (low, middle) if y < D[middle] else (middle, high)
+    nu = np.zeros(3)
+    pair = (low, middle) if y < D[middle] else (middle, high)
     share = np.clip((y - D[pair[0]]) / (D[pair[1]] - D[pair[0]]), 0.0, 1.0)
     nu[list(pair)] = np.sqrt(1.0 - share), np.sqrt(share)
     return nu

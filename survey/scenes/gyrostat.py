@@ -115,10 +115,9 @@ REFERENCES = (
     "M. E. Lesina, Ya. V. Zinovyeva (2004): Integration of the equations of a gyrostat with Barnett-London effect",
 )
 
-_LARGE, _FAR = (
-    {"minimum": -1e12, "maximum": 1e12},
-    {"minimum": -1e9, "maximum": 1e9},
-)  # beyond, binary64 has no digits left
+# beyond, binary64 has no digits left
+_LARGE = {"minimum": -1e12, "maximum": 1e12}
+_FAR = {"minimum": -1e9, "maximum": 1e9}
 _SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 _QUESTIONS = ("fate", "trajectory", "abel", "portrait")
 _FATE, _TIME, _ABEL, _PORTRAIT = ({"question": (name,)} for name in _QUESTIONS)
@@ -376,7 +375,8 @@ def _fates_on_separatrices(point, request, method):
     given = np.broadcast_arrays(
         *(np.asarray(point[name], dtype=float) for name in (*_SYSTEM, "phi0", "saddle"))
     )
-    rows, shape = np.stack([array.ravel() for array in given], axis=-1), given[0].shape
+    rows = np.stack([array.ravel() for array in given], axis=-1)
+    shape = given[0].shape
     good = np.isfinite(rows).all(axis=1)
     stable, left = request.options["separatrix"] == "stable", request.options["side"] == "left"
     found, heads = separatrix_fate.solve(method, rows[good], request.rtol, stable, left)

@@ -369,20 +369,17 @@ def _write_rests(placed, out, i):
 def _trajectories(point, method, rtol):
     shared = [point[name] for name in NAMES]
     block = Rows(tuple(shared), point["t"])
-    rows, times = block.columns(shared).T, block.per_point(point["t"])
+    rows = block.columns(shared).T
+    times = block.per_point(point["t"])
     bodies = [read(row) if np.isfinite(row).all() else None for row in rows]
     fine = np.array([body is not None for body in bodies])
     good = fine[:, None] & np.isfinite(times)
-    floats, status = (
-        np.full((*times.shape, FLOATS), np.nan),
-        np.full(times.shape, INVALID_PARAMETERS),
-    )
+    floats = np.full((*times.shape, FLOATS), np.nan)
+    status = np.full(times.shape, INVALID_PARAMETERS)
     if fine.any():
         some = [body for body in bodies if body is not None]
-        G, starts = (
-            np.array([body.table for body in some]),
-            np.array([np.concatenate([body.w, body.nu]) for body in some]),
-        )
+        G = np.array([body.table for body in some])
+        starts = np.array([np.concatenate([body.w, body.nu]) for body in some])
         at = np.where(good[fine], times[fine], 0.0)
         floats[fine], status[fine] = motion.trajectories(method, G, starts, at, rtol)
     floats[~good], status[~good] = np.nan, INVALID_PARAMETERS

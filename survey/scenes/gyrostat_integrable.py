@@ -358,10 +358,8 @@ class _Motions:
             self.verdict[moves & (delta2 < -bar)] = _MOTIONS["comes_to_rest"]
             return
         floats, kinds, _ = _carried(self._turn, self.flows, slack)
-        (period, _, bar, _), on = (
-            floats[:, 0].T,
-            np.array([branch is not None for branch in self.branches]),
-        )
+        (period, _, bar, _) = floats[:, 0].T
+        on = np.array([branch is not None for branch in self.branches])
         found = (bar < TRUST * (1.0 + period)) & ~on
         heads["period"] = np.where(found, period, np.nan), np.where(found, bar, np.nan)
         self.verdict[found], self.verdict[on] = kinds[found], _MOTIONS["comes_to_rest"]

@@ -211,7 +211,8 @@ def _missed(row, clock):
 @kernel
 def _solve_points(q, a, low, steps, out):
     """Points of their own, in double-double, in `steps` steps each."""
-    work, chain = taylor_double.workspace(2), np.empty((steps.max(), taylor_double.STEP))
+    work = taylor_double.workspace(2)
+    chain = np.empty((steps.max(), taylor_double.STEP))
     for i in range(len(a)):
         taylor_double.hill_walk(
             _start,

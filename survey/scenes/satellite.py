@@ -239,7 +239,8 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
 def _passages(point, request):
     """The outputs of a passage along the separatrix alone, which exist at k = 1 too."""
     if "rho" in point:
-        rho, oblate = point["rho"], np.array(request.options["body"] == "oblate")
+        rho = point["rho"]
+        oblate = np.array(request.options["body"] == "oblate")
     else:
         rho, _ = rates(point["inertia_ratio"], request.options["direction"])
         oblate = point["inertia_ratio"] > 1
@@ -454,7 +455,8 @@ def _walk_points(rows, rho, tolerance, out, reached):
 @kernel
 def _solve_points(rows, rho, low, steps, out):
     """Points of their own, in double-double, in `steps` (even) steps each."""
-    work, chain = taylor_double.workspace(motion.CLOCK), np.empty((steps.max(), taylor_double.STEP))
+    work = taylor_double.workspace(motion.CLOCK)
+    chain = np.empty((steps.max(), taylor_double.STEP))
     row = np.empty(motion.EXACTLY)
     for i in range(len(rho)):
         motion.exactly(rows[i], row)

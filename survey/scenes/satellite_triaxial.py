@@ -184,7 +184,8 @@ def _answers(names, turning, columns, request, asked, lines=None):
 
 def _one_by_one(names, columns, rotates, request, asked):
     """As `_answers`, of motions of both kinds; those that are not possible get their status."""
-    valid, out = _possible(names, columns), {}
+    valid = _possible(names, columns)
+    out = {}
     for turning in np.unique(rotates):
         own = rotates == turning
         some = [np.where(own & valid, values, np.nan) for values in columns]

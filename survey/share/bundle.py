@@ -190,10 +190,8 @@ def _readme(name, ds, pictures):
 def _described(folder, files, ds, data, author, license_url):
     """The RO-Crate's description of the folder."""
     attrs = ds.attrs
-    title, date = (
-        plain(str(attrs.get("title", data)), 300),
-        plain(str(attrs.get("date_created", "")), 40),
-    )
+    title = plain(str(attrs.get("title", data)), 300)
+    date = plain(str(attrs.get("date_created", "")), 40)
     entities = []
     for name in files:
         with open(folder / name, "rb") as file:
@@ -335,7 +333,8 @@ def complaints(folder):
 
 def _unlike(folder, data):
     """Does the workflow say what the data were computed from, and is the scene's text theirs?"""
-    attrs, wrong = reading.attributes_of(folder / data), []
+    attrs = reading.attributes_of(folder / data)
+    wrong = []
     try:
         asked = tomllib.loads((folder / "workflow.toml").read_text(encoding="utf-8"))
         held = tomllib.loads(str(attrs.get("workflow", "")))

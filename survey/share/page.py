@@ -113,7 +113,8 @@ def _common(ds, axes):
     """Axes and boundaries."""
     described = []
     for dim in axes:
-        values, log = ds[dim].values.astype(float), logarithmic(ds[dim].values)
+        values = ds[dim].values.astype(float)
+        log = logarithmic(ds[dim].values)
         ends = [float(end) for end in (np.log(values[[0, -1]]) if log else values[[0, -1]])]
         described.append(
             {
@@ -129,7 +130,8 @@ def _common(ds, axes):
 
 def _glyphs(text):
     """A label with formulas as the outlines of its glyphs: {"path": SVG path with y upwards, "width"}."""
-    drawn, parts = TextPath((0, 0), " ".join(text.split()), size=15), []
+    drawn = TextPath((0, 0), " ".join(text.split()), size=15)
+    parts = []
     letters = {1: "M", 2: "L", 3: "Q", 4: "C", 79: "Z"}
     for points, code in drawn.iter_segments(curves=True, simplify=False):
         parts.append(
@@ -159,7 +161,8 @@ def _of_model(ds, packed):
         shown.append(
             {"name": name, "text": f"{name}: {plain(said)}" if said else name} | _scale(found[name])
         )
-    rule, given = model.rule, {}
+    rule = model.rule
+    given = {}
     if rule != "hill" and "curve_count" in ds:
         given = _curves(ds, model.names)
     others = OTHER_EDGES.get(f"{rule} {len(model.functions)}") or OTHER_EDGES.get(rule, ())
@@ -198,7 +201,9 @@ def _of_points(ds, axes):
             figures.index(named) if (named := name.split(" ")[0]) in figures else len(figures)
         )
     )
-    state, shown, variables = ds.status.transpose(*axes), [], {}
+    state = ds.status.transpose(*axes)
+    shown = []
+    variables = {}
     for name in flags + floats[:FLOATS]:
         variable = ds[name].transpose(*axes)
         text = plain(str(variable.attrs.get("long_name", name)))
@@ -364,16 +369,15 @@ def _digest(text):
 
 def _about(ds, proof, why):
     """Proof, provenance, and how to cite, as HTML."""
-    attrs, out = ds.attrs, []
+    attrs = ds.attrs
+    out = []
     if proof:
         areas = "; ".join(
             f"{plain(name)}: area {a:.9g} to {b:.9g}" for name, (a, b) in proof["areas"].items()
         )
         certificate = html.escape(plain(proof["certificate"]))
-        digest, theorem = (
-            html.escape(plain(proof["sha256"])),
-            html.escape(plain(proof["statement"], 10_000, True)),
-        )
+        digest = html.escape(plain(proof["sha256"]))
+        theorem = html.escape(plain(proof["statement"], 10_000, True))
         out.append(f'<div class="proof"><strong>Proved</strong> ({html.escape(areas)}) by the certificate '
                    f"{certificate}, sha256 {digest}: survey-check {certificate} verifies it"
                    f"<details><summary>the theorem</summary><pre>{theorem}</pre></details></div>")  # fmt: skip

@@ -121,7 +121,8 @@ def curves_of(ds):
     """
     schema.curves(ds)
     names = {code: name for name, code in flag_codes(ds.curve_class.attrs).items()}
-    kinds, ends = ds.curve_class.values, np.cumsum(ds.curve_count.values)
+    kinds = ds.curve_class.values
+    ends = np.cumsum(ds.curve_count.values)
     found = {}
     for kind, last, number in zip(kinds, ends, ds.curve_count.values, strict=True):
         found.setdefault(names[kind], []).append(slice(int(last - number), int(last)))
@@ -134,7 +135,8 @@ def draw_edges(axes, ds, x):
     """
     if "edge_count" not in ds or ds.edge_count.ndim or ds.attrs.get("boundaries") != x.name:
         return
-    names, labelled = {code: name for name, code in flag_codes(ds.edge_class.attrs).items()}, set()
+    names = {code: name for name, code in flag_codes(ds.edge_class.attrs).items()}
+    labelled = set()
     for position, code in zip(ds.edge_position.values, ds.edge_class.values, strict=True):
         name = names.get(int(code), "boundary")
         label, properties = CURVES.get(name, (spaced(name), _THIN))

@@ -68,7 +68,8 @@ def draw_ensemble(axes, ds, name, paper, asked):
                 )
     else:
         lost = np.isin(state.values, list(status.UNANSWERED))
-        words, values = words_of(variable), variable.values.astype(float)
+        words = words_of(variable)
+        values = variable.values.astype(float)
         shown = np.ma.masked_invalid(np.where(lost | np.isin(values, list(words)), np.nan, values))
         colours = colours_of_numbers(shown, variable, asked, fill_of(variable) is not None)
         drawn = axes.scatter(x.values, y.values, SIZE, shown, **colours)

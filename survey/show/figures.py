@@ -174,7 +174,8 @@ def _flat(ds, name, chosen=None):
     The first position along any other, but the last angle of Abel solutions, of which w and t are
     curves over it.
     """
-    keep, at = list(ds.status.dims)[:2], {}
+    keep = list(ds.status.dims)[:2]
+    at = {}
     if family.over_angles(ds):
         others, at = [dim for dim in ds.status.dims if dim != family.ANGLE], {family.ANGLE: -1}
         keep = [others[0], family.ANGLE] if name in family.AT_TURNING else others[:2]

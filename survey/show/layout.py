@@ -11,10 +11,8 @@ SHORTEST = 10  # characters of a line
 OVERHANG = 1.2  # of the width of axes that have neighbours: texts may reach into the gap
 
 
-MOST_LINES, SMALLEST = (
-    3,
-    6.0,
-)  # of the label of a colour bar, before its letters shrink; and to which
+MOST_LINES = 3  # of the label of a colour bar, before its letters shrink
+SMALLEST = 6.0  # to which they do
 LAST = r"(?<=,) \$[^$]*\$( \([^)]*\))?$"  # the symbol and the unit of a label
 FORMULA, INTERVAL = r"\$[^$]*\$", r"\[[^][()]{1,12}[])]"  # stay whole, such as [0, 2 pi)
 

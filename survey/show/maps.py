@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from survey import status
 from survey.file.labels import fill_of, flag_codes, scene_statuses, words_of
-from survey.file.overview import Overview, Points
+from survey.file.overview import Overview, VariablePoints
 from survey.grid import logarithmic
 from survey.show.boundaries import draw_boundaries, in_plane, limits_of
 from survey.show.cells import draw_cells
@@ -104,10 +104,8 @@ def _shown(axes, ds, variable, state, dpi):
     """
     if max(variable.shape) <= MAX_DRAWN:
         return variable.compute(), state.compute(), {}
-    box, points = (
-        axes.get_window_extent(),
-        Points(variable, state, scene_statuses(ds), with_statuses=True),
-    )
+    box = axes.get_window_extent()
+    points = VariablePoints(variable, state, scene_statuses(ds), with_statuses=True)
     pixels = np.array([box.width, box.height]) * dpi / axes.figure.dpi
     overview = Overview(
         points, np.clip(CELLS_PER_PIXEL * pixels, 1, MAX_CELLS).astype(int)

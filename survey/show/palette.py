@@ -29,7 +29,8 @@ def kinds_of(ds, variable, state):
     The kinds are its flags, followed by the scene's own statuses, under which points are undefined,
     not undecided.
     """
-    table, shown = flag_codes(variable.attrs), variable.values.astype(np.int32)
+    table = flag_codes(variable.attrs)
+    shown = variable.values.astype(np.int32)
     colours = dict.fromkeys(table, "#444444") | colours_of(table) | greys_of(ds, table)
     for name, code in ((name, scene_statuses(ds)[name]) for name in greys_of(ds, table)):
         table[name] = max(table.values()) + 1

@@ -57,7 +57,9 @@ def draw_surfaces(axes, ds):
     )
     ends = np.array([_scaled(np.sort(ds[dim].values.astype(float))[[0, -1]], log)
                      for dim, log in zip(dims, logs, strict=True)])  # fmt: skip
-    corners, kinds, shown = ds.surface_corners.values, _kinds(ds), _bounds_stability(ds)
+    corners = ds.surface_corners.values
+    kinds = _kinds(ds)
+    shown = _bounds_stability(ds)
     shown = shown if shown.any() else ~shown
     corners, kinds = corners[shown], kinds[shown]
     names = {code: name for name, code in flag_codes(ds.surface_class.attrs).items()}
@@ -137,7 +139,8 @@ def _chains(links):
     for number, pair in enumerate(links):
         for node in pair:
             at.setdefault(node, []).append(number)
-    left, found = set(range(len(links))), []
+    left = set(range(len(links)))
+    found = []
     for number in range(len(links)):
         if number not in left:
             continue

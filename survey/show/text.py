@@ -101,10 +101,8 @@ def title_of(ds, variable):
     """The survey's title, what is drawn if no axis or colour bar says so, as of verdicts, the
     options that are words, and the numbers that are fixed and not zero.
     """
-    title, name = (
-        literal(ds.attrs.get("title", "")),
-        literal(variable.attrs.get("long_name", variable.name)),
-    )
+    title = literal(ds.attrs.get("title", ""))
+    name = literal(variable.attrs.get("long_name", variable.name))
     fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
     fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
     position = {name: f" ({_position(ds[name], c)} of {ds.sizes[name]})"

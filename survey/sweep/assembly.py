@@ -30,7 +30,10 @@ class Assembly:
         flags = {name: described[name][1] for name in ("status", "verdict") if name in described}
         self.tally = Tally(flags, request.rtol)
         self.map = coordinates(grid, scene, request), described, self.layout, grid.shape, tile
-        self.file, self.writer, self.writes, self.buffers = None, ThreadPoolExecutor(1), [], {}
+        self.file = None
+        self.writer = ThreadPoolExecutor(1)
+        self.writes = []
+        self.buffers = {}
 
     def __enter__(self):
         return self

@@ -206,7 +206,8 @@ def _of_curves(workflow, names, count, kind, values, error, where):
 
 def _edges(workflow, axis, each=in_turn, once=lambda name, make: make()):
     """The Edges of all rows, found a few rows at a time."""
-    measure, between = _measure(workflow, "edges"), _parts(workflow, axis)
+    measure = _measure(workflow, "edges")
+    between = _parts(workflow, axis)
     rows = prod(size for dim, size in workflow.grid.sizes.items() if dim != axis)
 
     def make(some):
@@ -286,11 +287,13 @@ def _curves(workflow, across, axis, other, edges, each):
     """The variables of the curves on each map of the axes `across` (its rows) and `axis`, and of
     their folds.
     """
-    grid, further = workflow.grid, [dim for dim in other if dim != across]
+    grid = workflow.grid
+    further = [dim for dim in other if dim != across]
     at = dict(
         zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True)
     )
-    found, square = [], square_of(workflow, across, axis)
+    found = []
+    square = square_of(workflow, across, axis)
     curve_of, curves_before = np.full(edges.row.size, -1), 0
     planes = _planes(workflow, further)
 

@@ -132,7 +132,8 @@ def on_cluster(task, numbers, finished, died, client, patience=None):
     """Call the task for every number on the cluster's workers (see `dispatch`). Raises Stopped if
     they fail.
     """
-    done, watch = itertools.count(1), _Watch(client, patience or Patience())
+    done = itertools.count(1)
+    watch = _Watch(client, patience or Patience())
     finished(0)
     aside = []
     for number, result, killed in _results(task, numbers, client, watch):
@@ -210,8 +211,11 @@ class _Watch:
         self.client, self.patience, self.address = client, patience, client.scheduler.address
         now = time.monotonic()
         self.checked, self.busy, self.staffed, self.warned = now, now, now, now
-        self.held, self.proven, self.missed = {}, set(), Counter()
-        self.struck_by, self.had_some = set(), False
+        self.held = {}
+        self.proven = set()
+        self.missed = Counter()
+        self.struck_by = set()
+        self.had_some = False
 
     @property
     def pause(self):

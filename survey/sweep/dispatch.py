@@ -132,8 +132,11 @@ class _Watch:
 
     def __init__(self, patience, workers):
         self.patience, self.workers = patience, workers
-        self.begun, self.proven, self.stuck = {}, set(), False
-        self.starter, self.over = threading.get_ident(), threading.Event()
+        self.begun = {}
+        self.proven = set()
+        self.stuck = False
+        self.starter = threading.get_ident()
+        self.over = threading.Event()
 
     def __enter__(self):
         threading.Thread(target=self._watch, daemon=True).start()

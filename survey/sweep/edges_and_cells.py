@@ -9,7 +9,8 @@ def find(workflow, once, progress=None):
     """The datasets that [boundaries] and [refine] add to the file, their attributes included;
     `once` as in `Blocks`.
     """
-    found, parts = [], requested(workflow)
+    found = []
+    parts = requested(workflow)
     if "edges" in parts and not (workflow.proves and workflow.refine is None):
         found.append(parts["edges"].find(workflow, _on_threads(progress), once))
     if "surfaces" in parts:

@@ -133,7 +133,8 @@ def run(
         reused = kept.intact()
         job = Job(workflow.scene, workflow.request, workflow.grid, kept, code_version(), earlier)
         left = TimeLeft(workflow.grid.shape, blocks, reused)
-        compiled, patience = {}, dispatch.Patience(block_timeout)
+        compiled = {}
+        patience = dispatch.Patience(block_timeout)
 
         compiles_here = len(reused) < len(blocks) and not (workers or scheduler)
         compiler = (

@@ -25,10 +25,8 @@ def estimates(workflow):
     and cells).
     """
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
-    seconds, parts = (
-        {"kernels": grid.points * seconds_per_point(scene, request, grid), "further": 0.0},
-        {},
-    )
+    seconds = {"kernels": grid.points * seconds_per_point(scene, request, grid), "further": 0.0}
+    parts = {}
     for name, module in edges_and_cells.requested(workflow).items():
         parts[name], more = module.plan(workflow, lone_cost(scene, request, grid))
         seconds["further"] += more

@@ -134,10 +134,8 @@ def prover_of(workflow):
     if len(names) == 1:
         low, high = (Fraction(end) for end in rectangle[0])
         width = max(EDGE_WIDTH, EDGE_ULPS * math.ulp(max(abs(low), abs(high))))
-        across, depth = (
-            [ROW_PARTS],
-            max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width))))),
-        )
+        across = [ROW_PARTS]
+        depth = max(0, math.ceil(math.log2((high - low) / (ROW_PARTS * Fraction(width)))))
         bits, tolerance = ROW_BITS, FRACTION * width
     else:
         ends = [[float(end) for end in side] for side in rectangle]
@@ -147,10 +145,8 @@ def prover_of(workflow):
         ]
         depths = [min(DEEPEST, max(0, math.ceil(math.log2(1 / x) - 1e-9))) for x in widths]
         depth = max(0, min(depths) - START[kind])
-        across, tolerance = (
-            [2 ** (halvings - depth) for halvings in depths],
-            FRACTION * 0.5 ** max(depths),
-        )
+        across = [2 ** (halvings - depth) for halvings in depths]
+        tolerance = FRACTION * 0.5 ** max(depths)
         bits = search.BITS
     return Prover(
         {"kind": kind, "pieces": pieces}, names, rectangle, across, depth, tolerance, bits
@@ -212,7 +208,8 @@ def solved(prover, once, progress=None):
     for number in prover.numbers:
         with contextlib.suppress(_Missing):
             parts[number] = _unpacked(once(name(number), missing))
-    todo, reused = [number for number in prover.numbers if number not in parts], len(parts)
+    todo = [number for number in prover.numbers if number not in parts]
+    reused = len(parts)
 
     def finished(done, result=None):
         if result:
@@ -226,7 +223,8 @@ def solved(prover, once, progress=None):
 
     if todo:
         # a part may take minutes
-        workers, patience = min(dispatch.cpus(), len(todo)), dispatch.Patience(math.inf)
+        workers = min(dispatch.cpus(), len(todo))
+        patience = dispatch.Patience(math.inf)
         # large parameters take longest
         dispatch.on_processes(prover, todo[::-1], finished, died, workers, patience)
     layouts, lists = zip(*(parts[number] for number in prover.numbers), strict=True)
@@ -273,7 +271,8 @@ def _describe(workflow, path, text):
     """Variables and attributes."""
     from survey.proof import checker
 
-    certificate, names = checker.Certificate(text), list(workflow.refine)
+    certificate = checker.Certificate(text)
+    names = list(workflow.refine)
     parameters = [next(p for p in workflow.scene.PARAMETERS if p.name == name) for name in names]
     box = np.array(
         [[float(end) for side in region for end in side] for _, region in certificate.cells]
@@ -323,7 +322,8 @@ def _describe_row(workflow, path, text):
     """Variables and attributes of the edges of a row."""
     from survey.proof import checker
 
-    certificate, axis = checker.Certificate(text), workflow.boundaries
+    certificate = checker.Certificate(text)
+    axis = workflow.boundaries
     cells = [
         (letter, *region[0]) for letter, region in certificate.cells if letter in checker.EDGES
     ]
@@ -361,7 +361,8 @@ def _areas(sides, least, left, units):
     """The proved bounds of the area of each verdict, rounded outwards, and the values halfway
     between them.
     """
-    variables, total = {}, math.prod(high - low for low, high in sides)
+    variables = {}
+    total = math.prod(high - low for low, high in sides)
     for name, scale, unit, words in (
         ("area", total, units, "area of the map with this verdict"),
         ("area_fraction", Fraction(1), "1", "share of the map's area with this verdict"),

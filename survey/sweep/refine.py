@@ -31,7 +31,9 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
     to be open will take.
     """
     measure, panels = _measure(workflow), _panels(workflow)
-    points, found, total = 0, [], _area(panels)
+    points = 0
+    found = []
+    total = _area(panels)
     more = measure.keywords(workflow.scene) if hasattr(measure, "keywords") else {}
     for x, y in panels:
         share, done = _area([(x, y)]) / total, _area(panels[: len(found)]) / total
@@ -94,7 +96,9 @@ def _in_parts(name, each, once, report):
     halvings, lock = count(), threading.Lock()
 
     def parts(task, items, what):
-        halving, began, done = next(halvings), time.perf_counter(), count(1)
+        halving = next(halvings)
+        began = time.perf_counter()
+        done = count(1)
 
         def part(number):
             leaves = once(f"{name}-{halving}-{number}", lambda: {"leaves": task(items[number])})[

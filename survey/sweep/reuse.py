@@ -65,7 +65,8 @@ def solve_block(scene, request, grid, block, earlier=None):
     )
     if not held or not all(some.any() for some in held):
         return solve.solve_block(scene, request, grid, block)
-    shape, point = tuple(some.size for some in held), grid.point(block)
+    shape = tuple(some.size for some in held)
+    point = grid.point(block)
     request = replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges)
     out = {
         name: np.empty(shape + extra, kind)

@@ -49,7 +49,8 @@ def stored(scene, request, solved, shape):
     """A scene's results in the file's types and the block's shape; status `overflow` where a bar
     does not fit.
     """
-    arrays, table = {}, layout(scene, request)
+    arrays = {}
+    table = layout(scene, request)
     left_out = [name for name in table if name not in solved]
     if left_out:
         raise BadInput(f"{scene.TITLE}: solve returns no {listed(left_out)}, which OUTPUTS declare")
@@ -66,10 +67,8 @@ def stored(scene, request, solved, shape):
         for name, (dtype, fill, extra) in table.items():
             where = lost.reshape(shape + (1,) * len(extra))
             if name == "status":
-                where, fill = (
-                    lost & ~np.isin(arrays[name], list(status.UNANSWERED)),
-                    status.OVERFLOW,
-                )
+                where = lost & ~np.isin(arrays[name], list(status.UNANSWERED))
+                fill = status.OVERFLOW
             arrays[name] = np.where(where, dtype.type(fill), arrays[name])
     return arrays
 

@@ -25,7 +25,8 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     from survey.measures import isosurfaces
 
     measure = measures.question(workflow.scene.FAMILY, "surfaces")
-    names, box = list(workflow.grid.sizes), boundaries.square_of(workflow, *workflow.grid.sizes)
+    names = list(workflow.grid.sizes)
+    box = boundaries.square_of(workflow, *workflow.grid.sizes)
     functions = measure.Functions(
         workflow.scene, box, names, boundaries.fixed_of(workflow), workflow.request.options
     )

@@ -24,7 +24,8 @@ class TimeLeft:
         self.centres /= np.array(shape, float)
         self.open = np.ones(len(blocks), bool)
         self.open[list(reused)] = False
-        self.nearest, self.cost = np.full(len(blocks), np.inf), np.zeros(len(blocks))
+        self.nearest = np.full(len(blocks), np.inf)
+        self.cost = np.zeros(len(blocks))
         self.began, self.worked = np.inf, 0.0
 
     def took(self, number, seconds):

@@ -7,48 +7,51 @@ from math import pi
 import numpy as np
 from mpmath import mp
 
-from survey.truth import brun_digits, brun_sums, remembered
+from survey.truth import brun_digits, remembered
+from survey.truth import brun_sums as bs
+from survey.truth.brun_digits import NAMES, OUTPUTS
 
-NAMES = ("A", "C", "epsilon", "theta0", "p_theta0", "p_psi", "p_phi")
-OUTPUTS = ("u_min", "u_max", "period", "precession", "spin", "action")
 SURE = 1e-20
 NODES = 2048
 DIGITS = 120
+COLUMNS = (bs.U_MIN, bs.U_MAX, bs.PERIOD, bs.PRECESSION, bs.SPIN, bs.ACTION)  # of OUTPUTS
 LOST = 0.1  # a truth with a larger doubt than this of itself knows no side of the separatrix
 
 
 def _rows(out, answer):
     found = {}
     with np.errstate(all="ignore"):
-        beside = out[..., 13]
-        delay = beside * out[..., 4]
+        beside = out[..., bs.PERIOD_DOUBT]
+        delay = beside * out[..., bs.PERIOD]
         turned = (
             2 * pi * beside
-            + (np.abs(out[..., 6]) + np.abs(out[..., 8])) * beside
-            + delay * out[..., 16]
+            + (np.abs(out[..., bs.PRECESSION]) + np.abs(out[..., bs.SPIN])) * beside
+            + delay * out[..., bs.FASTEST]
         )
     more = {
-        "u_min": out[..., 14],
-        "u_max": out[..., 15],
+        "u_min": out[..., bs.U_MIN_DOUBT],
+        "u_max": out[..., bs.U_MAX_DOUBT],
         "period": delay,
         "precession": turned,
         "spin": turned,
     }
-    for i, name in enumerate(OUTPUTS):
-        value, low = out[..., 2 * i], out[..., 2 * i + 1]
+    for name, column in zip(OUTPUTS, COLUMNS, strict=True):
+        value, low = out[..., column], out[..., column + 1]
         scale = np.abs(value)
         if name in ("u_min", "u_max"):
             scale = scale + 1
         if name in ("precession", "spin"):
-            scale = scale + 2 * pi * (1 + np.abs(out[..., 6]))
+            scale = scale + 2 * pi * (1 + np.abs(out[..., bs.PRECESSION]))
         if name == "action":  # of a narrow well
-            half = (out[..., 2] - out[..., 0]) / 2
+            half = (out[..., bs.U_MAX] - out[..., bs.U_MIN]) / 2
             scale = scale * (
                 1 + (1e-11 if out.ndim == 3 else 1e-21) / half / np.where(out.ndim == 3, half, 1)
             )
         with np.errstate(invalid="ignore"):
             trusted = (
-                np.abs(out[..., 12]) < 1e-18 if name not in ("u_min", "u_max", "period") else True
+                np.abs(out[..., bs.APART]) < 1e-18
+                if name not in ("u_min", "u_max", "period")
+                else True
             )
         trusted = trusted & (beside < LOST)
         found[name] = np.where(trusted, value, np.nan), low, SURE * scale + more.get(name, 0.0)
@@ -59,39 +62,39 @@ def _in_full(point, ends):
     """The outputs at a state with DIGITS digits, from elliptic integrals, as `brun_sums.states`: it
     takes 0.1 s.
 
-    `ends` are the turning points of double-double, u_min (high, low), u_max (high, low), where
-    Newton's method begins.
+    `ends` are columns U_MIN and U_MAX of double-double, where Newton's method begins.
     """
-    row = np.zeros(brun_sums.COLUMNS)
+    row = np.zeros(bs.COLUMNS)
     with mp.workdps(DIGITS):
         state = [mp.mpf(float(x)) for x in point]
         integrals = brun_digits.integrals(state)
-        turning = brun_digits.polished(
-            integrals, [mp.mpf(ends[0]) + mp.mpf(ends[1]), mp.mpf(ends[2]) + mp.mpf(ends[3])]
-        )
-        for i, true in enumerate(brun_digits.outputs(integrals, turning)):
-            row[2 * i] = float(true)
-            row[2 * i + 1] = float(true - row[2 * i])
+        begin = [mp.mpf(ends[column]) + mp.mpf(ends[column + 1]) for column in (bs.U_MIN, bs.U_MAX)]
+        turning = brun_digits.polished(integrals, begin)
+        for column, true in zip(COLUMNS, brun_digits.outputs(integrals, turning), strict=True):
+            row[column] = float(true)
+            row[column + 1] = float(true - row[column])
     return row
 
 
 def states(given, answer):
     points = np.ascontiguousarray(np.column_stack([given[name] for name in NAMES]))
     ok = answer["status"] == 0
-    out = np.full((len(points), brun_sums.COLUMNS), np.nan)
+    out = np.full((len(points), bs.COLUMNS), np.nan)
     out[ok] = remembered(
-        "states", lambda p, rows: brun_sums.states(p, NODES, rows), points[ok], brun_sums.COLUMNS
+        "states", lambda p, rows: bs.states(p, NODES, rows), points[ok], bs.COLUMNS
     )
     with np.errstate(invalid="ignore"):
-        vague = ok & (out[:, 13] * out[:, 4] > answer["period_error"]) & (out[:, 13] < LOST)
+        beside = out[:, bs.PERIOD_DOUBT]
+        vague = ok & (beside * out[:, bs.PERIOD] > answer["period_error"]) & (beside < LOST)
         vague = np.flatnonzero(vague & (given["p_theta0"] != 0))
     if len(vague):  # one of a batch in full
-        out[vague[0]] = _in_full(points[vague[0]], out[vague[0], :4])
+        out[vague[0]] = _in_full(points[vague[0]], out[vague[0]])
     width = answer["u_max"] - answer["u_min"]
     with np.errstate(invalid="ignore"):
-        sure = out[:, 13] < LOST
+        sure = out[:, bs.PERIOD_DOUBT] < LOST
         apart = sure & (
-            (out[:, 2] - out[:, 0]) > 2 * (answer["u_max_error"] + answer["u_min_error"]) + 1e-12
+            (out[:, bs.U_MAX] - out[:, bs.U_MIN])
+            > 2 * (answer["u_max_error"] + answer["u_min_error"]) + 1e-12
         )
         said = answer["verdict"]
         passes = (given["p_psi"] == given["p_phi"]) | (given["p_psi"] == -given["p_phi"])
@@ -105,16 +108,16 @@ def integrals(sign):
             np.column_stack([given[name] for name in ("l", "alpha", "beta")])
         )
         ok = answer["status"] == 0
-        out = np.full((len(points), 2, brun_sums.COLUMNS), np.nan)
-        brun_sums.integrals(
+        out = np.full((len(points), 2, bs.COLUMNS), np.nan)
+        bs.integrals(
             points[ok], float(sign), float(np.ravel(given["ratio"])[0]), NODES, part := out[ok]
         )
         out[ok] = part
-        wells = np.isfinite(out[..., 0]).sum(axis=1)
+        wells = np.isfinite(out[..., bs.U_MIN]).sum(axis=1)
         # a well at a point, or a separatrix
         out[wells != np.isfinite(answer["u_min"]).sum(axis=1)] = np.nan
         with np.errstate(invalid="ignore"):
-            wide = (out[..., 2] - out[..., 0]).min(axis=1) > 1e-6
+            wide = (out[..., bs.U_MAX] - out[..., bs.U_MIN]).min(axis=1) > 1e-6
             wrong = wide & (wells > 0) & (answer["wells"] >= 0) & (answer["wells"] < wells)
         return _rows(out, answer) | {"wrong": {"wells": wrong}}
 

@@ -100,7 +100,8 @@ def outputs(given, ends, library=True):
     def q(u):
         return k * u * u + k * S * u + L - k + k * (S * S - low * high)
 
-    g, s = mp.sqrt(q(low) * q(high)), L - k + 3 * k * S * S / 2
+    g = mp.sqrt(q(low) * q(high))
+    s = L - k + 3 * k * S * S / 2
     period = 2 * mp.pi * A / mp.agm(mp.sqrt((s + g) / 2), mp.sqrt(g))
     spread = mp.sqrt(mp.mpc(s * s - g * g))
     X, Y = s + spread, s - spread
@@ -140,7 +141,8 @@ def draw(random):
     """(kind, point): hard cases of every kind that is known."""
     A, C = 10 ** random.uniform(-0.5, 0.5), random.uniform(0.05, 1.999)
     sign = random.choice([-1.0, 1.0], size=3)
-    epsilon, theta = sign[0] * 10 ** random.uniform(-6, 1), random.uniform(0.01, 3.13)
+    epsilon = sign[0] * 10 ** random.uniform(-6, 1)
+    theta = random.uniform(0.01, 3.13)
     p, b, a = random.normal(size=3)
     kind = random.choice(KINDS)
     k = epsilon * A * A * (1 - C)
@@ -164,12 +166,10 @@ def draw(random):
             wide = k / 2 * np.sqrt((1 - u * u) * (1 - 9 * u * u))
             y = sign[1] * np.sqrt(k / 2 * (1 - 3 * u * u) + wide * random.uniform(-1, 1))
         # (S8)
-        a, b, theta, p = (
-            u * (y - k / y),
-            y - k * u * u / y,
-            np.arccos(u),
-            10 ** random.uniform(-12, -1),
-        )
+        a = u * (y - k / y)
+        b = y - k * u * u / y
+        theta = np.arccos(u)
+        p = 10 ** random.uniform(-12, -1)
         epsilon = k / (A * A * (1 - C))
     elif kind == "near the upright rotation":
         k = -abs(k)

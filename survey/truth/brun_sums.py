@@ -14,12 +14,48 @@ smooth: sums converge like exp(-n).
 
 import numpy as np
 
+from survey.kernels.nutation import records as nu
 from survey.truth.compiled import inline, kernel
-from survey.truth.double import PI, add, div, mean, mul, neg, root, sine_cosine, sub, times
+from survey.truth.double import (
+    PI,
+    add,
+    div,
+    keep,
+    mean,
+    mul,
+    neg,
+    pair,
+    root,
+    sine_cosine,
+    sub,
+    times,
+)
 
 MOST = 4096
+# What is filled of a well, each of these in two columns, high and low: u_min, u_max, T, precession, spin, action.
+U_MIN, U_MAX, PERIOD, PRECESSION, SPIN, ACTION = range(0, 12, 2)
+# T by sums less T by the mean, relative; the doubt of T beside a separatrix, relative to T, those of
+# u_min and u_max; the fastest precession at a saddle.
+APART, PERIOD_DOUBT, U_MIN_DOUBT, U_MAX_DOUBT, FASTEST = range(12, 17)
 COLUMNS = 17
+# A turning point, each of these in two columns: u, 1 - u, 1 + u. Of two the lower one comes first.
+U, TO_PLUS, TO_MINUS = range(0, 6, 2)
+TURNING = 6
+LOWER, UPPER = range(2)
+# What `well` fills, each of these in two columns: T by the mean, T by sums, what the pole u = 1 adds
+# to the precession, what u = -1 adds, the action.
+_MEAN, _SUM, _AT_PLUS, _AT_MINUS, _ACTION = range(0, 10, 2)
+_WELL = 10
+# The sums: of 1 / sqrt Q, of the advance at either pole, and of the action.
+_PERIODS, _ADVANCES_PLUS, _ADVANCES_MINUS, _ACTIONS = range(4)
+_SUMS = 4
 ROUNDS = 1e-31  # of double-double, relative to the terms of L
+
+
+@inline
+def add_to(sums, n, x):
+    """Add a double-double to row n."""
+    sums[n, 0], sums[n, 1] = add((sums[n, 0], sums[n, 1]), x)
 
 
 @inline
@@ -118,7 +154,7 @@ def at_pole(v, d2, c1, c2, c3, c4):
 
 @inline
 def beside_pole(side, k, L, slope, end):
-    """Where the motion turns just before the pole that is itself a root: u, 1 - u, 1 + u into `end` (6)."""
+    """Where the motion turns just before the pole that is itself a root, into `end` (TURNING)."""
     five = add(times(k, 5.0), L)
     if five[0] < 0.0:
         zero = (0.0, 0.0)
@@ -126,9 +162,9 @@ def beside_pole(side, k, L, slope, end):
             div(times(slope, 2.0), five), zero, times(slope, 2.0), neg(five), times(k, 4.0), neg(k)
         )
         far, u = sub((2.0, 0.0), short), sub((1.0, 0.0), short)
-        end[0], end[1] = u if side == 1 else neg(u)
-        end[2], end[3] = short if side == 1 else far
-        end[4], end[5] = far if side == 1 else short
+        keep(end, U, u if side == UPPER else neg(u))
+        keep(end, TO_PLUS, short if side == UPPER else far)
+        keep(end, TO_MINUS, far if side == UPPER else short)
 
 
 @inline
@@ -149,7 +185,7 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
     Qh = add(mul(add(mul(k, uh), kS), uh), q0)
     g = root(mul(Ql, Qh))
     s = add(sub(L, k), times(mul(kS, S), 1.5))
-    out[0], out[1] = div(mul(PI, times(A, 2.0)), mean(root(times(add(s, g), 0.5)), root(g)))
+    keep(out, _MEAN, div(mul(PI, times(A, 2.0)), mean(root(times(add(s, g), 0.5)), root(g))))
     r1, r2 = root(mul(vl, vh)), root(mul(wl, wh))
     Q1, Q2 = (0.0, 0.0), (0.0, 0.0)
     if r1[0] > 0.0:
@@ -165,13 +201,13 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
     else:
         Q2 = root(add(sub(k, kS), q0))
     narrow = half[0] < 0.02 * min(vh[0], wl[0])
-    total = np.zeros((4, 2))
-    old = np.zeros((4, 2))
+    total = np.zeros((_SUMS, 2))
+    old = np.zeros((_SUMS, 2))
     n, good = 8, False
     first = True
     while n <= most:
         # midpoint nodes of n; doubling keeps the old ones by using odd multiples
-        part = np.zeros((4, 2))
+        part = np.zeros((_SUMS, 2))
         count = n if first else n // 2
         # nodes (j + 1/2) pi / n0 at first; then those half way
         for j in range(count):
@@ -188,24 +224,25 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
             Q = add(mul(add(mul(k, u), kS), u), q0)
             q = root(Q)
             inverse = div((1.0, 0.0), q)
-            part[0, 0], part[0, 1] = add((part[0, 0], part[0, 1]), inverse)
+            add_to(part, _PERIODS, inverse)
             f1, f2 = mul(k, add(add((1.0, 0.0), u), S)), mul(k, sub(sub((1.0, 0.0), u), S))
             e1, e2 = div(f1, add(q, Q1)), div(f2, add(q, Q2))
-            part[1, 0], part[1, 1] = add((part[1, 0], part[1, 1]), mul(e1, inverse))
-            part[2, 0], part[2, 1] = add((part[2, 0], part[2, 1]), mul(e2, inverse))
+            add_to(part, _ADVANCES_PLUS, mul(e1, inverse))
+            add_to(part, _ADVANCES_MINUS, mul(e2, inverse))
             if narrow:
                 term = div(mul(mul(down, up), q), mul(v, w))
             else:
                 term = add(q, times(add(mul(mul(vl, vh), e1), mul(mul(wl, wh), e2)), 0.5))
-            part[3, 0], part[3, 1] = add((part[3, 0], part[3, 1]), term)
+            add_to(part, _ACTIONS, term)
         good = True
-        for m in range(4):
+        for m in range(_SUMS):
             s = (part[m, 0], part[m, 1])
             if not first:
                 s = add(s, (old[m, 0], old[m, 1]))
             old[m, 0], old[m, 1] = s
             s = times(s, 1.0 / n)
-            scale = max(abs(s[0]), abs(total[0, 0]) * 1e-3 if m in (1, 2) else 0.0)
+            advance = m in (_ADVANCES_PLUS, _ADVANCES_MINUS)
+            scale = max(abs(s[0]), abs(total[_PERIODS, 0]) * 1e-3 if advance else 0.0)
             if first or abs(sub(s, (total[m, 0], total[m, 1]))[0]) > 1e-25 * scale + 1e-300:
                 good = False
             total[m, 0], total[m, 1] = s
@@ -215,7 +252,7 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
             # the first nodes are those of the shifted rule; restart with the rule at multiples of
             # pi / n
             first = False
-            ends = np.zeros((4, 2))
+            ends = np.zeros((_SUMS, 2))
             for e in range(2):
                 u = uh if e == 0 else ul
                 v, w = (vh, wh) if e == 0 else (vl, wl)
@@ -228,26 +265,19 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
                     term = (0.0, 0.0)
                 else:
                     term = add(q, times(add(mul(mul(vl, vh), e1), mul(mul(wl, wh), e2)), 0.5))
-                for m in range(4):
-                    t = (
-                        inverse
-                        if m == 0
-                        else (
-                            mul(e1, inverse) if m == 1 else (mul(e2, inverse) if m == 2 else term)
-                        )
-                    )
-                    ends[m, 0], ends[m, 1] = add((ends[m, 0], ends[m, 1]), times(t, 0.5))
+                add_to(ends, _PERIODS, times(inverse, 0.5))
+                add_to(ends, _ADVANCES_PLUS, times(mul(e1, inverse), 0.5))
+                add_to(ends, _ADVANCES_MINUS, times(mul(e2, inverse), 0.5))
+                add_to(ends, _ACTIONS, times(term, 0.5))
             # shifted nodes with n are the odd multiples of pi / 2n: with the even ones the rule of
             # 2n
-            for m in range(4):
-                old[m, 0], old[m, 1] = add((old[m, 0], old[m, 1]), (ends[m, 0], ends[m, 1]))
+            for m in range(_SUMS):
+                add_to(old, m, (ends[m, 0], ends[m, 1]))
             # still wanted: multiples of pi / n inside
             for j in range(1, n):
                 sin, cos = sine_cosine(times(PI, j / (2.0 * n)))
-                down, up = (
-                    times(mul(half, mul(sin, sin)), 2.0),
-                    times(mul(half, mul(cos, cos)), 2.0),
-                )
+                down = times(mul(half, mul(sin, sin)), 2.0)
+                up = times(mul(half, mul(cos, cos)), 2.0)
                 u = sub(uh, down) if abs(uh[0]) < abs(ul[0]) else add(ul, up)
                 v, w = add(vh, down), add(wl, up)
                 q = root(add(mul(add(mul(k, u), kS), u), q0))
@@ -258,54 +288,49 @@ def well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, out, most):
                     term = div(mul(mul(down, up), q), mul(v, w))
                 else:
                     term = add(q, times(add(mul(mul(vl, vh), e1), mul(mul(wl, wh), e2)), 0.5))
-                for m in range(4):
-                    t = (
-                        inverse
-                        if m == 0
-                        else (
-                            mul(e1, inverse) if m == 1 else (mul(e2, inverse) if m == 2 else term)
-                        )
-                    )
-                    old[m, 0], old[m, 1] = add((old[m, 0], old[m, 1]), t)
-            for m in range(4):
+                add_to(old, _PERIODS, inverse)
+                add_to(old, _ADVANCES_PLUS, mul(e1, inverse))
+                add_to(old, _ADVANCES_MINUS, mul(e2, inverse))
+                add_to(old, _ACTIONS, term)
+            for m in range(_SUMS):
                 total[m, 0], total[m, 1] = times((old[m, 0], old[m, 1]), 1.0 / (2 * n))
             n *= 4
         else:
             n *= 2
     up, down = (0.0, 0.0), (0.0, 0.0)
     if delta[0] != 0.0:
-        up = mul(PI, add((1.0, 0.0), mul(r1, (total[1, 0], total[1, 1]))))
+        up = mul(PI, add((1.0, 0.0), mul(r1, pair(total[_ADVANCES_PLUS], 0))))
         if delta[0] < 0.0:
             up = neg(up)
     if sigma[0] != 0.0:
-        down = mul(PI, add((1.0, 0.0), mul(r2, (total[2, 0], total[2, 1]))))
+        down = mul(PI, add((1.0, 0.0), mul(r2, pair(total[_ADVANCES_MINUS], 0))))
         if sigma[0] < 0.0:
             down = neg(down)
-    out[2], out[3] = mul(mul(PI, times(A, 2.0)), (total[0, 0], total[0, 1]))
-    out[4], out[5] = up
-    out[6], out[7] = down
-    action = (total[3, 0], total[3, 1])
+    keep(out, _SUM, mul(mul(PI, times(A, 2.0)), pair(total[_PERIODS], 0)))
+    keep(out, _AT_PLUS, up)
+    keep(out, _AT_MINUS, down)
+    action = pair(total[_ACTIONS], 0)
     if not narrow:
         # - sqrt(vl vh) |delta| / 2 and likewise below: what the poles take
         x, y = (delta if delta[0] > 0 else neg(delta)), (sigma if sigma[0] > 0 else neg(sigma))
         action = sub(action, times(add(x, y), 0.5))
-    out[8], out[9] = action
+    keep(out, _ACTION, action)
     if not good:
-        out[2:10] = np.nan
+        out[_SUM:_WELL] = np.nan
 
 
 @inline
 def between_ends(A, k, L, a, b, level, below, e, one, most):
-    """As `well`, of the ends (2, 6): u, 1 - u, 1 + u of each."""
-    ul, uh = (e[0, 0], e[0, 1]), (e[1, 0], e[1, 1])
-    vl, vh = (e[0, 2], e[0, 3]), (e[1, 2], e[1, 3])
-    wl, wh = (e[0, 4], e[0, 5]), (e[1, 4], e[1, 5])
+    """As `well`, of the turning points (2, TURNING)."""
+    ul, uh = pair(e[LOWER], U), pair(e[UPPER], U)
+    vl, vh = pair(e[LOWER], TO_PLUS), pair(e[UPPER], TO_PLUS)
+    wl, wh = pair(e[LOWER], TO_MINUS), pair(e[UPPER], TO_MINUS)
     well(A, k, L, a, b, level, below, ul, uh, vl, vh, wl, wh, one, most)
 
 
 @inline
 def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, ends):
-    """Roots of P (expanded about u0, whose 1 -+ u0 are v0, w0) with their u, 1 - u, 1 + u; returns
+    """Roots of P (expanded about u0, whose 1 -+ u0 are v0, w0), into `ends` (n, TURNING); returns
     their number.
     """
     number = stationary(c, low, high, work, found)
@@ -327,26 +352,25 @@ def prepared(k, L, a, b, level, below, c, low, high, u0, v0, w0, work, found, en
             )
             v = sub((2.0, 0.0), w)
             u = sub(w, (1.0, 0.0))
-        ends[j, 0], ends[j, 1] = u
-        ends[j, 2], ends[j, 3] = v
-        ends[j, 4], ends[j, 5] = w
+        keep(ends[j], U, u)
+        keep(ends[j], TO_PLUS, v)
+        keep(ends[j], TO_MINUS, w)
     return number
 
 
 @inline
 def doubts(A, k, L, a, b, c, low, high, u0, e, work, found, o):
     """What rounds of L of ROUNDS times the size of its terms do beside a separatrix (floats
-    suffice), into o[13:17].
+    suffice), into columns PERIOD_DOUBT to FASTEST.
 
-    These are the doubt of T relative to it, those of u_min and u_max, and the fastest precession at
-    a saddle. A saddle is a minimum of P (as c, expanded about u0) with P = (1 - u^2) (L - L_sep)
+    A saddle is a minimum of P (as c, expanded about u0) with P = (1 - u^2) (L - L_sep)
     there.
     """
     rounds = ROUNDS * (abs(L) + 2.0 * abs(k) + a * a + b * b)
     slopes, square = np.zeros((5, 2)), np.zeros((4, 2))
     derived(c, slopes[:4])
     derived(slopes[:4], square)
-    o[13] = o[16] = 0.0
+    o[PERIOD_DOUBT] = o[FASTEST] = 0.0
     number = stationary(slopes, low, high, work, found)
     for j in range(number):
         x = (found[j, 0], found[j, 1])
@@ -356,36 +380,44 @@ def doubts(A, k, L, a, b, c, low, high, u0, e, work, found, o):
             size = 0.0
             for n in range(4, -1, -1):
                 size = size * abs(x[0]) + abs(c[n, 0])
-            o[13] = max(o[13], rounds * (1.0 - u * u) / height, 10.0 * ROUNDS * size / height)
-            o[16] = max(o[16], (abs(b - a * u) + abs(a - b * u)) / (1.0 - u * u) / A)
-    for side in range(2):
-        u = e[side, 0]
-        x = sub((e[side, 0], e[side, 1]), u0)
-        o[14 + side] = rounds * (1.0 - u * u) / abs(value(slopes[:4], x)[0])
+            o[PERIOD_DOUBT] = max(
+                o[PERIOD_DOUBT], rounds * (1.0 - u * u) / height, 10.0 * ROUNDS * size / height
+            )
+            o[FASTEST] = max(o[FASTEST], (abs(b - a * u) + abs(a - b * u)) / (1.0 - u * u) / A)
+    for side in (LOWER, UPPER):
+        u = e[side, U]
+        x = sub(pair(e[side], U), u0)
+        o[U_MIN_DOUBT if side == LOWER else U_MAX_DOUBT] = (
+            rounds * (1.0 - u * u) / abs(value(slopes[:4], x)[0])
+        )
 
 
 @kernel
 def states(points, most, out):
-    """points (N, 7): A, C, epsilon, theta0, p_theta0, p_psi, p_phi. out (N, 17): see `fill` and `doubts`."""
+    """points (N, STATE): SIZE_A to P_PHI of `records`; out (N, COLUMNS)."""
     work = (np.empty((5, 2)), np.empty((5, 2)), np.empty((5, 2)))
-    found, ends, c, one = np.empty((8, 2)), np.empty((8, 6)), np.empty((5, 2)), np.empty(10)
+    found = np.empty((8, 2))
+    ends = np.empty((8, TURNING))
+    c = np.empty((5, 2))
+    one = np.empty(_WELL)
     for i in range(len(points)):
         q, o = points[i], out[i]
         o[:] = np.nan
-        A, C, eps = (q[0], 0.0), (q[1], 0.0), (q[2], 0.0)
-        p, b, a = (q[4], 0.0), (q[5], 0.0), (q[6], 0.0)
+        A, C, eps = (q[nu.SIZE_A], 0.0), (q[nu.SIZE_C], 0.0), (q[nu.EPSILON], 0.0)
+        theta = q[nu.THETA]
+        p, b, a = (q[nu.P_THETA], 0.0), (q[nu.P_PSI], 0.0), (q[nu.P_PHI], 0.0)
         k = mul(mul(eps, A), sub(A, C))
-        sin, cos = sine_cosine((q[3], 0.0))
-        hs, hc = sine_cosine((0.5 * q[3], 0.0))
+        sin, cos = sine_cosine((theta, 0.0))
+        hs, hc = sine_cosine((0.5 * theta, 0.0))
         v0, w0 = times(mul(hs, hs), 2.0), times(mul(hc, hc), 2.0)
-        if q[3] < 1.5:
+        if theta < 1.5:
             num = add(sub(b, a), mul(a, v0))
         else:
             num = sub(add(b, a), mul(a, w0))
         X = (0.0, 0.0)
         if sin[0] != 0.0:
             X = div(num, sin)
-        if q[3] == 0.0:
+        if theta == 0.0:
             X = (0.0, 0.0)
         energy = add(mul(p, p), mul(X, X))
         sin2 = mul(sin, sin)
@@ -440,23 +472,23 @@ def states(points, most, out):
                 for j in range(number):
                     if found[j, 0] < -1e-26:
                         lower = j
-        e = np.empty((2, 6))
-        for side in range(2):
-            j = lower if side == 0 else upper
+        e = np.empty((2, TURNING))
+        for side in (LOWER, UPPER):
+            j = lower if side == LOWER else upper
             if j == -2:
-                e[side, 0], e[side, 1] = cos
-                e[side, 2], e[side, 3] = v0
-                e[side, 4], e[side, 5] = w0
+                keep(e[side], U, cos)
+                keep(e[side], TO_PLUS, v0)
+                keep(e[side], TO_MINUS, w0)
             elif j == -1:  # the pole itself
-                e[side, 0], e[side, 1] = (-1.0, 0.0) if side == 0 else (1.0, 0.0)
-                e[side, 2], e[side, 3] = (2.0, 0.0) if side == 0 else (0.0, 0.0)
-                e[side, 4], e[side, 5] = (0.0, 0.0) if side == 0 else (2.0, 0.0)
+                keep(e[side], U, (-1.0, 0.0) if side == LOWER else (1.0, 0.0))
+                keep(e[side], TO_PLUS, (2.0, 0.0) if side == LOWER else (0.0, 0.0))
+                keep(e[side], TO_MINUS, (0.0, 0.0) if side == LOWER else (2.0, 0.0))
                 # P < 0 next to it: the motion turns before
-                if (below[0] if side == 0 else level[0]) < 0.0:
-                    beside_pole(side, k, L, below if side == 0 else level, e[side])
+                if (below[0] if side == LOWER else level[0]) < 0.0:
+                    beside_pole(side, k, L, below if side == LOWER else level, e[side])
             else:
                 e[side] = ends[j]
-        if e[1, 0] - e[0, 0] <= 1e-12:
+        if e[UPPER, U] - e[LOWER, U] <= 1e-12:
             continue
         one[:] = np.nan
         between_ends(A, k, L, a, b, level, below, e, one, most)
@@ -467,26 +499,31 @@ def states(points, most, out):
 
 @inline
 def fill(o, e, one, drift):
-    """u_min, u_max, T, precession, spin, action (high, low), T by sums less T by the mean."""
-    o[0], o[1], o[2], o[3] = e[0, 0], e[0, 1], e[1, 0], e[1, 1]
-    T, up, down = (one[0], one[1]), (one[4], one[5]), (one[6], one[7])
-    o[4], o[5] = T
-    o[6], o[7] = add(up, down)
-    o[8], o[9] = add(mul(drift, T), sub(down, up))
-    o[10], o[11] = one[8], one[9]
-    o[12] = sub((one[2], one[3]), T)[0] / T[0]
+    """Columns U_MIN to APART."""
+    keep(o, U_MIN, pair(e[LOWER], U))
+    keep(o, U_MAX, pair(e[UPPER], U))
+    T, up, down = pair(one, _MEAN), pair(one, _AT_PLUS), pair(one, _AT_MINUS)
+    keep(o, PERIOD, T)
+    keep(o, PRECESSION, add(up, down))
+    keep(o, SPIN, add(mul(drift, T), sub(down, up)))
+    keep(o, ACTION, pair(one, _ACTION))
+    o[APART] = sub(pair(one, _SUM), T)[0] / T[0]
 
 
 @kernel
 def integrals(points, sign, ratio, most, out):
-    """points (N, 3): l, alpha, beta. out (N, 2, 17): of each well, lower u first."""
+    """points (N, INTEGRALS): ENERGY, ALPHA, BETA of `records`; out (N, 2, COLUMNS): of each well, lower u first."""
     work = (np.empty((5, 2)), np.empty((5, 2)), np.empty((5, 2)))
     marks = np.empty((8, 2))
-    found, ends, c, one = np.empty((8, 2)), np.empty((8, 6)), np.empty((5, 2)), np.empty(10)
+    found = np.empty((8, 2))
+    ends = np.empty((8, TURNING))
+    c = np.empty((5, 2))
+    one = np.empty(_WELL)
     for i in range(len(points)):
         q, o = points[i], out[i]
         o[:] = np.nan
-        k, L, a, b = (sign, 0.0), (q[0], 0.0), (q[1], 0.0), (q[2], 0.0)
+        k, L = (sign, 0.0), (q[nu.ENERGY], 0.0)
+        a, b = (q[nu.ALPHA], 0.0), (q[nu.BETA], 0.0)
         level, below = sub(add(L, k), mul(a, b)), add(add(L, k), mul(a, b))
         c[0] = sub(sub(L, mul(a, a)), mul(b, b))
         c[1] = times(mul(a, b), 2.0)
@@ -508,7 +545,7 @@ def integrals(points, sign, ratio, most, out):
             found,
             ends,
         )
-        if q[1] == q[2] or q[1] == -q[2]:
+        if abs(q[nu.ALPHA]) == abs(q[nu.BETA]):
             continue
         drift = times(mul(a, sub((1.0, 0.0), (ratio, 0.0))), 1.0)
         drift = div(drift, (ratio, 0.0))
@@ -518,7 +555,7 @@ def integrals(points, sign, ratio, most, out):
             if value(c, mid)[0] > 0.0 and at < 2:
                 e = ends[j : j + 2]
                 one[:] = np.nan
-                if e[1, 0] - e[0, 0] > 1e-12:
+                if e[UPPER, U] - e[LOWER, U] > 1e-12:
                     between_ends((1.0, 0.0), k, L, a, b, level, below, e, one, most)
                     fill(o[at], e, one, drift)
                     zero = (0.0, 0.0)

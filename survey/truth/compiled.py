@@ -13,11 +13,15 @@ import platformdirs
 
 
 def _folder(function):
-    """Named by a hash of the function's file and of the arithmetic that is compiled into it."""
+    """Named by a hash of the function's file and of the arithmetic and the columns that are compiled
+    into it.
+    """
     digest = hashlib.sha256(
         f"{numba.__version__} {llvmlite.__version__} {llvm.get_host_cpu_name()}".encode()
     )
-    for path in (function.__code__.co_filename, Path(__file__).with_name("double.py"), __file__):
+    here = Path(__file__)
+    shared = here.with_name("double.py"), here.parents[1] / "kernels" / "nutation" / "records.py"
+    for path in (function.__code__.co_filename, *shared, here):
         digest.update(Path(path).read_bytes())
     base = Path(os.environ.get("NUMBA_CACHE_DIR") or platformdirs.user_cache_dir("survey"))
     return base / f"truth-{digest.hexdigest()[:16]}"

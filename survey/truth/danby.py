@@ -5,6 +5,7 @@ verdicts.
 import numpy as np
 
 from survey.truth import danby_flow, remembered
+from survey.truth.danby_flow import A_DOUBT, B_DOUBT, COLUMNS, A, B
 
 LONG = np.longdouble
 ULP = float(np.finfo(LONG).eps)
@@ -16,15 +17,18 @@ def solved(mu, e, tolerance=danby_flow.TINY):
     def kernel(points, out):
         danby_flow.points(*(np.ascontiguousarray(x) for x in points.T), tolerance, out)
 
-    return remembered(("danby", tolerance), kernel, np.column_stack([mu.ravel(), e.ravel()]), 7)
+    points = np.column_stack([mu.ravel(), e.ravel()])
+    return remembered(("danby", tolerance), kernel, points, COLUMNS)
 
 
 def margins(out):
     """(A B, C D, K) times 16 and t, from the truth, with their doubts (long doubles)."""
-    a, b = out[:, 0].astype(LONG) + out[:, 1], out[:, 2].astype(LONG) + out[:, 3]
-    da, db = out[:, 4], out[:, 5]
+    a, b = (out[:, column].astype(LONG) + out[:, column + 1] for column in (A, B))
+    da, db = out[:, A_DOUBT], out[:, B_DOUBT]
     t, dt = (a + 4) / 4, da / 4
-    ab, cd, k = b + 2 * a + 2, b - 2 * a + 2, a * a - 4 * b + 8
+    ab = b + 2 * a + 2
+    cd = b - 2 * a + 2
+    k = a * a - 4 * b + 8
     size = np.abs(a) + np.abs(b) + 8
     return (
         (ab, db + 2 * da + 4 * ULP * size), (cd, db + 2 * da + 4 * ULP * size),
@@ -35,7 +39,7 @@ def margins(out):
 def truth(given, answer):
     ok = answer["status"] == 0
     mu, e = np.broadcast_arrays(given["mu"], given["e"])
-    out = np.full((ok.size, 7), np.nan)
+    out = np.full((ok.size, COLUMNS), np.nan)
     out[ok] = solved(mu[ok], e[ok])
     (ab, dab), (cd, dcd), (k, dk), (t, dt) = margins(out)
     with np.errstate(invalid="ignore"):
@@ -56,7 +60,7 @@ def truth(given, answer):
         "collision": (said == 0) & (mu > 0) & other,
     }
     return {
-        "a": (out[:, 0], out[:, 1], out[:, 4]),
-        "b": (out[:, 2], out[:, 3], out[:, 5]),
+        "a": (out[:, A], out[:, A + 1], out[:, A_DOUBT]),
+        "b": (out[:, B], out[:, B + 1], out[:, B_DOUBT]),
         "wrong": wrong,
     }

@@ -17,6 +17,7 @@ from survey.truth.double import (
     div,
     get,
     horner,
+    keep,
     mul,
     neg,
     reach,
@@ -30,11 +31,15 @@ from survey.truth.double import (
 TERMS = 33
 TINY = 1e-31
 MOST = 4000
+# What is filled: the invariants a and b, each in two columns, high and low; their doubts, and steps.
+A, B = 0, 2
+A_DOUBT, B_DOUBT, STEPS = range(4, 7)
+COLUMNS = 7
 
 
 @kernel
 def points(mu, e, tolerance, out):
-    """out[i] = a, b (high, low), their doubts, and steps."""
+    """Fill `out` (N, COLUMNS)."""
     c, g = np.zeros((2, TERMS)), np.zeros((2, TERMS))
     y = np.zeros((4, 4, 2, TERMS))
     u, v = np.zeros((2, TERMS)), np.zeros((2, TERMS))
@@ -49,7 +54,8 @@ def points(mu, e, tolerance, out):
         x[:] = 0.0
         for n in range(4):
             x[n, n, 0] = 1.0
-        at, steps, largest = (0.0, 0.0), 0, 1.0
+        at = (0.0, 0.0)
+        steps, largest = 0, 1.0
         left = PI
         while left[0] > 0.0 and steps < MOST:
             steps += 1
@@ -95,9 +101,9 @@ def points(mu, e, tolerance, out):
         # columns x[k] of Phi; with J = (0 1; -1 0) in (x, q | p, m): Phi^-1 = (T', -S'; -Q', P')
         o = out[i]
         _invariants(x, o)
-        o[4] = 1e-29 * steps * largest * largest
-        o[5] = 1e-29 * steps * largest**4
-        o[6] = float(steps)
+        o[A_DOUBT] = 1e-29 * steps * largest * largest
+        o[B_DOUBT] = 1e-29 * steps * largest**4
+        o[STEPS] = float(steps)
         if steps >= MOST:
             o[:] = np.nan
 
@@ -120,5 +126,5 @@ def _invariants(x, o):
         for j in range(i):
             b = add(b, mul((m[i, i, 0], m[i, i, 1]), (m[j, j, 0], m[j, j, 1])))
             b = sub(b, mul((m[i, j, 0], m[i, j, 1]), (m[j, i, 0], m[j, i, 1])))
-    o[0], o[1] = a
-    o[2], o[3] = b
+    keep(o, A, a)
+    keep(o, B, b)

@@ -14,10 +14,12 @@ from survey.measures.hill import multiprecision
 from survey.request import ranges
 from survey.request.hill_scene import HillScene
 from survey.truth import remembered
-from survey.truth.hill import hill_outputs
+from survey.truth.hill import FACTORS, hill_outputs
+from survey.truth.hill_flow import COLUMNS, DOUBT, END, STEPS
 
-COLUMNS, ORDER = 12, 10
-SMALL, DIGITS = 1e-26, 1e-36  # of a step, over the size of the flow; of the arithmetic
+ORDER = 10
+SMALL = 1e-26  # of a step, over the size of the flow
+DIGITS = 1e-36  # of the arithmetic
 
 
 def of_file(path):
@@ -62,7 +64,7 @@ def own(scene):
 
 
 def _factors(scene, z, p):
-    """y1, y2, y1', y2' (high, low) at T/2 if z is even, else at T; that place; their doubt; steps."""
+    """A row (COLUMNS) of `hill_flow`: at T/2 if z is even, else at T."""
     mp = multiprecision.context()
     exact = [mp.mpf(float(x)) for x in p]
     period = float(scene.period(p) if callable(scene.period) else scene.period)
@@ -71,21 +73,27 @@ def _factors(scene, z, p):
     )
     end = period / 2 if scene.EVEN else period
     ends = [0.0, *sorted({x for x in breaks.tolist() if 0.0 < x < end}), end]
-    flow, doubt, steps, largest = (mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(1)), 0.0, 0, 1.0
+    flow = mp.mpf(1), mp.mpf(0), mp.mpf(0), mp.mpf(1)
+    doubt, steps, largest = 0.0, 0, 1.0
     for low, high in pairwise(ends):
         flow, error, more, size = _piece(lambda u: z(u, exact), mp, flow, mp.mpf(low), mp.mpf(high))
         doubt, steps, largest = doubt + error, steps + more, max(largest, size)
-    row = []
-    for value in flow:
-        row += [float(value), float(value - float(value))]
-    return [*row, end, 0.0, (doubt + DIGITS * steps) * largest * largest, float(steps)]
+    row = np.zeros(COLUMNS)
+    for column, value in zip(FACTORS.values(), flow, strict=True):
+        row[column] = float(value)
+        row[column + 1] = float(value - float(value))
+    row[END] = end
+    row[DOUBT] = (doubt + DIGITS * steps) * largest * largest
+    row[STEPS] = steps
+    return row
 
 
 def _piece(z, mp, flow, u, end):
     """The flow y1, y2, y1', y2' at the end of a smooth piece, the local errors' sum, steps, the
     largest entry.
     """
-    h, doubt, steps, largest = end - u, 0.0, 0, 1.0
+    h = end - u
+    doubt, steps, largest = 0.0, 0, 1.0
     # a jump at an end of the piece belongs to the other side
     inside = (end - u) * mp.mpf(2) ** -110
     low, high = u + inside, end - inside

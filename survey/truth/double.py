@@ -33,6 +33,18 @@ def fma(typingctx, a, b, c):
 
 
 @inline
+def pair(row, n):
+    """The number in columns n and n + 1 of a row, high and low."""
+    return row[n], row[n + 1]
+
+
+@inline
+def keep(row, n, x):
+    """Set columns n and n + 1 of a row."""
+    row[n], row[n + 1] = x
+
+
+@inline
 def two_sum(a, b):
     s = a + b
     t = s - a

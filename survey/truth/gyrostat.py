@@ -5,6 +5,18 @@ their outputs.
 import numpy as np
 
 from survey.truth import gyrostat_flow, remembered
+from survey.truth.gyrostat_flow import (
+    COLUMNS,
+    END_PHI,
+    END_W,
+    GOAL,
+    PHI0,
+    TIME,
+    TURNED,
+    TURNINGS,
+    VALUE,
+    W0,
+)
 
 SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 SURE = 1e-26  # of the truth, relative, where nothing grows
@@ -40,7 +52,7 @@ def _twice(kernel, points, said, bars, columns):
 
 def _solved(kernel, points, tolerance):
     return remembered(
-        (kernel.__name__, tolerance), lambda p, out: kernel(p, tolerance, out), points, 6
+        (kernel.__name__, tolerance), lambda p, out: kernel(p, tolerance, out), points, COLUMNS
     )
 
 
@@ -54,19 +66,20 @@ def flow(given, answer):
     ok = answer["status"] == 0
     points = _points(given, "t", ok)
     said, bars = ([answer[f"{name}{end}"][ok] for name in ("phi", "w")] for end in ("", "_error"))
-    out, doubt = _twice(gyrostat_flow.flow, points, said, bars, (0, 2))
+    out, doubt = _twice(gyrostat_flow.flow, points, said, bars, (END_PHI, END_W))
     turns = answer["turnings"][ok]
     with np.errstate(invalid="ignore"):
         clear = (
-            (out[:, 4] >= 0)
-            & (np.abs(out[:, 2]) > 2 * np.maximum(bars[1], 1e-25))
-            & (points[:, 7] != 0)
+            (out[:, TURNINGS] >= 0)
+            & (np.abs(out[:, END_W]) > 2 * np.maximum(bars[1], 1e-25))
+            & (points[:, W0] != 0)
         )
         wrong = np.zeros(len(ok), bool)
-        wrong[ok] = clear & (turns >= 0) & (turns != out[:, 4])
-    spread = lambda x: _spread(ok, x)  # noqa: E731
-    return {"phi": (spread(out[:, 0]), spread(out[:, 1]), spread(doubt[:, 0])),
-            "w": (spread(out[:, 2]), spread(out[:, 3]), spread(doubt[:, 1])), "wrong": {"turnings": wrong}}  # fmt: skip
+        wrong[ok] = clear & (turns >= 0) & (turns != out[:, TURNINGS])
+    found = {"wrong": {"turnings": wrong}}
+    for name, c, j in (("phi", END_PHI, 0), ("w", END_W, 1)):
+        found[name] = tuple(_spread(ok, x) for x in (out[:, c], out[:, c + 1], doubt[:, j]))
+    return found
 
 
 def along(given, answer):
@@ -82,27 +95,25 @@ def along(given, answer):
         np.where(turned, answer[a + "_error"], answer[b + "_error"])[ok]
         for a, b in (("phi_turning", "w"), ("t_turning", "t"))
     ]
-    out, doubt = _twice(gyrostat_flow.along, points, pick, bars, (0, 2))
+    out, doubt = _twice(gyrostat_flow.along, points, pick, bars, (VALUE, TIME))
     with np.errstate(invalid="ignore"):
         apart = np.abs(given["phi"] - answer["phi_turning"]) > answer["phi_turning_error"]
-    early = turned[ok] & (out[:, 4] == 0) & ~apart[ok]
+    early = turned[ok] & (out[:, TURNED] == 0) & ~apart[ok]
     if early.any():  # within its bar: held against the turning point beyond
         further = points[early]
-        further[:, 8] += np.sign(further[:, 8] - further[:, 6])
+        further[:, GOAL] += np.sign(further[:, GOAL] - further[:, PHI0])
         found = [part[early] for part in (*pick, *bars)]
         out[early], doubt[early] = _twice(
-            gyrostat_flow.along, further, found[:2], found[2:], (0, 2)
+            gyrostat_flow.along, further, found[:2], found[2:], (VALUE, TIME)
         )
-    true = _spread(ok, out[:, 4])
+    true = _spread(ok, out[:, TURNED])
     wrong = ((status == 0) & (true == 1)) | (turned & (true == 0))
     found = {"wrong": {"turning": wrong}}
     for names, here in ((("w", "t"), true == 0), (("phi_turning", "t_turning"), true == 1)):
-        for name, c, j in zip(names, (0, 2), (0, 1), strict=True):
-            value, low, d = (
-                _spread(ok, out[:, c]),
-                _spread(ok, out[:, c + 1]),
-                _spread(ok, doubt[:, j]),
-            )
+        for name, c, j in zip(names, (VALUE, TIME), (0, 1), strict=True):
+            value = _spread(ok, out[:, c])
+            low = _spread(ok, out[:, c + 1])
+            d = _spread(ok, doubt[:, j])
             said = np.isfinite(answer[name])
             found[name] = np.where(here & said, value, np.nan), low, d
     return found

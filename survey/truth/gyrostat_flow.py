@@ -15,6 +15,7 @@ from survey.truth.double import (
     div,
     get,
     horner,
+    keep,
     neg,
     reach,
     sine_cosine,
@@ -27,7 +28,24 @@ from survey.truth.double import (
 TERMS = 27
 TINY = 1e-32
 MOST = 20_000
+# A point: the six parameters, where the motion starts, and t or phi to go to.
+B12, B31, D, C23, S2, S3, PHI0, W0, GOAL = range(9)
+SIX = 6
+# The series.
 PHI, W, SIN, COS, F, SC, CC = range(7)
+SERIES = 7
+# At a time: phi and w, each in two columns, high and low; turning points, or -1 in doubt; steps.
+END_PHI, END_W = 0, 2
+TURNINGS, STEPS = 4, 5
+# At an angle: w and t, or where TURNED is 1 phi and t of the turning point before it, each in two
+# columns; then steps.
+VALUE, TIME = 0, 2
+TURNED = 4
+COLUMNS = 6
+# After a long time: phi and w; w at the last passage of the section and at the one before; phi at
+# the last right turning point and at the one before; the fastest rate; 1 if all was done.
+LAST_PHI, LAST_W, PASSAGE, PASSAGE_BEFORE, RIGHT, RIGHT_BEFORE, RATE, DONE = range(8)
+SETTLED = 8
 
 
 @inline
@@ -40,13 +58,13 @@ def expand(p, y, phi, w):
     store(y[COS], 0, cos)
     for n in range(TERMS - 1):
         s, c = get(y[SIN], n), get(y[COS], n)
-        store(y[F], n, sub(times(c, p[0]), times(s, p[1])))
+        store(y[F], n, sub(times(c, p[B12]), times(s, p[B31])))
         store(y[CC], n, conv(y[COS], y[COS], n))
-        g = neg(times(conv(y[SIN], y[COS], n), p[2]))
-        g = sub(g, times(get(y[CC], n), 2.0 * p[3]))
+        g = neg(times(conv(y[SIN], y[COS], n), p[D]))
+        g = sub(g, times(get(y[CC], n), 2.0 * p[C23]))
         if n == 0:
-            g = add(g, (p[3], 0.0))
-        g = add(g, sub(times(c, p[4]), times(s, p[5])))
+            g = add(g, (p[C23], 0.0))
+        g = add(g, sub(times(c, p[S2]), times(s, p[S3])))
         by = (n + 1.0, 0.0)
         store(y[PHI], n + 1, div(get(y[W], n), by))
         store(y[W], n + 1, div(add(conv(y[F], y[W], n), g), by))
@@ -57,15 +75,15 @@ def expand(p, y, phi, w):
 @inline
 def sizes(p, w):
     """A power of two near the largest rate."""
-    g = max(abs(p[2]), abs(p[3]), abs(p[4]), abs(p[5]))
-    rate = max(abs(p[0]), abs(p[1]), np.sqrt(g), abs(w), 1e-290)
+    g = max(abs(p[D]), abs(p[C23]), abs(p[S2]), abs(p[S3]))
+    rate = max(abs(p[B12]), abs(p[B31]), np.sqrt(g), abs(w), 1e-290)
     return 2.0 ** np.floor(np.log2(rate))
 
 
 @inline
 def scaled(given, row, k):
-    row[0], row[1] = given[0] / k, given[1] / k
-    for j in range(2, 6):
+    row[B12], row[B31] = given[B12] / k, given[B31] / k
+    for j in range(D, SIX):
         row[j] = given[j] / k / k
 
 
@@ -79,19 +97,17 @@ def pace(y, tolerance):
 
 @kernel
 def flow(points, tolerance, out):
-    """points (N, 9): b12 .. s3, phi0, w0, t. out (N, 6): phi, w (high, low), turnings or -1 in
-    doubt, steps.
-    """
-    y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
+    """points (N, 9): B12 to GOAL, a time; out (N, COLUMNS): END_PHI to STEPS."""
+    y, p = np.zeros((SERIES, 2, TERMS)), np.zeros(SIX)
     for i in range(len(points)):
         row, o = points[i], out[i]
-        k = sizes(row, row[7])
+        k = sizes(row, row[W0])
         scaled(row, p, k)
-        phi, w = (row[6], 0.0), (row[7] / k, 0.0)
-        left = (row[8] * k, 0.0)
+        phi, w = (row[PHI0], 0.0), (row[W0] / k, 0.0)
+        left = (row[GOAL] * k, 0.0)
         back = left[0] < 0.0
         if back:  # S1
-            p[0], p[1] = -p[0], -p[1]
+            p[B12], p[B31] = -p[B12], -p[B31]
             left, w = neg(left), neg(w)
         steps, turns, doubtful = 0, 0, False
         sign = 0.0 if w[0] == 0.0 else np.sign(w[0])
@@ -115,10 +131,10 @@ def flow(points, tolerance, out):
             phi, w = horner(y[PHI], step), horner(y[W], step)
             left = (0.0, 0.0) if last else sub(left, (h, 0.0))
         w = times(w, -k if back else k)
-        o[0], o[1] = phi
-        o[2], o[3] = w
-        o[4] = -1.0 if doubtful else float(turns)
-        o[5] = float(steps)
+        keep(o, END_PHI, phi)
+        keep(o, END_W, w)
+        o[TURNINGS] = -1.0 if doubtful else float(turns)
+        o[STEPS] = float(steps)
         if steps >= MOST:
             o[:] = np.nan
 
@@ -142,22 +158,20 @@ def zero(series, goal, low, high):
 
 @kernel
 def along(points, tolerance, out):
-    """points (N, 9): b12 .. s3, phi0, w0, phi. out (N, 6): w, t (high, low), 0, or phi, t of
-    turning, 1; steps.
-    """
-    y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
+    """points (N, 9): B12 to GOAL, an angle; out (N, COLUMNS): VALUE to STEPS."""
+    y, p = np.zeros((SERIES, 2, TERMS)), np.zeros(SIX)
     for i in range(len(points)):
         row, o = points[i], out[i]
         o[:] = np.nan
-        k = sizes(row, row[7])
+        k = sizes(row, row[W0])
         scaled(row, p, k)
-        phi, w, goal = (row[6], 0.0), (row[7] / k, 0.0), (row[8], 0.0)
-        if w[0] == 0.0 or row[8] == row[6]:
+        phi, w, goal = (row[PHI0], 0.0), (row[W0] / k, 0.0), (row[GOAL], 0.0)
+        if w[0] == 0.0 or row[GOAL] == row[PHI0]:
             continue
-        ahead = 1.0 if row[8] > row[6] else -1.0
+        ahead = 1.0 if row[GOAL] > row[PHI0] else -1.0
         back = ahead * w[0] < 0.0
         if back:  # S1
-            p[0], p[1] = -p[0], -p[1]
+            p[B12], p[B31] = -p[B12], -p[B31]
             w = neg(w)
         t = (0.0, 0.0)
         for steps in range(3000):
@@ -175,39 +189,36 @@ def along(points, tolerance, out):
             if sub(there, goal)[0] * ahead >= 0.0:
                 x = zero(y[PHI], goal, 0.0, stop[0])
                 value, t = horner(y[W], x), add(t, x)
-                o[4] = 0.0
+                o[TURNED] = 0.0
             elif turned:
                 value, t = there, add(t, stop)
-                o[4] = 1.0
+                o[TURNED] = 1.0
             else:
                 phi, w, t = there, horner(y[W], stop), add(t, (h, 0.0))
                 if abs(w[0]) < 1e-10:  # at rest, or nearly: an equilibrium lies ahead
                     break
                 continue
-            scale = k if o[4] == 0.0 else 1.0
-            if back and o[4] == 0.0:
+            scale = k if o[TURNED] == 0.0 else 1.0
+            if back and o[TURNED] == 0.0:
                 scale = -scale
-            o[0], o[1] = times(value, scale)
-            o[2], o[3] = div(times(t, -1.0 if back else 1.0), (k, 0.0))
-            o[5] = float(steps)
+            keep(o, VALUE, times(value, scale))
+            keep(o, TIME, div(times(t, -1.0 if back else 1.0), (k, 0.0)))
+            o[STEPS] = float(steps)
             break
 
 
 @kernel
 def settle(points, section, span, tolerance, out):
-    """points (N, 8) without a time, for `span` in units of the fastest rate; velocities are over
-    that rate.
-
-    out (N, 8): phi, w at the end, w at the last two passages of `section`, phi at the last two
-    right turning points, the rate, and 1 if all was done.
+    """points (N, 8): B12 to W0, for `span` in units of the fastest rate; out (N, SETTLED), with
+    velocities over that rate.
     """
-    y, p = np.zeros((7, 2, TERMS)), np.zeros(6)
+    y, p = np.zeros((SERIES, 2, TERMS)), np.zeros(SIX)
     for i in range(len(points)):
         row, o = points[i], out[i]
         o[:] = np.nan
-        k = sizes(row, row[7])
+        k = sizes(row, row[W0])
         scaled(row, p, k)
-        phi, w = (row[6], 0.0), (row[7] / k, 0.0)
+        phi, w = (row[PHI0], 0.0), (row[W0] / k, 0.0)
         t = 0.0
         for _ in range(4000):
             expand(p, y, phi, w)
@@ -218,13 +229,13 @@ def settle(points, section, span, tolerance, out):
             if np.floor(a) != np.floor(b) and w[0] * speed[0] > 0.0:
                 goal = section[i] + 2 * np.pi * (np.floor(b) if b > a else np.floor(a))
                 x = zero(y[PHI], (goal, 0.0), 0.0, h)
-                o[3], o[2] = o[2], horner(y[W], x)[0]
+                o[PASSAGE_BEFORE], o[PASSAGE] = o[PASSAGE], horner(y[W], x)[0]
             if w[0] > 0.0 and speed[0] <= 0.0:
                 x = zero(y[W], (0.0, 0.0), 0.0, h)
-                o[5], o[4] = o[4], horner(y[PHI], x)[0]
+                o[RIGHT_BEFORE], o[RIGHT] = o[RIGHT], horner(y[PHI], x)[0]
             phi, w = there, speed
             t += h
             if t > span or abs(w[0]) > 1e6 or (abs(w[0]) < 1e-14 and h > span):
-                o[7] = 1.0
+                o[DONE] = 1.0
                 break
-        o[0], o[1], o[6] = phi[0], w[0], k
+        o[LAST_PHI], o[LAST_W], o[RATE] = phi[0], w[0], k

@@ -10,7 +10,23 @@ from math import pi
 import numpy as np
 
 from survey.truth import hill_flow, remembered
-from survey.truth.hill_flow import AMPLITUDE, COSINE, INERTIA, ONE_MINUS_K, RHO, K
+from survey.truth.hill_flow import (
+    AMPLITUDE,
+    COLUMNS,
+    COSINE,
+    DOUBT,
+    DY1,
+    DY2,
+    END,
+    INERTIA,
+    ONE_MINUS_K,
+    RHO,
+    Y1,
+    Y2,
+    K,
+)
+
+FACTORS = {"y1": Y1, "y2": Y2, "dy1": DY1, "dy2": DY2}  # their columns
 
 LONG = np.longdouble
 ULP = float(np.finfo(LONG).eps)
@@ -19,7 +35,7 @@ TOLERANCE = 1e-33
 
 
 def solved(way, given, rates, rho, direction=1.0, oblate=False, tolerance=TOLERANCE):
-    """Truth (N, 12): see `hill_flow.satellites`."""
+    """Truth (N, COLUMNS): see `hill_flow.satellites`."""
     given, rho = np.broadcast_arrays(np.asarray(given, float), np.asarray(rho, float))
 
     def kernel(points, out):
@@ -27,7 +43,9 @@ def solved(way, given, rates, rho, direction=1.0, oblate=False, tolerance=TOLERA
         hill_flow.satellites(way, given, rates, rho, direction, oblate, tolerance, out)
 
     points = np.column_stack([given.ravel(), rho.ravel()])
-    return remembered(("satellites", way, rates, direction, oblate, tolerance), kernel, points, 12)
+    return remembered(
+        ("satellites", way, rates, direction, oblate, tolerance), kernel, points, COLUMNS
+    )
 
 
 def satellite(way, inertia, direction, oblate, most=3e3):
@@ -40,7 +58,7 @@ def satellite(way, inertia, direction, oblate, most=3e3):
         rates = INERTIA if inertia else RHO
         ok = _tractable(given, way, name, most) & (answer["status"] == 0)
         values, other = (np.broadcast_to(given[x], ok.shape) for x in (way, name))
-        out = np.full((ok.size, 12), np.nan)
+        out = np.full((ok.size, COLUMNS), np.nan)
         out[ok] = solved(WAYS[way], values[ok], rates, other[ok], float(direction), oblate)
         k = {"k": values, "one_minus_k": 1 - values, "amplitude": np.sin(values)}[way]
         rho = direction / np.sqrt(3 * np.abs(1 - other)) if inertia else other
@@ -51,10 +69,10 @@ def satellite(way, inertia, direction, oblate, most=3e3):
             "amplitude": 2 * np.sin((pi / 2 - values + 6.123233995736766e-17) / 2) ** 2,
         }[way]
         found = hill_outputs(out, answer, True)
-        found["period"] = 2 * out[:, 8], 2 * out[:, 9], 1e-29 * out[:, 8]
+        found["period"] = 2 * out[:, END], 2 * out[:, END + 1], 1e-29 * out[:, END]
         grows, _low, doubt = found["exponent"]
         with np.errstate(all="ignore"):
-            turns = _long(out, 8) * 2 / (2 * LONG_PI) * _rho_long(rho, other, inertia)
+            turns = _long(out, END) * 2 / (2 * LONG_PI) * _rho_long(rho, other, inertia)
             found["exponent_per_orbit"] = (
                 grows / turns,
                 0.0,
@@ -67,7 +85,8 @@ def satellite(way, inertia, direction, oblate, most=3e3):
         with np.errstate(invalid="ignore"):
             # its Runge-Kutta steps add up to an error of about 1e-4, which D feels times the
             # squares of the factors
-            known = ok & (np.abs(out[:, :8:2]).max(axis=1) ** 2 < LOUD)
+            largest = np.abs(out[:, list(FACTORS.values())]).max(axis=1)
+            known = ok & (largest**2 < LOUD)
             off = np.abs(
                 np.abs(answer["rotation_number"]) - rough_rotation(k, short, rho, body, known)
             )
@@ -102,18 +121,16 @@ def _tractable(given, way, name, most):
     )
 
 
-def _long(out, i):
-    return out[:, i].astype(LONG) + out[:, i + 1]
+def _long(out, column):
+    """The number in this column and the next, high and low."""
+    return out[:, column].astype(LONG) + out[:, column + 1]
 
 
 def hill_outputs(out, answer, half):
     """What follows from the factors of `half` a period or of the whole, and which verdicts are wrong."""
-    doubt = out[:, 10]
-    y1, y2, d1, d2 = (_long(out, i) for i in (0, 2, 4, 6))
-    found = {
-        name: (out[:, 2 * i], out[:, 2 * i + 1], doubt)
-        for i, name in enumerate(("y1", "y2", "dy1", "dy2"))
-    }
+    doubt = out[:, DOUBT]
+    y1, y2, d1, d2 = (_long(out, column) for column in FACTORS.values())
+    found = {name: (out[:, column], out[:, column + 1], doubt) for name, column in FACTORS.items()}
     with np.errstate(all="ignore"):
         if half:
             minus, plus = d1 * y2, y1 * d2  # (D - 2) / 4 and (D + 2) / 4
@@ -123,8 +140,8 @@ def hill_outputs(out, answer, half):
             dtrace = 4 * np.minimum(dminus, dplus) + 4 * ULP * np.abs(trace)
         else:
             # the trace, and its distance from 2 and -2, in double-double
-            high, low = _two(out[:, 0], out[:, 6])
-            low = low + out[:, 1] + out[:, 7]
+            high, low = _two(out[:, Y1], out[:, DY2])
+            low = low + out[:, Y1 + 1] + out[:, DY2 + 1]
             trace = high.astype(LONG) + low
             minus, plus = ((high - 2).astype(LONG) + low) / 4, ((high + 2).astype(LONG) + low) / 4
             dminus = dplus = doubt
@@ -200,7 +217,7 @@ def mathieu_solved(a, q):
         quarter = np.tile([pi / 2, 6.123233995736766e-17], (len(points), 1))
         hill_flow.own_points(COSINE, points, np.full(len(points), np.inf), quarter, TOLERANCE, out)
 
-    return remembered("mathieu", kernel, points, 12)
+    return remembered("mathieu", kernel, points, COLUMNS)
 
 
 def mathieu(given, answer):

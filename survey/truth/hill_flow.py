@@ -17,9 +17,11 @@ from survey.truth.double import (
     div,
     get,
     horner,
+    keep,
     mean,
     mul,
     neg,
+    pair,
     reach,
     root,
     sine_cosine,
@@ -32,6 +34,14 @@ from survey.truth.double import (
 TERMS = 31
 TINY = 1e-34
 MOST = 60_000  # steps
+
+# What is filled: at the end y1, y2, y1', y2' and its place, each in two columns, high and low; the
+# doubt of the four, and steps.
+Y1, Y2, DY1, DY2, END = range(0, 10, 2)
+DOUBT, STEPS = 10, 11
+COLUMNS = 12
+# A solution, each in two columns: its value and slope.
+_VALUE, _SLOPE = 0, 2
 
 K, ONE_MINUS_K, AMPLITUDE = 0, 1, 2
 RHO, INERTIA = 0, 1
@@ -68,13 +78,11 @@ def rate(which, given, direction):
 
 @kernel
 def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, out):
-    """Half-period factors of points: out[i] = y1, y2, y1', y2' and T/2 (high, low), their doubt, steps."""
-    w, w2, w3, z = (
-        np.zeros((2, TERMS)),
-        np.zeros((2, TERMS)),
-        np.zeros((2, TERMS)),
-        np.zeros((2, TERMS)),
-    )
+    """Half-period factors of points, and T/2: out (N, COLUMNS)."""
+    w = np.zeros((2, TERMS))
+    w2 = np.zeros((2, TERMS))
+    w3 = np.zeros((2, TERMS))
+    z = np.zeros((2, TERMS))
     y = np.zeros((4, 2, TERMS))
     state = np.zeros((4, 4))
     for i in range(len(given)):
@@ -108,8 +116,7 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
         for n in range(4):
             for m in range(4):
                 state[n, m] = 0.0
-        # y, y_s of each solution (high, low)
-        state[0, 0] = state[1, 2] = state[2, 0] = state[3, 2] = 1.0
+        state[0, _VALUE] = state[1, _SLOPE] = state[2, _VALUE] = state[3, _SLOPE] = 1.0
         w0, v0 = least, dleast
         left = length
         steps = 0
@@ -139,49 +146,52 @@ def satellites(which, given, rhowhich, rhogiven, direction, oblate, tolerance, o
                 for s in range(2):
                     q = y[2 * side + s]
                     x = state[2 * side + s]
-                    store(q, 0, (x[0], x[1]))
-                    store(q, 1, (x[2], x[3]))
+                    store(q, 0, pair(x, _VALUE))
+                    store(q, 1, pair(x, _SLOPE))
                     for n in range(TERMS - 2):
                         store(q, n + 2, div(neg(conv(z, q, n)), ((n + 1.0) * (n + 2.0), 0.0)))
-                    h = min(h, reach(q, abs(x[0]) + abs(x[2]) / (1.0 + abs(ro[0])), tolerance))
+                    size = abs(x[_VALUE]) + abs(x[_SLOPE]) / (1.0 + abs(ro[0]))
+                    h = min(h, reach(q, size, tolerance))
             last = h >= left[0]
             step = left if last else (h, 0.0)
             for s in range(2 * signs):
                 x = state[s]
                 a, b = horner(y[s], step), slope(y[s], step)
-                x[0], x[1] = a
-                x[2], x[3] = b
+                keep(x, _VALUE, a)
+                keep(x, _SLOPE, b)
                 biggest = max(biggest, abs(a[0]), abs(b[0]))
             w0, v0 = horner(w, step), slope(w, step)
             left = (0.0, 0.0) if last else sub(left, (h, 0.0))
         o = out[i]
         # Phi(0 -> quarter) from the solutions s forward: (y1, y2; y1', y2') = (s22, s12; s21, s11)
-        p, r = (state[0, 0], state[0, 1]), (state[0, 2], state[0, 3])
-        q, s = (state[1, 0], state[1, 1]), (state[1, 2], state[1, 3])
+        p, r = pair(state[0], _VALUE), pair(state[0], _SLOPE)
+        q, s = pair(state[1], _VALUE), pair(state[1], _SLOPE)
         y1, y2, d1, d2 = s, q, r, p
         if not rotates:
-            a, e = (state[2, 0], state[2, 1]), (state[2, 2], state[2, 3])
-            b, f = (state[3, 0], state[3, 1]), (state[3, 2], state[3, 3])
+            a, e = pair(state[2], _VALUE), pair(state[2], _SLOPE)
+            b, f = pair(state[3], _VALUE), pair(state[3], _SLOPE)
             y1, y2, d1, d2 = (
                 add(mul(a, y1), mul(b, d1)), add(mul(a, y2), mul(b, d2)),
                 add(mul(e, y1), mul(f, d1)), add(mul(e, y2), mul(f, d2)),
             )  # fmt: skip
             length = times(length, 2.0)
-        o[0], o[1] = y1
-        o[2], o[3] = div(y2, (scale, 0.0))
-        o[4], o[5] = times(d1, scale)
-        o[6], o[7] = d2
-        o[8], o[9] = div(length, (scale, 0.0))
+        keep(o, Y1, y1)
+        keep(o, Y2, div(y2, (scale, 0.0)))
+        keep(o, DY1, times(d1, scale))
+        keep(o, DY2, d2)
+        keep(o, END, div(length, (scale, 0.0)))
         # rounding of all steps, of T and of w: what the flow makes of it is bounded by its largest
         # entries
-        o[10] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + abs(ro[0]) * length[0])
-        o[11] = float(steps)
+        o[DOUBT] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + abs(ro[0]) * length[0])
+        o[STEPS] = float(steps)
         if steps >= MOST:
             o[:] = np.nan
 
 
 COSINE, HARMONICS, BENT, LORENTZ = 0, 1, 2, 3
 TWO_PI = 6.283185307179586  # as it stands in a user's z
+# Where a point of HARMONICS holds its four cosines, its four sines and the period.
+_COSINES, _SINES, _PERIOD = 1, 5, 9
 
 
 @inline
@@ -208,12 +218,12 @@ def own_series(kind, p, u, z, piece):
                 wave(z, sin, cos, (2.0 * (n + 1), 0.0), p[1 + n], 0.0)
         store(z, 0, add(get(z, 0), (p[0], 0.0)))
     elif kind == HARMONICS:  # a + sum of c_n cos n x + s_n sin n x, x = 2 pi u / T
-        base = div((TWO_PI, 0.0), (p[9], 0.0))
+        base = div((TWO_PI, 0.0), (p[_PERIOD], 0.0))
         for n in range(4):
-            if p[1 + n] != 0.0 or p[5 + n] != 0.0:
+            if p[_COSINES + n] != 0.0 or p[_SINES + n] != 0.0:
                 rate = times(base, n + 1.0)
                 sin, cos = sine_cosine(mul(rate, u))
-                wave(z, sin, cos, rate, p[1 + n], p[5 + n])
+                wave(z, sin, cos, rate, p[_COSINES + n], p[_SINES + n])
         store(z, 0, add(get(z, 0), (p[0], 0.0)))
     elif kind == BENT:  # a + b u before the break, c + d cos 6u behind it
         if piece == 0:
@@ -241,7 +251,7 @@ def own_series(kind, p, u, z, piece):
 
 @kernel
 def own_points(kind, points, ends, lengths, tolerance, out):
-    """y1, y2, y1', y2' at the end of [0, length] of points (N, n): as `satellites`; `ends` (N) are
+    """y1, y2, y1', y2' at the end of [0, length] of points (N, n): out (N, COLUMNS); `ends` (N) are
     breaks.
 
     `lengths` (N, 2) are double-doubles.
@@ -257,7 +267,7 @@ def own_points(kind, points, ends, lengths, tolerance, out):
         ):
             size += abs(p[n])
         x[:] = 0.0
-        x[0, 0] = x[1, 2] = 1.0
+        x[0, _VALUE] = x[1, _SLOPE] = 1.0
         u = (0.0, 0.0)
         steps, biggest = 0, 1.0
         for piece in range(2):
@@ -270,28 +280,28 @@ def own_points(kind, points, ends, lengths, tolerance, out):
                 own_series(kind, p, u, z, piece)
                 h = reach(z, 1e-25 + size, tolerance)
                 for s in range(2):
-                    store(q[s], 0, (x[s, 0], x[s, 1]))
-                    store(q[s], 1, (x[s, 2], x[s, 3]))
+                    store(q[s], 0, pair(x[s], _VALUE))
+                    store(q[s], 1, pair(x[s], _SLOPE))
                     for n in range(TERMS - 2):
                         store(q[s], n + 2, div(neg(conv(z, q[s], n)), ((n + 1.0) * (n + 2.0), 0.0)))
-                    h = min(
-                        h,
-                        reach(q[s], abs(x[s, 0]) + abs(x[s, 2]) / (1.0 + np.sqrt(size)), tolerance),
-                    )
+                    near = abs(x[s, _VALUE]) + abs(x[s, _SLOPE]) / (1.0 + np.sqrt(size))
+                    h = min(h, reach(q[s], near, tolerance))
                 last = h >= left[0]
                 step = left if last else (h, 0.0)
                 for s in range(2):
                     a, b = horner(q[s], step), slope(q[s], step)
-                    x[s, 0], x[s, 1] = a
-                    x[s, 2], x[s, 3] = b
+                    keep(x[s], _VALUE, a)
+                    keep(x[s], _SLOPE, b)
                     biggest = max(biggest, abs(a[0]), abs(b[0]))
                 u = end if last else add(u, (h, 0.0))
                 left = (0.0, 0.0) if last else sub(left, (h, 0.0))
-        o[0], o[1], o[2], o[3] = x[0, 0], x[0, 1], x[1, 0], x[1, 1]
-        o[4], o[5], o[6], o[7] = x[0, 2], x[0, 3], x[1, 2], x[1, 3]
-        o[8], o[9] = length
-        o[10] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + np.sqrt(size) * length[0])
-        o[11] = float(steps)
+        keep(o, Y1, pair(x[0], _VALUE))
+        keep(o, Y2, pair(x[1], _VALUE))
+        keep(o, DY1, pair(x[0], _SLOPE))
+        keep(o, DY2, pair(x[1], _SLOPE))
+        keep(o, END, length)
+        o[DOUBT] = 1e-29 * (1.0 + steps) * biggest * biggest * (1.0 + np.sqrt(size) * length[0])
+        o[STEPS] = float(steps)
         if steps >= MOST:
             o[:] = np.nan
 

@@ -8,8 +8,8 @@ import numpy as np
 from mpmath import mp, mpf
 
 from survey.truth import hill_flow, remembered
-from survey.truth.hill import TOLERANCE, hill_outputs
-from survey.truth.hill_flow import BENT, HARMONICS, LORENTZ, TWO_PI
+from survey.truth.hill import FACTORS, TOLERANCE, hill_outputs
+from survey.truth.hill_flow import BENT, COLUMNS, DOUBT, END, HARMONICS, LORENTZ, STEPS, TWO_PI
 
 
 def harmonics(u, p):
@@ -53,16 +53,16 @@ OWN = {
 
 def solved(name, p):
     """Factors at T/2 (where z is even) or T of points (N, n), as `hill_flow.own_points`."""
-    return remembered(name, lambda points, out: _solve(name, points, out), p, 12)
+    return remembered(name, lambda points, out: _solve(name, points, out), p, COLUMNS)
 
 
 def _solve(name, p, out):
-    _, _, kind, more = OWN[name]
+    _, names, kind, more = OWN[name]
     if kind is None:
-        out[:] = np.array([_steps(row, more.get("even", False)) for row in p]).reshape(-1, 12)
+        out[:] = np.array([_steps(row, more.get("even", False)) for row in p]).reshape(-1, COLUMNS)
         return
-    ends = p[:, 4].copy() if kind == BENT else np.full(len(p), np.inf)
-    length = p[:, 9] if kind == HARMONICS else np.ones(len(p))
+    ends = p[:, names.index("jump")].copy() if kind == BENT else np.full(len(p), np.inf)
+    length = p[:, names.index("T")] if kind == HARMONICS else np.ones(len(p))
     if more.get("even"):
         length = length / 2
     hill_flow.own_points(kind, p, ends, np.column_stack([length, 0 * length]), TOLERANCE, out)
@@ -86,12 +86,14 @@ def _steps(row, even):
                 [[c, s / root if root else length], [-s * root if z > 0 else s * root, c]]
             )
             flow = step * flow
-        out = []
-        for value in (flow[0, 0], flow[0, 1], flow[1, 0], flow[1, 1]):
-            high = float(value)
-            out += [high, float(value - high)]
-        biggest = max(1.0, *(abs(x) for x in out))
-    return [*out, float(end), 0.0, 1e-31 * biggest, 2.0]
+        out = np.zeros(COLUMNS)
+        factors = flow[0, 0], flow[0, 1], flow[1, 0], flow[1, 1]
+        for column, value in zip(FACTORS.values(), factors, strict=True):
+            out[column] = float(value)
+            out[column + 1] = float(value - float(value))
+    out[DOUBT] = 1e-31 * max(1.0, *abs(out[list(FACTORS.values())]).tolist())
+    out[END], out[STEPS] = end, 2.0
+    return out
 
 
 def true(name):
@@ -99,7 +101,7 @@ def true(name):
 
     def truth(given, answer):
         p = np.column_stack([given[x] for x in OWN[name][1]])
-        out = np.full((len(p), 12), np.nan)
+        out = np.full((len(p), COLUMNS), np.nan)
         ok = answer["status"] == 0
         out[ok] = solved(name, p[ok])
         found = hill_outputs(out, answer, OWN[name][3].get("even", False))

@@ -16,7 +16,7 @@ LEAST = (24, 16)  # with fewer points nothing would be seen
 
 
 def wanted(shown, view):
-    """Is the view a window of the map (a `shown.Map`) that holds few of its points along some axis?"""
+    """Is the view a window of the map (a `ShownMap`) that holds few of its points along some axis?"""
     seen = []
     for axis, window in zip(shown.axes, view.window, strict=True):
         low, high = axis.inner(*window)

@@ -28,7 +28,7 @@ from survey.errors import BadInput, SurveyError, Untrusted
 from survey.request import trust
 from survey.show import boundaries
 from survey.viewer import finer, raster, widgets
-from survey.viewer.shown import Map
+from survey.viewer.shown import ShownMap
 
 SIDE, WIDTH = 510, 470  # width in pixels of the column beside the map, and of its parts
 # beside the map, or below it where the browser's window is narrow
@@ -50,12 +50,15 @@ KEEP_LINK = "window.history.replaceState(null, '', '?' + cb_obj.name)"
 
 
 class Page:
-    """One page in a browser, on the survey `shown` (a `shown.Map`)."""
+    """One page in a browser, on the survey `shown` (a `ShownMap`)."""
 
     def __init__(self, shown, document):
-        self.map, self.document, self.waiting, self.pointer = shown, document, set(), None
+        self.map = shown
+        self.document = document
+        self.waiting = set()
+        self.pointer = None
         self.share = 0.0  # of the map that had been read when it was last drawn
-        # the Map of the window solved afresh, of which view, and when
+        # the ShownMap of the window solved afresh, of which view, and when
         self.finer = self.finer_of = self.timer = None
         self.not_finer = ""  # why it is not
         self.caption = _text(styles={"color": "#555555"})
@@ -145,7 +148,8 @@ class Page:
         }
         ds = boundaries.in_plane(self.map.ds, self.map.ds[self.view.name].isel(others))
         x, y = (ds[f"curve_{dim}"].values for dim in self.map.dims)
-        thin, found = max(1, x.size // CURVE_POINTS), boundaries.curves_of(ds)
+        thin = max(1, x.size // CURVE_POINTS)
+        found = boundaries.curves_of(ds)
         for name, curve in self.curves.items():
             parts = [slice(part.start, part.stop, thin) for part in found.get(name, [])]
             points = [x[part] for part in parts], [y[part] for part in parts]
@@ -246,7 +250,7 @@ class Page:
         self.timer = None
         try:
             found = finer.of_window(self.map, self.view)
-            self.finer = Map("the window", found)
+            self.finer = ShownMap("the window", found)
         except Untrusted:
             self.not_finer = "not solved afresh: its scene has not been allowed to run"
         except SurveyError as error:
@@ -390,7 +394,7 @@ class Page:
         )  # fmt: skip
 
     def _nearest(self, x, y):
-        """(the Map, and indices of the point of it in whose cell the position lies), the window's
+        """(the ShownMap, and indices of the point of it in whose cell the position lies), the window's
         before the map's.
         """
         for shown in (self.finer, self.map):
@@ -424,7 +428,8 @@ class Page:
         coords, survey = self.map.coords(self.view), self.map.ds.survey
         try:
             if coords is None:
-                coords, survey = {}, finer.of_point(self.map, self.view).survey
+                coords = {}
+                survey = finer.of_point(self.map, self.view).survey
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
             survey.trajectory(figure=drawn, **coords)
             self.motion.text = widgets.picture(drawn)

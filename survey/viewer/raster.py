@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib import colormaps
 
 from survey.file.labels import flag_codes, scene_statuses
-from survey.file.overview import NO_ANSWER, UNIONS, UNREAD, Overview, Points, over, unranked
+from survey.file.overview import NO_ANSWER, UNIONS, UNREAD, Overview, VariablePoints, over, unranked
 from survey.grid import logarithmic
 from survey.show.maps import colour_limits
 from survey.show.palette import colours_of, greys_of
@@ -127,7 +127,7 @@ class Pixels:
         return int(np.diff(self.starts, append=self.stop).max())
 
 
-class Layer(Points):
+class Layer(VariablePoints):
     """One variable of a survey over two of its axes, for drawing; `others` is {other dimension:
     index}.
 

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 
 from survey.errors import BadInput
 from survey.request import trust
-from survey.viewer.shown import Map
+from survey.viewer.shown import ShownMap
 from survey.wording import counted, short
 
 try:
@@ -40,7 +40,7 @@ def serve(path, port, link="", say=print, browser=False, trust_scene=False):
     browser if `browser`. `say` is called with lines for the user. `trust_scene`: an untrusted scene
     may run. Raises BadInput, Damaged.
     """
-    shown = Map(path)
+    shown = ShownMap(path)
     if trust_scene:
         trust.allow(shown.ds.attrs.get("scene_hash", ""))
     query = urlsplit(link).query if "?" in link else link

@@ -36,7 +36,7 @@ class View:
     point: tuple | None = None
 
 
-class Map:
+class ShownMap:
     """A survey's file, lazy if it is large, and its two axes; raises BadInput or Damaged for a file
     without a map.
 
@@ -60,7 +60,8 @@ class Map:
             for name, v in ds.data_vars.items()
             if dims <= set(v.dims) and not name.endswith("_error")
         ]
-        self.title, self.options = plain(ds.attrs.get("title", "")), options_in_words(ds)
+        self.title = plain(ds.attrs.get("title", ""))
+        self.options = options_in_words(ds)
         # further dimensions: of the survey, and of some outputs
         self.others = list(
             dict.fromkeys(

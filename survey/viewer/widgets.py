@@ -98,7 +98,8 @@ def code(text):
 
 def label(variable, tex=True):
     """`long name, symbol (unit)`."""
-    symbol, units = variable.attrs.get("symbol", ""), literal(variable.attrs.get("units", "1"))
+    symbol = variable.attrs.get("symbol", "")
+    units = literal(variable.attrs.get("units", "1"))
     text = literal(variable.attrs.get("long_name", variable.name))
     if (
         symbol

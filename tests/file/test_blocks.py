@@ -273,7 +273,7 @@ def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     ("where", "name", "error"),
     [
         (os, "fsync", OSError(28, "No space left on device")),
-        (netcdf.File, "write", OSError("HDF5: an error of its own")),
+        (netcdf.NewFile, "write", OSError("HDF5: an error of its own")),
         (os, "write", OSError(5, "Input/output error")),
     ],
 )
@@ -300,7 +300,7 @@ CALLS = [
     (os, "replace"),
     (blocks, "pack"),
     (map_file.MapFile, "write"),
-    (netcdf.File, "define"),
+    (netcdf.NewFile, "define"),
 ]
 
 

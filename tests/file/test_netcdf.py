@@ -62,7 +62,7 @@ def theirs(path):
 
 
 def ours(path):
-    file = netcdf.File(path)
+    file = netcdf.NewFile(path)
     for name, (dims, values, tile) in VARIABLES.items():
         file.define(
             name,
@@ -124,7 +124,7 @@ def test_the_first_error_is_told_and_hdf5_hears_of_none(tmp_path, monkeypatch, a
 
     monkeypatch.setattr(os, "write", full)
     with pytest.raises(OSError, match="No space left"):
-        file = netcdf.File(tmp_path / "x.nc")
+        file = netcdf.NewFile(tmp_path / "x.nc")
         try:
             for number in range(20):
                 values = RNG.random((64, 64))

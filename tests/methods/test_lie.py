@@ -13,7 +13,7 @@ from mpmath import mp, mpf
 
 from survey.kernels.libration import lie as kernel
 from survey.kernels.libration import lie_plan
-from survey.kernels.libration.monomials import brackets, monomials
+from survey.kernels.libration.monomials import LEFT, brackets, monomials
 from survey.methods import lie
 
 MU_R = float(exact.CRITICAL[2])
@@ -144,7 +144,12 @@ def solved_exchanged(mu, order):
         divisors[:, lane] = -harmonics[:, 0] * w2 + harmonics[:, 1] * w1 + harmonics[:, 2]
     kernel.run(code, places, numbers, divisors, big, np.empty((0, 2, 3, len(mu))), 0, len(mu))
     found = big[diagonal]
-    for part, first in enumerate((kernel.RE, kernel.IM, kernel.BAR)):
+    columns = {
+        lie_plan.REAL: kernel.RE,
+        lie_plan.IMAGINARY: kernel.IM,
+        lie_plan.COEFFICIENT_BAR: kernel.BAR,
+    }
+    for part, first in columns.items():
         out[part] = found[:, first : first + len(mu)]
     return out
 
@@ -160,7 +165,7 @@ def test_brackets_are_canonical():
         unit = np.eye(6, dtype=int)[j] + np.eye(6, dtype=int)[3 + j]
         f = quadratic.row[quadratic.find(unit[None])][0]
         # {r_j, i m} = -k_j m for m a representative: {r_j, m} = i k_j m
-        for out, _, g, number, _ in squares[:, squares[1] == f].T:
+        for out, _, g, number, _ in squares[:, squares[LEFT] == f].T:
             same = quadratic.row[g] == out and quadratic.sign[g] == 1
             assert same and number == -quadratic.harmonic[g, j]
 

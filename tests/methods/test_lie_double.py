@@ -78,7 +78,7 @@ def test_the_parts_behind_the_point_are_right():
     what, mu = lie_plan.plan(6), MASSES[: kernel.LANES]
     big, divisors = (
         np.zeros((what.rows, kernel.WIDTH)),
-        np.empty((len(what.harmonics), 3 * kernel.LANES)),
+        np.empty((len(what.harmonics), kernel.DIVISOR_WIDTH)),
     )
     for i, one in enumerate(mu):
         kernel.start(one, i, what.harmonics, big, divisors)

@@ -6,7 +6,7 @@ import pytest
 import survey.precision.peers
 from survey import modules
 from survey.precision.cases import gyrostat_abel, satellite
-from survey.precision.peers import System, batches
+from survey.precision.peers import PeerSystem, batches
 
 
 @pytest.fixture(params=modules.names(survey.precision.peers))
@@ -43,7 +43,7 @@ def test_points_keep_their_places(peer):
 
 def test_batches_hold_every_point_and_like_numbers_of_steps():
     steps = np.array([5.0, 1.0, 4.0, 2.0, 3.0])
-    system = System(None, np.zeros((5, 1)), np.zeros((5, 1)), steps, steps)
+    system = PeerSystem(None, np.zeros((5, 1)), np.zeros((5, 1)), steps, steps)
     assert batches(system, 2).tolist() == [[1, 3], [4, 2], [0, 0]]
     assert batches(system, 8).tolist() == [[1, 3, 4, 2, 0, 0, 0, 0]]
 

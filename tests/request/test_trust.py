@@ -253,13 +253,13 @@ def test_the_viewer_shows_the_text_before_it_runs(strange):
     from bokeh.document import Document
 
     from survey.viewer.page import Page
-    from survey.viewer.shown import Map
+    from survey.viewer.shown import ShownMap
 
     text = strange.file.read_text()
     document = Document()
     context = SimpleNamespace(request=SimpleNamespace(arguments={}))
     document._session_context = lambda: context
-    page = Page(Map(strange.path), document)
+    page = Page(ShownMap(strange.path), document)
     page.choose((1, 1))
     page.trust()  # nothing was shown yet
     page.solve()

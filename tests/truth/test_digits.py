@@ -6,6 +6,8 @@ from mpmath import mp, mpf
 
 import survey
 from survey.truth import digits, user_equations
+from survey.truth.hill import FACTORS
+from survey.truth.hill_flow import DOUBT
 
 POINTS = {
     "harmonics": [3.0, 1.0, -2.0, 0.0, 0.5, 0.3, 0.0, -1.0, 0.2, 0.7],
@@ -35,12 +37,12 @@ def test_it_agrees_with_the_other_truths(name):
         found = digits.own(scene)(dict(zip(parameters, p[:, None], strict=True)), answer)
     (row,) = seen
     with mp.workdps(40):
-        for i in range(0, 8, 2):
+        for i in FACTORS.values():
             off = abs(mpf(row[i]) + mpf(row[i + 1]) - mpf(known[i]) - mpf(known[i + 1]))
-            assert off <= row[10] + known[10] and row[10] < 1e-18 * (1 + abs(known[i])), (
+            assert off <= row[DOUBT] + known[DOUBT] and row[DOUBT] < 1e-18 * (1 + abs(known[i])), (
                 i,
                 off,
-                row[10],
+                row[DOUBT],
             )
     value, low, _doubt = found["discriminant"]
     assert abs(float(ds.discriminant) - value[0] - np.ravel(low)[0]) <= float(ds.discriminant_error)

@@ -25,7 +25,7 @@ from survey import status
 from survey.analysis.point import reading
 from survey.errors import BadInput
 from survey.viewer import finer, raster
-from survey.viewer.shown import Map
+from survey.viewer.shown import ShownMap
 
 ROOT = Path(__file__).parents[2]
 MAP = ROOT / "results/satellite_prolate_small.nc"
@@ -201,7 +201,7 @@ def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
     assert counts == f"regular_nutation: {(~bare).sum()}, no_motion: {bare.sum()}"
     ds.attrs["complete"] = 1
     ds.to_netcdf(tmp_path / "map.nc")
-    shown = Map(tmp_path / "map.nc")
+    shown = ShownMap(tmp_path / "map.nc")
     assert shown.shares("verdict")["no_motion"] == f" ({bare.sum()} in all)"
     lines = list(shown.under(shown.read(""), (0, 0)))
     assert any("no_motion: " in line for line in lines) and not any(
@@ -229,7 +229,7 @@ def test_of_a_refined_map_each_cell_is_seen_where_it_lies():
 
 
 def test_a_link_tells_its_view():
-    shown = Map(MAP)
+    shown = ShownMap(MAP)
     view = shown.read("")
     assert view.name == "verdict" and view.point is None and view.boundaries
     view.name, view.boundaries, view.point = "exponent", False, shown.position((3, 5))
@@ -248,7 +248,7 @@ def test_a_falling_axis_is_drawn_rising(tmp_path):
     xr.open_dataset(MAP).isel(k=slice(None, None, -1)).to_netcdf(tmp_path / "falling.nc")
     images = []
     for path in (MAP, tmp_path / "falling.nc"):
-        shown = Map(path)
+        shown = ShownMap(path)
         view = shown.read("var=exponent")
         pixels = [axis.pixels(*axis.ends, 60) for axis in shown.axes]
         mask, value = shown.layer(view).pixels(*pixels)
@@ -270,12 +270,12 @@ def test_a_falling_axis_is_drawn_rising(tmp_path):
 )
 def test_a_link_of_another_map_is_one_line(query, message):
     with pytest.raises(BadInput, match=re.escape(message)) as refused:
-        Map(MAP).read(query)
+        ShownMap(MAP).read(query)
     assert "\n" not in str(refused.value)
 
 
 def test_where_an_integer_does_not_apply_it_is_no_value():
-    shown = Map(ROOT / "results/gyrostat_fate_small.nc")
+    shown = ShownMap(ROOT / "results/gyrostat_fate_small.nc")
     view = shown.read("var=net_turns")
     _, value = shown.layer(view).pixels(*(axis.pixels(*axis.ends, 50) for axis in shown.axes))
     assert np.isnan(value).any() and np.nanmax(np.abs(value)) < 1000
@@ -344,7 +344,7 @@ def test_the_socket_wants_token_origin_and_a_session_that_the_page_signed():
             connection.close()
 
     async def check():
-        server, address = start(Map(MAP), 0)
+        server, address = start(ShownMap(MAP), 0)
         page = await asyncio.to_thread(
             lambda: urllib.request.urlopen(address, timeout=20).read().decode()
         )
@@ -383,7 +383,7 @@ def test_what_cannot_be_viewed_is_one_line(tmp_path):
         ("bare.nc", "the axis k has no values, so there is no map to view"),
     ):
         with pytest.raises(BadInput, match=message) as refused:
-            Map(tmp_path / name)
+            ShownMap(tmp_path / name)
         assert "\n" not in str(refused.value)
 
 
@@ -490,7 +490,7 @@ return views.map(view => { const r = view.el.getBoundingClientRect(); return [r.
 
 
 def test_a_window_narrower_than_the_grid_is_solved_afresh_and_is_what_evaluate_gives():
-    shown = Map(MAP)
+    shown = ShownMap(MAP)
     view = shown.read("var=discriminant&" + FINE)
     assert finer.wanted(shown, view) and not finer.wanted(shown, shown.read(""))
     fresh = finer.of_window(shown, view)
@@ -506,20 +506,20 @@ def test_a_window_narrower_than_the_grid_is_solved_afresh_and_is_what_evaluate_g
     assert (
         abs(fresh.discriminant - same.discriminant) <= bars
     ).all() and fresh.discriminant_error.max() < 1e-9
-    (low, high), axis = view.window[0], Map("window", fresh).axes[0]
+    (low, high), axis = view.window[0], ShownMap("window", fresh).axes[0]
     assert axis.ends == pytest.approx((low, high), abs=1e-15)  # the cells tile the window
     # a link shows the same
     assert finer.of_window(shown, shown.read(shown.link(view))).equals(fresh)
 
 
 def test_beyond_the_map_nothing_is_solved():
-    shown = Map(MAP)
-    ends = Map("window", finer.of_window(shown, shown.read("x=-1,0.05&y=0.5,0.62"))).axes
+    shown = ShownMap(MAP)
+    ends = ShownMap("window", finer.of_window(shown, shown.read("x=-1,0.05&y=0.5,0.62"))).axes
     assert ends[0].values[0] > 0.0 and ends[1].values[0] > 0.6
 
 
 def test_a_window_that_takes_too_long_is_refused(monkeypatch):
-    shown = Map(ROOT / "results/gyrostat_fate_small.nc")
+    shown = ShownMap(ROOT / "results/gyrostat_fate_small.nc")
     view = shown.read("x=0.1,0.2&y=0.1,0.2")
     monkeypatch.setattr(finer, "SECONDS", 1e-3)
     with pytest.raises(BadInput, match="too few to show more than the map does"):
@@ -527,7 +527,7 @@ def test_a_window_that_takes_too_long_is_refused(monkeypatch):
 
 
 def test_any_point_of_a_window_is_solved_and_told_in_python():
-    shown = Map(MAP)
+    shown = ShownMap(MAP)
     view = shown.read("var=exponent&" + FINE + "&point=0.8031,0.711")
     assert shown.coords(view) is None  # the map has no such point
     point = finer.of_point(shown, view).survey.point()

@@ -104,9 +104,9 @@ def test_an_exception_is_a_traceback(monkeypatch):
     assert counted(monkeypatch, broken)["tracebacks"] == 1
 
 
-def in_full(out, i):
-    """Number i of pairs (high, low)."""
-    return mpf(out[2 * i]) + mpf(out[2 * i + 1])
+def in_full(out, column):
+    """The number in this column and the next, high and low."""
+    return mpf(out[column]) + mpf(out[column + 1])
 
 
 @pytest.mark.parametrize(
@@ -125,8 +125,9 @@ def test_truth_of_satellites(k, rho, oblate):
         half = 2 * mp.ellipk(a * a) if k < 1 else mp.ellipk(1 / (a * a)) / a
         y = mp.odefun(slope, 0, [0, 1, a, 1, 0, 0, 1], tol=mpf(10) ** -30)(half)
         out = hill.solved(hill.K, k, hill.RHO, rho, 1.0, oblate)[0]
-        for i, true in enumerate((y[3], y[5], y[4], y[6], half)):
-            assert abs(in_full(out, i) - true) < 1e-28 * (1 + abs(true))
+        columns = (*hill.FACTORS.values(), hill.END)
+        for column, true in zip(columns, (y[3], y[5], y[4], y[6], half), strict=True):
+            assert abs(in_full(out, column) - true) < 1e-28 * (1 + abs(true))
 
 
 def floquet_rows(kind, number):
@@ -170,10 +171,10 @@ def test_truth_of_danbys_map():
     true = 2 * mp.cos(2 * mp.pi * mp.sqrt((1 + root) / 2)) + 2 * mp.cos(
         2 * mp.pi * mp.sqrt((1 - root) / 2)
     )
-    assert abs(danby.solved(mu, 0.0)[0, 0] - true) < 1e-15
-    assert danby.solved(*(0.04699080701821065, 0.31450715975493514))[0, [0, 2]] == pytest.approx(
-        [-4, 6], abs=1e-13
-    )
+    assert abs(danby.solved(mu, 0.0)[0, danby.A] - true) < 1e-15
+    assert danby.solved(*(0.04699080701821065, 0.31450715975493514))[
+        0, [danby.A, danby.B]
+    ] == pytest.approx([-4, 6], abs=1e-13)
 
 
 @pytest.mark.slow
@@ -188,15 +189,18 @@ def test_truth_of_a_gyrostat():
             return [x[1], f * x[1] + g]
 
         y = mp.odefun(slope, 0, [mpf(p[6]), mpf(p[7])], tol=mpf(10) ** -30)(4)
-        out = np.empty((1, 6))
+        out = np.empty((1, gyrostat_flow.COLUMNS))
         gyrostat_flow.flow(np.array([p]), gyrostat_flow.TINY, out)
-        assert all(abs(in_full(out[0], i) - y[i]) < 1e-27 for i in range(2))
+        for column, true in zip((gyrostat_flow.END_PHI, gyrostat_flow.END_W), y, strict=True):
+            assert abs(in_full(out[0], column) - true) < 1e-27
         # along phi to where it was: the same w, at that time
         there = np.array([[*p[:8], 1.9]])
-        along, back = np.empty((1, 6)), np.empty((1, 6))
+        along, back = np.empty((2, 1, gyrostat_flow.COLUMNS))
         gyrostat_flow.along(there, gyrostat_flow.TINY, along)
-        gyrostat_flow.flow(np.array([[*p[:8], along[0, 2]]]), gyrostat_flow.TINY, back)
-        assert abs(back[0, 0] - 1.9) < 1e-15 and abs(back[0, 2] - along[0, 0]) < 1e-15
+        time = along[0, gyrostat_flow.TIME]
+        gyrostat_flow.flow(np.array([[*p[:8], time]]), gyrostat_flow.TINY, back)
+        assert abs(back[0, gyrostat_flow.END_PHI] - 1.9) < 1e-15
+        assert abs(back[0, gyrostat_flow.END_W] - along[0, gyrostat_flow.VALUE]) < 1e-15
 
 
 @pytest.mark.slow
@@ -207,8 +211,8 @@ def test_truth_of_bruns_problem():
     brun_sums.states(state[None], 1024, out)
     with mp.workdps(60):
         true, _floor = brun_in_full(state)
-        for i, value in enumerate(true):
-            assert abs(in_full(out[0], i) - value) < 1e-27 * (1 + abs(value))
+        for column, value in zip(brun.COLUMNS, true, strict=True):
+            assert abs(in_full(out[0], column) - value) < 1e-27 * (1 + abs(value))
 
 
 # L - L_sep is 2e-27: the double-double truth of T is off by 3.75e-6, its last digits are mpmath's
@@ -230,9 +234,9 @@ def test_truth_of_a_motion_that_turns_just_before_a_pole():
         energy = 1 + (1 - cosine) / (1 + cosine)
         level, five = energy - 2 * (1 - cosine**2), energy + 2 * cosine**2 + 1 - 10
         short = mp.findroot(lambda v: 2 * level - five * v - 8 * v**2 + 2 * v**3, 2 * level / five)
-        assert abs(1 - in_full(out[0], 1) - short) < 1e-30
+        assert abs(1 - in_full(out[0], brun_sums.U_MAX) - short) < 1e-30
     ds = survey.evaluate("brun", **dict(zip(brun.NAMES, point, strict=True)))
-    assert abs(float(ds.period) - out[0, 4]) < float(ds.period_error)
+    assert abs(float(ds.period) - out[0, brun_sums.PERIOD]) < float(ds.period_error)
 
 
 @pytest.mark.slow
@@ -242,9 +246,9 @@ def test_truth_beside_a_saddle_of_bruns_problem():
     value, low, doubt = (x[0] for x in brun._rows(out, None)["period"])
     off = abs(mpf(value) + mpf(low) - mpf(SADDLE_PERIOD))
     assert 1e-7 < off < doubt < 1
-    full = brun._in_full(np.array(SADDLE), out[0, :4])
+    full = brun._in_full(np.array(SADDLE), out[0])
     with mp.workdps(40):
-        assert abs(in_full(full, 2) - mpf(SADDLE_PERIOD)) < 1e-24
+        assert abs(in_full(full, brun_sums.PERIOD) - mpf(SADDLE_PERIOD)) < 1e-24
     given = dict(zip(brun.NAMES, np.array([SADDLE]).T, strict=True))
     one = compare.Batch("brun states", "saddle", given, brun.states, "brun")
     counts, worst, faults = compare.compare(one)
@@ -290,8 +294,8 @@ def test_truth_of_own_equations(name):
                 x = mp.odefun(lambda u, x, n=piece: [x[1], -z(u, n) * x[0], x[3], -z(u, n) * x[2]], mpf(start), x,
                               tol=mpf(10) ** -13)(mpf(stop))  # fmt: skip
         out = user_equations.solved(name, p[None])[0]
-        for i, true in zip((0, 2, 1, 3), x, strict=True):
-            assert abs(in_full(out, i) - true) < 1e-11 * (1 + abs(true))
+        for name, true in zip(("y1", "dy1", "y2", "dy2"), x, strict=True):
+            assert abs(in_full(out, hill.FACTORS[name]) - true) < 1e-11 * (1 + abs(true))
 
 
 def test_the_command(tmp_path, capsys):
@@ -321,5 +325,5 @@ def test_truth_of_a_spike():
 
     true = mp.quad(term, [0, at - 20 * wide, at - 3 * wide, at, at + 3 * wide, at + 20 * wide, 1])
     with mp.workdps(40):
-        change = in_full(out, 0) - in_full(rest, 0)
+        change = in_full(out, hill.Y1) - in_full(rest, hill.Y1)
     assert abs(change - true) < 1e-5 * abs(true)

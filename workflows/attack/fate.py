@@ -8,7 +8,7 @@ import xarray as xr
 import survey
 from attack.compare import Batch
 from attack.gyrostat import _separatrix, force, potential, system
-from survey.truth import gyrostat_flow
+from survey.truth import gyrostat_flow as gf
 from survey.truth.gyrostat import SYSTEM
 from survey.truth.hill import LONG, ULP
 
@@ -111,32 +111,32 @@ def _fate(given, answer):
         np.column_stack([given[name] for name in (*SYSTEM, "phi0", "w0")])
     )
     section, sinks = _section(p), _sinks(p)
-    out = np.full((n, 8), np.nan)
+    out = np.full((n, gf.SETTLED), np.nan)
     ok = answer["status"] == 0
-    gyrostat_flow.settle(points[ok], np.full(ok.sum(), section), SPAN, 1e-20, part := out[ok])
+    gf.settle(points[ok], np.full(ok.sum(), section), SPAN, 1e-20, part := out[ok])
     out[ok] = part
     said = answer["verdict"]
     wrong, checked = np.zeros(n, bool), np.zeros(n, bool)
-    for i in np.flatnonzero(ok & (said >= 0) & (out[:, 7] == 1)):
-        at = (out[i, 0] + np.pi) % (2 * np.pi) - np.pi
+    for i in np.flatnonzero(ok & (said >= 0) & (out[:, gf.DONE] == 1)):
+        at = (out[i, gf.LAST_PHI] + np.pi) % (2 * np.pi) - np.pi
         rest = [
             s
             for s in sinks
-            if abs((at - s + np.pi) % (2 * np.pi) - np.pi) < 1e-3 and abs(out[i, 1]) < 1e-3
+            if abs((at - s + np.pi) % (2 * np.pi) - np.pi) < 1e-3 and abs(out[i, gf.LAST_W]) < 1e-3
         ]
         if rest:
             limit = answer["limit_phi"][i]
             here = said[i] == 0 and abs((limit - rest[0] + np.pi) % (2 * np.pi) - np.pi) < 1e-6
             wrong[i], checked[i] = not here, True
         elif said[i] in (2, 3):
-            speed = out[i, 2] * out[i, 6]
+            speed = out[i, gf.PASSAGE] * out[i, gf.RATE]
             checked[i] = np.isfinite(speed) and abs(speed - answer["limit_w"][i]) < 1e-3 * (
                 1 + abs(speed)
             )
         elif said[i] in (5, 6):
-            checked[i] = np.sign(out[i, 1]) == (1 if said[i] == 5 else -1)
+            checked[i] = np.sign(out[i, gf.LAST_W]) == (1 if said[i] == 5 else -1)
         elif said[i] == 4:
-            checked[i] = abs(out[i, 4] - out[i, 5]) < 1e-3
+            checked[i] = abs(out[i, gf.RIGHT] - out[i, gf.RIGHT_BEFORE]) < 1e-3
     mirrored = _same(given, answer, {"question": "fate"}, mirror=True)
     return {"wrong": {"fate": wrong, "mirror image": mirrored}, "checked": checked}
 
@@ -257,19 +257,20 @@ def _cycles(p, answer, i, cycles, slack):
         step = 1e-7 * abs(w)
         goal = section + np.copysign(2 * np.pi, w)
         rows = np.array([[*p.values(), section, w + s * step, goal] for s in (-1, 0, 1)])
-        out = np.full((3, 6), np.nan)
-        gyrostat_flow.along(rows, 1e-28, out)
-        if not (out[:, 4] == 0).all():
+        out = np.full((3, gf.COLUMNS), np.nan)
+        gf.along(rows, 1e-28, out)
+        if not (out[:, gf.TURNED] == 0).all():
             continue
-        slope = (out[2, 0] - out[0, 0]) / (2 * step)
-        defect = (out[1, 0] - w) + out[1, 1]
+        speeds, times = out[:, gf.VALUE], out[:, gf.TIME]
+        slope = (speeds[2] - speeds[0]) / (2 * step)
+        defect = (speeds[1] - w) + out[1, gf.VALUE + 1]
         cycles["cycle_w"][i, j] = w + defect / (1 - slope)
         slack["cycle_w"][i, j] = 1e-13 * (1 + abs(w)) / abs(1 - slope) + 1e-3 * abs(
             defect / (1 - slope)
         )
         cycles["cycle_multiplier"][i, j] = slope
         slack["cycle_multiplier"][i, j] = 1e-6 * (1 + slope) / min(1, abs(w))
-        cycles["cycle_period"][i, j] = out[1, 2] + (out[2, 2] - out[0, 2]) / (2 * step) * (
+        cycles["cycle_period"][i, j] = times[1] + (times[2] - times[0]) / (2 * step) * (
             cycles["cycle_w"][i, j] - w
         )
-        slack["cycle_period"][i, j] = 1e-13 * (1 + out[1, 2]) * (1 + 1 / abs(w)) / abs(1 - slope)
+        slack["cycle_period"][i, j] = 1e-13 * (1 + times[1]) * (1 + 1 / abs(w)) / abs(1 - slope)

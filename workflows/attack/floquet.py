@@ -19,8 +19,8 @@ import survey
 from attack.compare import Batch
 from attack.hill import accuracy
 from survey.truth import hill_flow
-from survey.truth.hill import TOLERANCE
-from survey.truth.hill_flow import HARMONICS, TWO_PI
+from survey.truth.hill import FACTORS, TOLERANCE
+from survey.truth.hill_flow import COLUMNS, HARMONICS, TWO_PI
 
 DIGITS = 45
 DOUBT = 1e-20  # multipliers that nearly meet follow from a trace of 30 digits
@@ -241,11 +241,12 @@ def _solutions(a, q, s, period):
     """M of v'' + z v = 0 as [[y1, y2], [y1', y2']], and its doubt, of each point."""
     p = np.zeros((len(a), 10))
     p[:, 0], p[:, 1], p[:, 2], p[:, 9] = a, q, s, period
-    out, ends = np.empty((len(a), 12)), np.full(len(a), np.inf)
+    out = np.empty((len(a), COLUMNS))
+    ends = np.full(len(a), np.inf)
     hill_flow.own_points(HARMONICS, p, ends, np.column_stack([p[:, 9], 0 * a]), TOLERANCE, out)
     with mp.workdps(DIGITS):  # the two halves of a double-double
-        pairs = [[mpf(row[2 * i]) + mpf(row[2 * i + 1]) for i in range(4)] for row in out]
-    return [(y1, y2, d1, d2) for y1, y2, d1, d2 in pairs], out[:, 10]
+        flows = [tuple(mpf(row[c]) + mpf(row[c + 1]) for c in FACTORS.values()) for row in out]
+    return flows, out[:, hill_flow.DOUBT]
 
 
 def _of_trace(trace):

@@ -10,9 +10,9 @@ import numpy as np
 import survey
 from attack.compare import Batch
 from survey.truth import user_equations
-from survey.truth.hill import WAYS, mathieu_solved, satellite, solved
+from survey.truth.hill import FACTORS, WAYS, mathieu_solved, satellite, solved
 from survey.truth.hill import mathieu as true_mathieu
-from survey.truth.hill_flow import INERTIA, RHO
+from survey.truth.hill_flow import DY2, INERTIA, RHO, Y1
 from survey.truth.user_equations import OWN
 
 METHODS = ("auto", "auto", "auto", "taylor16", "magnus6", "rk4", "dop853")
@@ -95,7 +95,7 @@ def _edge(random, f, low, high, points=14):
 
 
 def _factors(out):
-    return out[:, [0, 2, 4, 6]]
+    return out[:, list(FACTORS.values())]
 
 
 def _draw_modulus(random, size):
@@ -404,5 +404,5 @@ def _own_margin(name, x, row):
     out = user_equations.solved(name, p)
     if OWN[name][3].get("even"):
         return _factors(out)
-    trace = out[:, 0] + out[:, 6]
+    trace = out[:, Y1] + out[:, DY2]
     return np.column_stack([trace - 2, trace + 2])

@@ -59,9 +59,9 @@ def _separatrix(six, phi0, saddle):
 def _ends(six, phi0, w0, angle=1e9):
     """(phi where each solution of w0 (N) turns, True where it turns before `angle`)."""
     points = np.array([(*six, phi0, w, angle) for w in w0])
-    out = np.empty((len(points), 6))
+    out = np.empty((len(points), gyrostat_flow.COLUMNS))
     gyrostat_flow.along(points, 1e-30, out)
-    return out[:, 0], out[:, 4] == 1.0
+    return out[:, gyrostat_flow.VALUE], out[:, gyrostat_flow.TURNED] == 1.0
 
 
 def _threshold(six, phi0, low, high):
@@ -96,7 +96,10 @@ def _roots(n):
         math.sin(2 * saddle_phi),
         math.cos(2 * saddle_phi),
     )
-    d, c23, systems, speeds = 1.1, 0.3, [], []
+    d = 1.1
+    c23 = 0.3
+    systems = []
+    speeds = []
     for gap in 10.0**gaps:  # g(saddle_phi) = 0, g'(saddle_phi) = gap
         a, b = d * c * s + c23 * c2, d * c2 - 2 * c23 * s2 + gap
         systems.append((0.0, 0.0, d, c23, a * c - b * s, -a * s - b * c))

@@ -27,10 +27,8 @@ def _plain(share):
 
 
 def _to_one(share):
-    mu, short = (
-        np.linspace(-12.0, np.log10(0.5), few(share, 20)),
-        np.linspace(-14.0, -0.1, few(share, 16)),
-    )
+    mu = np.linspace(-12.0, np.log10(0.5), few(share, 20))
+    short = np.linspace(-14.0, -0.1, few(share, 16))
     return Plane("e to 1", logarithmic(r"$\mu$", mu), logarithmic("$1 - e$", short), "libration_elliptic",
                  {"mu": 10.0 ** mu[None], "e": 1.0 - 10.0 ** short[:, None]}, truth, SOURCE, slow=SLOW)  # fmt: skip
 

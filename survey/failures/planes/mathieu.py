@@ -26,10 +26,8 @@ def _large(share):
 
 def _gaps(share):
     """Width about 2 (q / 4)^n / (n - 1)!^2 / 4^-n, from 1e-3 to 1e-13."""
-    q, position = (
-        10.0 ** np.linspace(-1.6, 0.5, few(share, 18)),
-        np.linspace(-1.5, 1.5, few(share, 25)),
-    )
+    q = 10.0 ** np.linspace(-1.6, 0.5, few(share, 18))
+    position = np.linspace(-1.5, 1.5, few(share, 25))
     ends = [edge("mathieu", along="a", a=(24.0, 26.5), q=x).edge.values for x in q]
     low, high = np.array([[x[0], x[-1]] for x in ends]).T
     a = 0.5 * (low + high)[:, None] + position[None] * (high - low)[:, None]

@@ -143,19 +143,15 @@ def trajectories(begin, at, G, starts, times, tolerance, limit, floats, status):
 
 @inline
 def _trajectory(begin, at, G, start, times, tolerance, limit, floats):
-    T, V, squares, there = (
-        np.zeros((LAST + 1, 12)),
-        np.zeros((LOW + 1, 6, 12)),
-        np.zeros((6, 6)),
-        np.empty((6, 6)),
-    )
-    state, new, J, work, row = (
-        start.copy(),
-        np.empty(6),
-        np.empty((6, 6)),
-        np.empty((6, 6)),
-        np.empty(FLOATS),
-    )
+    T = np.zeros((LAST + 1, 12))
+    V = np.zeros((LOW + 1, 6, 12))
+    squares = np.zeros((6, 6))
+    there = np.empty((6, 6))
+    state = start.copy()
+    new = np.empty(6)
+    J = np.empty((6, 6))
+    work = np.empty((6, 6))
+    row = np.empty(FLOATS)
     for i in range(3):
         squares[3 + i, 3 + i] = _FIRST * _FIRST
     t, t_low, j, size = 0.0, 0.0, 0, len(times)

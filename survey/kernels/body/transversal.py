@@ -161,20 +161,16 @@ def monodromy(p, M, slip, start, rotates, fundamental, notes):
     after two turning points. `slip` bounds what the matrices M (4, SIZE, SIZE) are off, in norm
     over that of M.
     """
-    T, Z, P, work = (
-        table(),
-        np.empty((ORDER + 1, SIZE, SIZE)),
-        np.empty((SIZE, SIZE)),
-        np.empty((SIZE, SIZE)),
-    )
+    T = table()
+    Z = np.empty((ORDER + 1, SIZE, SIZE))
+    P = np.empty((SIZE, SIZE))
+    work = np.empty((SIZE, SIZE))
     ellipses, turnings = np.zeros((SIZE, SIZE, SIZE)), 0
     phi, w, t, log_det, log_bar = start[0], start[1], 0.0, 0.0, 0.0
     saa, sab, sbb = 0.0, 0.0, 0.0
-    constant, by_w, by_angle = (
-        _norm(M[BY_NOTHING]),
-        _norm(M[BY_W]),
-        _norm(M[BY_SIN]) + _norm(M[BY_COS]),
-    )
+    constant = _norm(M[BY_NOTHING])
+    by_w = _norm(M[BY_W])
+    by_angle = _norm(M[BY_SIN]) + _norm(M[BY_COS])
     for i in range(SIZE):
         for c in range(SIZE):
             fundamental[i, c] = 1.0 if i == c else 0.0

@@ -31,6 +31,20 @@ PIECE = 15
 # Where a curve starts: START_PHI to START_W_BAR of `records`, and of a BRANCH the angle and the bar
 # of its equilibrium and its slope dw/dphi there.
 REST, REST_BAR, SLOPE = range(4, 7)
+# A point of a curve in a cell: phi, u, du/dphi, dphi/du, the error of u at this phi and of phi at
+# this u. Of a sample the first two.
+_PHI, _U, _RISE, _RUN, _U_BAR, _PHI_BAR = range(6)
+_POINT, _SAMPLE = 6, 2
+# Of a piece, where serial numbers are those of pieces along their curves: the first one of its
+# curve, and of the next curve.
+CURVE_FIRST, CURVE_NEXT = range(2)
+# A link of two gaps: the gap, the one before it in time, the turns by which limits of starts there
+# lie further, the turning points more.
+LATE, EARLY, TURNS, TURNINGS = range(4)
+LINK = 4
+# Do turns, do turning points depend on how one goes to the root of a region?
+BY_TURNS, BY_TURNINGS = range(2)
+LOOPS = 2
 # into the next piece; cut off; at an equilibrium; into the first piece
 GOES_ON, CUT, ARRIVES, CLOSES = range(4)
 BRANCH, ROTATION, LIBRATION = range(3)  # what is followed
@@ -50,10 +64,8 @@ def _hermite(piece, x):
     size = piece[X1] - piece[X0]
     t = (x - piece[X0]) / size
     r = 1.0 - t
-    a, b = (
-        piece[Y0] * (1.0 + 2.0 * t) + size * piece[D0] * t,
-        piece[Y1] * (1.0 + 2.0 * r) - size * piece[D1] * r,
-    )
+    a = piece[Y0] * (1.0 + 2.0 * t) + size * piece[D0] * t
+    b = piece[Y1] * (1.0 + 2.0 * r) - size * piece[D1] * r
     return a * r * r + b * t * t
 
 
@@ -75,40 +87,39 @@ def side_of(piece, phi, u):
 
 @inline
 def _end_of(p, phi, w, sign, n, saa, sab, sbb, end):
-    """Note a point of the curve: phi, u, du/dphi, dphi/du, and the error of u at this phi, and of
-    phi at this u.
-    """
+    """Note a point of the curve."""
     f, g, _dg = values(p, phi)
     accel = f * w + g
     across = bar(n, max(accel * accel * saa - 2.0 * accel * w * sab + w * w * sbb, 0.0))
-    end[0], end[1], end[2], end[3] = phi, abs(w), sign * accel / w, sign * w / accel
-    end[4], end[5] = across / abs(w), across / abs(accel)
+    end[_PHI], end[_U] = phi, abs(w)
+    end[_RISE], end[_RUN] = sign * accel / w, sign * w / accel
+    end[_U_BAR], end[_PHI_BAR] = across / abs(w), across / abs(accel)
 
 
 @kernel
-def _write(cell, sign, falling, one, two, turns, samples, count, scale, piece):
-    """Fill `piece` between two points of `_end_of`, the first and the last in the cell; returns its
-    relative error.
+def _write(cell, sign, falling, entry, end, turns, samples, count, scale, piece):
+    """Fill `piece` between the points where the curve enters the cell and where it ends there;
+    returns its relative error.
 
     `turns`: does it turn in this cell? `falling`: g < 0 there, so that the reference edge is the
     left one.
     """
-    left, right = (one, two) if one[0] < two[0] else (two, one)
-    low, high = (one, two) if one[1] < two[1] else (two, one)
+    left, right = (entry, end) if entry[_PHI] < end[_PHI] else (end, entry)
+    low, high = (entry, end) if entry[_U] < end[_U] else (end, entry)
     piece[CELL], piece[SIDE], piece[ENDING] = cell, 1.0 if sign > 0 else 0.0, GOES_ON
-    piece[REFERENCE] = left[1] if falling else right[1]
-    piece[OTHER] = math.nan if turns else (right[1] if falling else left[1])
-    piece[FALLS] = 1.0 if left[1] > right[1] else 0.0
-    unit, best = scale + high[1], math.inf
+    piece[REFERENCE] = left[_U] if falling else right[_U]
+    piece[OTHER] = math.nan if turns else (right[_U] if falling else left[_U])
+    piece[FALLS] = 1.0 if left[_U] > right[_U] else 0.0
+    unit, best = scale + high[_U], math.inf
     for over in range(2):
-        if (over and low[1] >= RATIO * high[1]) or (not over and low[1] == 0.0):
+        if (over and low[_U] >= RATIO * high[_U]) or (not over and low[_U] == 0.0):
             continue
         error = _cubic(left, right, low, high, over, samples, count, unit, piece)
         if not error < best and best < math.inf:  # back to the first
             _cubic(left, right, low, high, 0, samples, count, unit, piece)
         best = min(best, error)
-    return (low[5] if piece[OVER_U] else low[4] / unit) + (
-        high[5] if piece[OVER_U] else high[4] / unit
+    return (low[_PHI_BAR] if piece[OVER_U] else low[_U_BAR] / unit) + (
+        high[_PHI_BAR] if piece[OVER_U] else high[_U_BAR] / unit
     )
 
 
@@ -117,15 +128,18 @@ def _cubic(left, right, low, high, over, samples, count, unit, piece):
     """Fill the cubic and its bars, over u if `over`; returns the error, relative."""
     piece[OVER_U] = over
     if over:
-        piece[X0], piece[X1], piece[Y0], piece[Y1] = low[1], high[1], low[0], high[0]
-        piece[D0], piece[D1], across = low[3], high[3], max(low[5], high[5])
+        piece[X0], piece[X1], piece[Y0], piece[Y1] = low[_U], high[_U], low[_PHI], high[_PHI]
+        piece[D0], piece[D1] = low[_RUN], high[_RUN]
+        across = max(low[_PHI_BAR], high[_PHI_BAR])
     else:
-        piece[X0], piece[X1], piece[Y0], piece[Y1] = left[0], right[0], left[1], right[1]
-        piece[D0], piece[D1], across = left[2], right[2], max(left[4], right[4])
-    missed, highest = 0.0, high[1]
+        piece[X0], piece[X1], piece[Y0], piece[Y1] = left[_PHI], right[_PHI], left[_U], right[_U]
+        piece[D0], piece[D1] = left[_RISE], right[_RISE]
+        across = max(left[_U_BAR], right[_U_BAR])
+    missed, highest = 0.0, high[_U]
     for i in range(count):
-        highest = max(highest, samples[i, 1])
-        x, y = (samples[i, 1], samples[i, 0]) if over else (samples[i, 0], samples[i, 1])
+        phi, u = samples[i, _PHI], samples[i, _U]
+        highest = max(highest, u)
+        x, y = (u, phi) if over else (phi, u)
         if x < piece[X0] or x > piece[X1]:  # u is not monotone, or a sample is the end itself
             missed = max(
                 missed, 0.0 if abs(y - piece[Y0]) < 1e-13 or abs(y - piece[Y1]) < 1e-13 else HIDDEN
@@ -136,7 +150,7 @@ def _cubic(left, right, low, high, over, samples, count, unit, piece):
     piece[BAR] = 2.0 * across + 3.0 * missed + 1e-12 * size
     # u, whose samples stand at thirds of times, exceeds them by half at most where it is concave
     piece[BAR_U] = (
-        min(2.0 * piece[BAR] / max(abs(high[3]), 1e-300), 2.0 * highest) + 1e-12 * unit
+        min(2.0 * piece[BAR] / max(abs(high[_RUN]), 1e-300), 2.0 * highest) + 1e-12 * unit
         if over
         else 0.0
     )
@@ -177,7 +191,8 @@ def pieces(
     0 in the cell? eqs: equilibria of p. A branch is cut off a turn after u has passed `top`, or
     where its windings come too near to one another.
     """
-    T, samples, one, two = table(), np.zeros((SAMPLES, 2)), np.zeros(6), np.zeros(6)
+    T, samples = table(), np.zeros((SAMPLES, _SAMPLE))
+    entry, end = np.zeros(_POINT), np.zeros(_POINT)
     how = setting(p, start[rc.START_W], tolerance)
     cells = len(edges) - 1
     phi, w, n, size, kept = start[rc.START_PHI], start[rc.START_W], 0, 0, 0
@@ -187,17 +202,19 @@ def pieces(
     sampled, from_axis, turnings = 0, False, 0
     if kind == BRANCH:
         slope = start[SLOPE]
-        one[0], one[1], one[2], one[3] = start[REST], 0.0, sign * slope, sign / slope
-        one[4], one[5] = start[REST_BAR] * abs(slope), start[REST_BAR]
-        samples[0, 0], samples[0, 1], sampled = phi, abs(w), 1
+        entry[_PHI], entry[_U] = start[REST], 0.0
+        entry[_RISE], entry[_RUN] = sign * slope, sign / slope
+        entry[_U_BAR], entry[_PHI_BAR] = start[REST_BAR] * abs(slope), start[REST_BAR]
+        samples[0, _PHI], samples[0, _U] = phi, abs(w)
+        sampled = 1
     elif kind == ROTATION:
-        _end_of(p, phi, w, sign, 1, saa, sab, sbb, one)
+        _end_of(p, phi, w, sign, 1, saa, sab, sbb, entry)
         cell = (cell if sign > 0 else cell - 1) % cells
         if sign < 0 and cell == cells - 1:
             phi += TWO_PI
-            one[0] = phi
+            entry[_PHI] = phi
     else:
-        _end_of(p, phi, 0.0, sign, 1, saa, sab, sbb, one)
+        _end_of(p, phi, 0.0, sign, 1, saa, sab, sbb, entry)
         from_axis = True
     first, before, right, ending, fast = cell, math.nan, math.nan, CUT, 0
     while n < LIMIT and size + 2 < most:
@@ -221,19 +238,16 @@ def pieces(
             for k in range(1, 3):
                 x, v, _e, _y = at(p, T, dt + (to - dt) * (k / 3.0))
                 if sampled < SAMPLES:
-                    samples[sampled, 0], samples[sampled, 1], sampled = (
-                        x - shift,
-                        abs(v),
-                        sampled + 1,
-                    )
+                    samples[sampled, _PHI], samples[sampled, _U] = x - shift, abs(v)
+                    sampled += 1
             if not reached:
                 break
             _x, v, _e, _y = at(p, T, to)
             a, b, c = carried(p, T, to, v, saa, sab, sbb)
             edge = edges[cell + 1] if sign > 0 else edges[cell]
-            _end_of(p, edge, v, sign, n + 1, a, b, c, two)
+            _end_of(p, edge, v, sign, n + 1, a, b, c, end)
             wide = _write(
-                cell, sign, falls[cell], one, two, from_axis, samples, sampled, scale, out[size]
+                cell, sign, falls[cell], entry, end, from_axis, samples, sampled, scale, out[size]
             )
             size, sampled, from_axis, dt = size + 1, 0, False, to
             kept = size
@@ -247,9 +261,9 @@ def pieces(
                 if kind == BRANCH:
                     done = done or abs(abs(v) - before) < CLOSE * (scale + abs(v))
                     before = abs(v)
-            for i in range(6):
-                one[i] = two[i]
-            one[0] = edges[cell] if sign > 0 else edges[cell + 1]
+            for i in range(_POINT):
+                entry[i] = end[i]
+            entry[_PHI] = edges[cell] if sign > 0 else edges[cell + 1]
             if kind == ROTATION and cell == first:
                 ending, done = CLOSES, True
             if done or size + 2 >= most:
@@ -262,14 +276,14 @@ def pieces(
         if shift != 0.0:
             phi -= (1.0 if shift > 0.0 else -1.0) * TWO_PI_LOW
         if turned:
-            _end_of(p, phi, 0.0, sign, n + 1, saa, sab, sbb, two)
+            _end_of(p, phi, 0.0, sign, n + 1, saa, sab, sbb, end)
             wide = _write(
-                cell, sign, falls[cell], one, two, True, samples, sampled, scale, out[size]
+                cell, sign, falls[cell], entry, end, True, samples, sampled, scale, out[size]
             )
             size, sampled, from_axis, before = size + 1, 0, True, math.nan
             turnings += 1
-            for i in range(6):
-                one[i] = two[i]
+            for i in range(_POINT):
+                entry[i] = end[i]
             sbb, sab = 0.0, 0.0
             sign = -sign
             if kind == LIBRATION and turnings == 2:
@@ -291,14 +305,15 @@ def pieces(
                     slope = 0.5 * (
                         eqs[held, F] + math.sqrt(eqs[held, F] ** 2 + 4.0 * eqs[held, DG])
                     )
-                    two[0], two[1], two[2], two[3] = where, 0.0, sign * slope, sign / slope
-                    two[4], two[5] = 4.0 * ARRIVED * abs(slope), 4.0 * ARRIVED
+                    end[_PHI], end[_U] = where, 0.0
+                    end[_RISE], end[_RUN] = sign * slope, sign / slope
+                    end[_U_BAR], end[_PHI_BAR] = 4.0 * ARRIVED * abs(slope), 4.0 * ARRIVED
                     _write(
                         cell,
                         sign,
                         falls[cell],
-                        one,
-                        two,
+                        entry,
+                        end,
                         from_axis,
                         samples,
                         sampled,
@@ -360,40 +375,44 @@ def _join(parent, turns, counts, loops, a, b, turn, count):
     """Limits of a lie `turn` turns further than those of b, and from a there are `count` more
     turning points.
     """
-    one, t1, c1 = _root(parent, turns, counts, a)
-    two, t2, c2 = _root(parent, turns, counts, b)
-    if one == two:
-        if t1 != t2 + turn:
-            loops[one, 0] = 1
-        if c1 != c2 + count:
-            loops[one, 1] = 1
+    root_a, turns_a, counts_a = _root(parent, turns, counts, a)
+    root_b, turns_b, counts_b = _root(parent, turns, counts, b)
+    if root_a == root_b:
+        if turns_a != turns_b + turn:
+            loops[root_a, BY_TURNS] = 1
+        if counts_a != counts_b + count:
+            loops[root_a, BY_TURNINGS] = 1
         return
-    parent[one], turns[one], counts[one] = two, t2 + turn - t1, c2 + count - c1
-    loops[two, 0] = max(loops[two, 0], loops[one, 0])
-    loops[two, 1] = max(loops[two, 1], loops[one, 1])
+    parent[root_a] = root_b
+    turns[root_a] = turns_b + turn - turns_a
+    counts[root_a] = counts_b + count - counts_a
+    for i in range(LOOPS):
+        loops[root_b, i] = max(loops[root_b, i], loops[root_a, i])
+
+
+@inline
+def _link(link, later, earlier, turns, turnings):
+    link[LATE], link[EARLY], link[TURNS], link[TURNINGS] = later, earlier, turns, turnings
 
 
 @kernel
 def neighbours(found, serial, curve, falls, first, turning, links, seeds):
-    """Fill `links` (rows of gap, gap that comes before it in time, turns by which limits of starts
-    there lie further, turning points more) and `seeds`, gaps into which, against time, a curve goes
-    on that was cut off; returns their numbers, or (-1, -1) if the order of pieces contradicts
-    itself.
+    """Fill `links` (n, LINK) and `seeds`, gaps into which, against time, a curve goes on that was
+    cut off; returns their numbers, or (-1, -1) if the order of pieces contradicts itself.
 
     A gap lies below a piece, or above the last: gap number first[key] + key + j, key = 2 cell +
-    side. serial: the number of a piece on its curve; curve: the first serial of its curve, and of
-    the next one.
+    side. serial: the number of a piece on its curve; curve: CURVE_FIRST, CURVE_NEXT.
     """
     cells, size, cuts = len(falls), 0, 0
     for edge in range(cells):  # between the cells edge - 1 and edge
         left = edge - 1 if edge > 0 else cells - 1
         for side in range(2):
-            one, two = 2 * left + side, 2 * edge + side
+            key_left, key_right = 2 * left + side, 2 * edge + side
             # g > 0: it is the reference edge
-            i = first[one] if falls[left] == 0 else first[one] + turning[one]
-            j = first[two] if falls[edge] != 0 else first[two] + turning[two]
+            i = first[key_left] if falls[left] == 0 else first[key_left] + turning[key_left]
+            j = first[key_right] if falls[edge] != 0 else first[key_right] + turning[key_right]
             while True:
-                more_left, more_right = i < first[one + 1], j < first[two + 1]
+                more_left, more_right = i < first[key_left + 1], j < first[key_right + 1]
                 same, rest_left, rest_right = False, False, False
                 if more_left:
                     rest_left = (
@@ -408,21 +427,21 @@ def neighbours(found, serial, curve, falls, first, turning, links, seeds):
                     and more_right
                     and not rest_left
                     and not rest_right
-                    and curve[i, 0] == curve[j, 0]
+                    and curve[i, CURVE_FIRST] == curve[j, CURVE_FIRST]
                 ):
                     before, after = (serial[i], serial[j]) if side == 1 else (serial[j], serial[i])
                     # the curve goes on to the left where w > 0, against time
                     same = after == before + 1 or (
-                        before == curve[i, 1] - 1 and after == curve[i, 0]
+                        before == curve[i, CURVE_NEXT] - 1 and after == curve[i, CURVE_FIRST]
                     )
                 if not rest_left and not rest_right:
                     # L(left) = L(right) + 1 beyond the first edge
-                    a, b = i + one, j + two
-                    beyond, links[size, 3] = 1 if edge == 0 else 0, 0
+                    a, b = i + key_left, j + key_right
+                    beyond = 1 if edge == 0 else 0
                     if side == 0:
-                        links[size, 0], links[size, 1], links[size, 2] = b, a, beyond
+                        _link(links[size], b, a, beyond, 0)
                     else:
-                        links[size, 0], links[size, 1], links[size, 2] = a, b, -beyond
+                        _link(links[size], a, b, -beyond, 0)
                     size += 1
                 if same:
                     i, j = i + 1, j + 1
@@ -430,12 +449,12 @@ def neighbours(found, serial, curve, falls, first, turning, links, seeds):
                     break
                 elif more_left and (rest_left or (side == 1 and found[i, ENDING] == CUT)):
                     if not rest_left:
-                        seeds[cuts] = j + two
+                        seeds[cuts] = j + key_right
                         cuts += 1
                     i += 1
                 elif more_right and (rest_right or (side == 0 and found[j, ENDING] == CUT)):
                     if not rest_right:
-                        seeds[cuts] = i + one
+                        seeds[cuts] = i + key_left
                         cuts += 1
                     j += 1
                 else:
@@ -445,7 +464,7 @@ def neighbours(found, serial, curve, falls, first, turning, links, seeds):
             plus, minus = first[2 * cell] + 2 * cell + k, first[2 * cell + 1] + 2 * cell + 1 + k
             # g < 0: from w > 0 to w < 0 in time
             later, earlier = (minus, plus) if falls[cell] != 0 else (plus, minus)
-            links[size, 0], links[size, 1], links[size, 2], links[size, 3] = later, earlier, 0, 1
+            _link(links[size], later, earlier, 0, 1)
             size += 1
     return size, cuts
 
@@ -455,15 +474,14 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
     """Join the gaps that no curve parts; open_[gap]: a curve that was cut off may part it, as all
     that came from there.
 
-    loops[root] = (do turns, do turning points depend on how one goes there?).
+    loops[root]: BY_TURNS, BY_TURNINGS.
     """
-    head, after, queue = (
-        np.full(gaps, -1),
-        np.empty(size, dtype=np.int64),
-        np.empty(gaps, dtype=np.int64),
-    )
+    head = np.full(gaps, -1)
+    after = np.empty(size, dtype=np.int64)
+    queue = np.empty(gaps, dtype=np.int64)
     for k in range(size):
-        after[k], head[links[k, 0]] = head[links[k, 0]], k
+        later = links[k, LATE]
+        after[k], head[later] = head[later], k
     top = 0
     for k in range(cuts):
         if not open_[seeds[k]]:
@@ -472,17 +490,17 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
         top -= 1
         k = head[queue[top]]
         while k >= 0:
-            gap = links[k, 1]
+            gap = links[k, EARLY]
             if not open_[gap]:
                 open_[gap], queue[top], top = True, gap, top + 1
             k = after[k]
     for i in range(gaps):
         parent[i] = i
     for k in range(size):
-        later, earlier = links[k, 0], links[k, 1]
+        later, earlier = links[k, LATE], links[k, EARLY]
         if open_[later] or open_[earlier]:
             continue
-        _join(parent, turns, counts, loops, earlier, later, links[k, 2], links[k, 3])
+        _join(parent, turns, counts, loops, earlier, later, links[k, TURNS], links[k, TURNINGS])
     for i in range(gaps):
         root, t, c = _root(parent, turns, counts, i)
         if parent[i] != i:

@@ -71,10 +71,8 @@ def expand(p, saddle, a):
     factorial, power = 1.0, 1.0
     for n in range(ORDER + 1):
         f[0, n], f[1, n] = over(add(times(c, p[B12]), times(s, -p[B31])), factorial)
-        one, two = (
-            add(times(c, p[S2]), times(s, -p[S3])),
-            add(times(s2, 0.5 * p[D]), times(c2, p[C23])),
-        )
+        one = add(times(c, p[S2]), times(s, -p[S3]))
+        two = add(times(s2, 0.5 * p[D]), times(c2, p[C23]))
         g[0, n], g[1, n] = over(sub(one, scaled(two, power)), factorial)
         s, c, s2, c2 = c, neg(s), c2, neg(s2)
         factorial, power = factorial * (n + 1.0), 2.0 * power

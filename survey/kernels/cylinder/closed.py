@@ -187,11 +187,9 @@ def start(p, phi0, w0, data):
 @inline
 def start_trigonometric(p, phi0, w0, side, mu, other, data):
     s, c = math.sin(phi0), math.cos(phi0)
-    F, f, b = (
-        mu * (p[B12] * s + p[B31] * c),
-        mu * (p[B12] * c - p[B31] * s),
-        math.hypot(p[B12], p[B31]),
-    )
+    F = mu * (p[B12] * s + p[B31] * c)
+    f = mu * (p[B12] * c - p[B31] * s)
+    b = math.hypot(p[B12], p[B31])
     data[W0], data[F0], data[SLOPE], data[MU], data[OTHER] = abs(w0), side * F, f, mu, other
     data[SQUARE] = (abs(w0) - 2.0 * side * F) * abs(w0) - f * f  # n^2 - (mu b)^2
     offset, miss, blur = misfit(p[B12], p[B31], p[D], p[C23], p[S2], p[S3], mu, other, w0, F)
@@ -261,11 +259,9 @@ def start_libration(data):
     middle, half = 0.5 * (right - left), 0.5 * (right + left)
     s, c = math.sin(middle), math.cos(middle)
     s2, c2 = 2.0 * s * c, (c - s) * (c + s)
-    b1, a2, b2 = (
-        data[B1] * c - data[A1] * s,
-        data[A2] * c2 + data[B2] * s2,
-        data[B2] * c2 - data[A2] * s2,
-    )
+    b1 = data[B1] * c - data[A1] * s
+    a2 = data[A2] * c2 + data[B2] * s2
+    b2 = data[B2] * c2 - data[A2] * s2
     ch, sh = math.cos(half), math.sin(half)
     # w^2 = sin((x - a)/2) sin((b - x)/2) Q, Q = q0 + q1 cos xi + p1 sin xi, xi = x - middle
     q0, q1, p1 = -4.0 * b1 - 4.0 * b2 * ch, -4.0 * b2, 4.0 * a2

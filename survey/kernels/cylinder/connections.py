@@ -131,11 +131,9 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
     Only branches that are `wanted` (4, 2) are followed. Rows are NaN where there are none, or an
     equilibrium is degenerate.
     """
-    eqs, turned, starts = (
-        np.zeros((MOST, EQUILIBRIUM_SIZE)),
-        np.zeros((MOST, EQUILIBRIUM_SIZE)),
-        np.zeros((2 * MOST, rc.START)),
-    )
+    eqs = np.zeros((MOST, EQUILIBRIUM_SIZE))
+    turned = np.zeros((MOST, EQUILIBRIUM_SIZE))
+    starts = np.zeros((2 * MOST, rc.START))
     q = np.zeros(P.shape[1])
     for i in range(len(P)):
         for system in range(4):

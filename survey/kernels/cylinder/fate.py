@@ -189,14 +189,12 @@ def fate(
     LIMIT is a row of eqs (verdicts 0, 9), of plus or minus (2, 3) or of lib (4).
     sizes: EQUILIBRIA to ATTRACTING. Where a table of cycles is NOT_KNOWN, equilibria alone decide.
     """
-    count, n_plus, n_minus, n_lib, stratum, weak = (
-        sizes[EQUILIBRIA],
-        sizes[ROTATIONS_PLUS],
-        sizes[ROTATIONS_MINUS],
-        sizes[LIBRATIONS],
-        sizes[STRATUM],
-        sizes[ATTRACTING] > 0,
-    )
+    count = sizes[EQUILIBRIA]
+    n_plus = sizes[ROTATIONS_PLUS]
+    n_minus = sizes[ROTATIONS_MINUS]
+    n_lib = sizes[LIBRATIONS]
+    stratum = sizes[STRATUM]
+    weak = sizes[ATTRACTING] > 0
     out[rc.VERDICT], out[rc.LIMIT] = UNDECIDED, -1
     out[rc.TURNINGS], out[rc.NET_TURNS], out[rc.STATUS] = UNDETERMINED, NO_TURNS, OK
     phi0, w0 = start[rc.START_PHI], start[rc.START_W]
@@ -220,13 +218,11 @@ def fate(
             return
     T = table()
     how = setting(p, w0, tolerance)
-    saa, sab, sbb, n, turnings = (
-        slip * slip,
-        0.0,
-        start[rc.START_W_BAR] * start[rc.START_W_BAR],
-        0,
-        0,
-    )
+    saa = slip * slip
+    sab = 0.0
+    sbb = start[rc.START_W_BAR] * start[rc.START_W_BAR]
+    n = 0
+    turnings = 0
     before, before_bar = -1.0, 0.0  # last passage of the section without a turning since
     # last turning points, unwrapped from `turns` = base
     right, right_bar, left = math.nan, 0.0, math.nan

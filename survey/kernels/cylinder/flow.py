@@ -73,11 +73,9 @@ def spread(rows, P, starts):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(SIX):
             P[i, k] = rows[i, k]
-        b, c, s = (
-            math.hypot(P[i, B12], P[i, B31]),
-            math.hypot(0.5 * P[i, D], P[i, C23]),
-            math.hypot(P[i, S2], P[i, S3]),
-        )
+        b = math.hypot(P[i, B12], P[i, B31])
+        c = math.hypot(0.5 * P[i, D], P[i, C23])
+        s = math.hypot(P[i, S2], P[i, S3])
         P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = (
             b,
             c + s,

@@ -133,11 +133,9 @@ def begin(p, phi, w, A, T):
     A[_W, 0, 0], A[_W, 1, 0] = w
     for n in range(ORDER):
         s, c = (A[_S, 0, n], A[_S, 1, n]), (A[_C, 0, n], A[_C, 1, n])
-        cw, sw, cs = (
-            convolved(A[_C], A[_W], n),
-            convolved(A[_S], A[_W], n),
-            convolved(A[_C], A[_S], n),
-        )
+        cw = convolved(A[_C], A[_W], n)
+        sw = convolved(A[_S], A[_W], n)
+        cs = convolved(A[_C], A[_S], n)
         double = shifted(times(convolved(A[_S], A[_S], n), -2.0), 1.0 if n == 0 else 0.0)
         if n <= LOW:
             T[n, SIN], T[n, COS], T[n, SIN2], T[n, COS2] = s[0], c[0], 2.0 * cs[0], double[0]
@@ -200,11 +198,9 @@ def carried(p, A, T, dt, w, ellipse):
         size = math.hypot(along_w, along_v)
     u, v = (w / size, rate / size) if known else (along_w / size, along_v / size)
     across_w, across_v = b * x - a * y, d * x - c * y
-    one, shear, two = (
-        u * along_w + v * along_v,
-        u * across_w + v * across_v,
-        u * across_v - v * across_w,
-    )
+    one = u * along_w + v * along_v
+    shear = u * across_w + v * across_v
+    two = u * across_v - v * across_w
     leak = 0.0 if on or not known else u * along_v - v * along_w
     bound = p[BOUND_F] * abs(w) + p[BOUND_G]
     e = TOLERANCE + ROUGH * (4.0 + 3.0 * dt * (abs(w) + dt * bound))
@@ -273,10 +269,8 @@ def followed(p, start, turns, origin, sign, still, asked, floats, turnings):
             x, v = at(phi, A, dt)
             a, _b, c, _d = spread(carried(p, A, T, dt[0], v[0], ellipse))
             delay = n * ROUGH * (asked[j] - min(origin[0], 0.0)) + origin_bar  # error of the time
-            wide, high = (
-                bar(n, a) + abs(v[0]) * delay,
-                bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay,
-            )
+            wide = bar(n, a) + abs(v[0]) * delay
+            high = bar(n, c) + (p[BOUND_F] * abs(v[0]) + p[BOUND_G]) * delay
             if not (wide < TRUST and high < TRUST * (1.0 + abs(v[0]))):
                 return NO_CONVERGENCE
             floats[j, rc.PHI], floats[j, rc.W] = add(x, radians(turns))[0], v[0]

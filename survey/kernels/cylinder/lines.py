@@ -158,10 +158,8 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
                     xb, wb, _e, _y = at(p, T, when)
                     loose = 1e-12 * (1.0 + abs(xb))
                     first, last = copies(window, xb)
-                    wide_first, wide_last = (
-                        copies(window, xb - loose)[0],
-                        copies(window, xb + loose)[1],
-                    )
+                    wide_first = copies(window, xb - loose)[0]
+                    wide_last = copies(window, xb + loose)[1]
                     first, last = min(first, wide_first), max(last, wide_last)
                     level = border == AT_W_LOW or border == AT_W_HIGH
                     if first <= last and (level or window[W_LOW] <= wb <= window[W_HIGH]):

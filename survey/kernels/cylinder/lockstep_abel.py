@@ -277,12 +277,10 @@ def _refill(
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            p, phi0, w0, size = (
-                P[waiting],
-                starts[waiting, rc.START_PHI],
-                starts[waiting, rc.START_W],
-                finite(targets[waiting]),
-            )
+            p = P[waiting]
+            phi0 = starts[waiting, rc.START_PHI]
+            w0 = starts[waiting, rc.START_W]
+            size = finite(targets[waiting])
             at, rows, codes = (
                 targets[waiting, :size],
                 floats[waiting, :size],
@@ -364,11 +362,9 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     column, doubt = np.zeros(LANES, dtype=np.int64), np.full(LANES, -1)
-    goal, started, calm = (
-        np.zeros(LANES),
-        np.zeros(LANES, dtype=np.bool_),
-        np.zeros(LANES, dtype=np.bool_),
-    )
+    goal = np.zeros(LANES)
+    started = np.zeros(LANES, dtype=np.bool_)
+    calm = np.zeros(LANES, dtype=np.bool_)
     waiting, free = np.int64(0), True  # a literal 0 would have `_refill` compiled twice
     while True:
         if free:

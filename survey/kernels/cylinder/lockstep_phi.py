@@ -145,11 +145,9 @@ def _coefficients(row, size):
     return read
 
 
-_omega, _r, _low_q = (
-    _coefficients(OMEGA, ORDER + 1),
-    _coefficients(R, ORDER + 1),
-    _coefficients(Q, VARIED + 1),
-)
+_omega = _coefficients(OMEGA, ORDER + 1)
+_r = _coefficients(R, ORDER + 1)
+_low_q = _coefficients(Q, VARIED + 1)
 
 
 @unroll
@@ -244,12 +242,10 @@ def _record(T, before, state, step, i, block, targets, first, floats, status):
         before[TIME_LOW, i],
     )
     inverse, size, end = 1.0 / before[W, i], len(targets), state[AT, i]
-    high, slope, time_bar, slowest = (
-        step[W_WITHIN, i],
-        step[STEEPEST, i],
-        state[T_BOUND, i],
-        1.0 / step[LOWEST, i],
-    )
+    high = step[W_WITHIN, i]
+    slope = step[STEEPEST, i]
+    time_bar = state[T_BOUND, i]
+    slowest = 1.0 / step[LOWEST, i]
     last = first
     while last < size and unturned(targets[last], turns) <= end:
         last += 1

@@ -28,6 +28,8 @@ from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 # vanishes within rounding.
 REVERSED, ON_CIRCLE, MIRRORED, AT_REST, MEAN = 0, 2, 3, 4, 5
 BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(6, 10)  # as in `flow`
+_ON_F, _ON_G, _ON_DG, _ON_DDG = range(4)  # the same from BOUND_F on
+_BOUNDS = 4
 COLUMNS = 10  # of a row of `flow`; what has more is a program
 SLOTS, FORCES, F_AT, G_AT, DG_AT, RADIUS, OPERATIONS = range(10, 17)
 CODE, FIRST, SECOND, NUMBER, WIDTH = range(5)
@@ -276,7 +278,7 @@ def ball(p, phi, radius, orders, B):
 
 @kernel
 def bounds(p, phi, radius, B, out):
-    """Raise out (4) to bounds, over the angles within `radius` of phi, of |f| and |f'|, of |g|, of |g'|, of |g''|.
+    """Raise `out` (_BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| within `radius` of phi.
 
     The first two also bound what rounds f and g there, in roundoffs: `steps` takes them for the
     sizes of their terms.
@@ -285,10 +287,10 @@ def bounds(p, phi, radius, B, out):
     ball(p, phi, 0.0, 1, B)
     rounded_f, rounded_g = B[f, 0, 1] / ROUNDOFF_UP, B[g, 0, 1] / ROUNDOFF_UP
     ball(p, phi, radius, 3, B)
-    out[0] = max(out[0], rounded_f, 1.0001 * max(_largest(B, f, 0), _largest(B, f, 1)))
-    out[1] = max(out[1], rounded_g, 1.0001 * _largest(B, g, 0))
-    out[2] = max(out[2], 1.0001 * _largest(B, g, 1))
-    out[3] = max(out[3], 2.0001 * _largest(B, g, 2))
+    out[_ON_F] = max(out[_ON_F], rounded_f, 1.0001 * max(_largest(B, f, 0), _largest(B, f, 1)))
+    out[_ON_G] = max(out[_ON_G], rounded_g, 1.0001 * _largest(B, g, 0))
+    out[_ON_DG] = max(out[_ON_DG], 1.0001 * _largest(B, g, 1))
+    out[_ON_DDG] = max(out[_ON_DDG], 2.0001 * _largest(B, g, 2))
 
 
 @kernel
@@ -296,15 +298,15 @@ def bound_circle(p):
     """Write bounds over the whole circle into p, within a factor of 2; infinite where no FINEST
     pieces bound them.
     """
-    B, out, pieces, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(4), COARSEST, False
+    B, out, pieces, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(_BOUNDS), COARSEST, False
     while not near and pieces <= FINEST:
         half = math.pi / pieces
-        for k in range(4):
+        for k in range(_BOUNDS):
             out[k] = 0.0
         for i in range(pieces):
             bounds(p, (2 * i + 1) * half - math.pi, 1.0001 * half, B, out)
         near = pieces > COARSEST
-        for k in range(4):
+        for k in range(_BOUNDS):
             near = near and math.isfinite(out[k]) and p[BOUND_F + k] <= 2.0 * out[k]
             p[BOUND_F + k] = out[k]
         pieces *= 4
@@ -315,15 +317,15 @@ def bound_near(p, phi):
     """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they
     are not finite.
     """
-    B, out, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(4), False
+    B, out, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(_BOUNDS), False
     p[RADIUS] = min(4.0 * p[RADIUS], 0.5 * (1.0 + abs(phi)))
     while not near:
         p[RADIUS] *= 0.5
-        for k in range(4):
+        for k in range(_BOUNDS):
             out[k] = 0.0
         bounds(p, phi, p[RADIUS], B, out)
-        near = math.isfinite(out[0] + out[1] + out[2] + out[3]) or p[RADIUS] < LEAST_RADIUS
-    for k in range(4):
+        near = math.isfinite(out.sum()) or p[RADIUS] < LEAST_RADIUS
+    for k in range(_BOUNDS):
         p[BOUND_F + k] = out[k]
 
 

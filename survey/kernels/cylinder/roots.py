@@ -169,12 +169,10 @@ def shrunk(a, k):
 @inline
 def lifted(a, r):
     """Has g one sign for real |x| <= r, by g >= a0 - |a1| r + x^2 (a2 - |a3| r - B r^2)?"""
-    e0, e1, e2, e3 = (
-        _ROUGH * a[BOUNDS],
-        _ROUGH * a[BOUNDS + 1],
-        _ROUGH * a[BOUNDS + 2],
-        _ROUGH * a[BOUNDS + 3],
-    )
+    e0 = _ROUGH * a[BOUNDS]
+    e1 = _ROUGH * a[BOUNDS + 1]
+    e2 = _ROUGH * a[BOUNDS + 2]
+    e3 = _ROUGH * a[BOUNDS + 3]
     level = abs(a[0]) - e0 > (abs(a[1]) + e1) * r * _MARGIN
     return (
         a[0] * a[2] > 0.0

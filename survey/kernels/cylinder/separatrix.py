@@ -72,11 +72,9 @@ def saddle(p, index, out):
     Degenerate equilibria, multiple roots of g within what double-doubles can tell apart, are
     counted as saddles.
     """
-    found, order, keys = (
-        np.empty((MOST_DISCS, 5)),
-        np.empty(MOST_DISCS, np.int64),
-        np.empty(MOST_DISCS),
-    )
+    found = np.empty((MOST_DISCS, 5))
+    order = np.empty(MOST_DISCS, np.int64)
+    keys = np.empty(MOST_DISCS)
     count = 0
     for i in range(discs(p, found)):
         if not (found[i, ROOTS] > ONE or (found[i, ROOTS] == ONE and found[i, SLOPE] > 0.0)):
@@ -245,13 +243,11 @@ def passing(data, phi0, phi, out):
     """w and t where phi is passed, or the turning point before it: fill out (VALUE to TIME_BAR),
     return the status.
     """
-    x0, A, a, b, v0 = (
-        _pair(data, _X0),
-        _pair(data, _STEEP),
-        _pair(data, _TILT),
-        _pair(data, _LEVEL),
-        _pair(data, _V0),
-    )
+    x0 = _pair(data, _X0)
+    A = _pair(data, _STEEP)
+    a = _pair(data, _TILT)
+    b = _pair(data, _LEVEL)
+    v0 = _pair(data, _V0)
     product, doubt = _pair(data, _PRODUCT), data[_DOUBT, 0]
     L, r0, early, noise = data[_RATE, 0], data[_R0, 0], data[_SHIFT, 0], data[_SHIFT, 1]
     sharp = data[_RATE, 1] + data[_R0, 1] + 12.0 * ROUNDOFF_UP

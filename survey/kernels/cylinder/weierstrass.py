@@ -126,10 +126,8 @@ def _lattice(T):
             4.0 * ROUNDOFF_UP * (abs(m) * (mean * (1.0 / 18.0) + share) + math.sqrt(second) * first)
         )
         flipped, height = g3 < 0.0, abs(g3)
-        root, move = (
-            0.5 * math.sqrt(g2 if g2 > 0.0 else 0.0) + 0.9 * math.sqrt(height / math.sqrt(wide)),
-            0.0,
-        )
+        root = 0.5 * math.sqrt(g2 if g2 > 0.0 else 0.0) + 0.9 * math.sqrt(height / math.sqrt(wide))
+        move = 0.0
         for _ in range(_HALLEY):  # to the greatest root of 4 e^3 - g2 e - |g3|
             value, slope = (4.0 * root * root - g2) * root - height, 12.0 * root * root - g2
             move = value * slope / (slope * slope - 12.0 * root * value)
@@ -257,20 +255,16 @@ def _formula(T):
             T[_Q4, i],
             T[_D_Q4, i],
         )
-        delay, turns, phase, by_shape = (
-            T[_DELAY, i],
-            T[_TURNS, i],
-            T[_PHASE, i],
-            0.5 * T[_BY_SHAPE, i],
-        )
+        delay = T[_DELAY, i]
+        turns = T[_TURNS, i]
+        phase = T[_PHASE, i]
+        by_shape = 0.5 * T[_BY_SHAPE, i]
         e = abs(1.0 + by_shape) * T[_E_A, i] + abs(1.0 - by_shape) * T[_E_B, i] + 40.0 * ROUNDOFF_UP
         mean = 0.5 * (T[_MEAN_A + _LEVELS, i] + T[_MEAN_B + _LEVELS, i])
         size, unit = 1.0 / (T[_XI_P, i] + T[_XI_Q, i]), mean * mean
-        P, Q, Y = (
-            T[_XI_P, i] * size * unit,
-            T[_XI_Q, i] * size,
-            T[_Y, i] * size * size * unit * mean,
-        )
+        P = T[_XI_P, i] * size * unit
+        Q = T[_XI_Q, i] * size
+        Y = T[_Y, i] * size * size * unit * mean
         # the constants of the formula
         start, g = w0 * w0, 0.5 * q + o
         d_g = 0.5 * d_1 + d_2 + ROUNDOFF_UP * abs(g)

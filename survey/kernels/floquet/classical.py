@@ -41,12 +41,10 @@ def factors(
     """As `steps.factors`; the nodes of one step take the places of the lanes there."""
     S, V = np.zeros((len(operations), 1, NODES.size)), np.empty((numbers.shape[1], NODES.size))
     t, zero, A = np.empty(NODES.size), np.zeros(NODES.size), np.empty((NODES.size, n, n))
-    work, first, second, one_step = (
-        np.empty((3, n, n)),
-        np.empty((n, n)),
-        np.empty((n, n)),
-        np.empty((n, n)),
-    )
+    work = np.empty((3, n, n))
+    first = np.empty((n, n))
+    second = np.empty((n, n))
+    one_step = np.empty((n, n))
     for task in range(len(point)):
         i, h = point[task], 2.0 * half[task]
         for node in range(NODES.size):

@@ -41,16 +41,12 @@ def flow(
         lanes *= 2
     derived, recorded = len(M) > 0, len(first) > 0
     S, V = np.zeros((len(operations), ORDER + 1, lanes)), np.zeros((numbers.shape[1], lanes))
-    B, C = (
-        np.zeros((len(operations), ORDER + 1, n * lanes)),
-        np.zeros((len(operations), n, n * lanes)),
-    )
+    B = np.zeros((len(operations), ORDER + 1, n * lanes))
+    C = np.zeros((len(operations), n, n * lanes))
     P, W = np.zeros((ORDER + 1, n, n * lanes)), np.zeros((len(terms), n * lanes))
-    rows, a, needed = (
-        np.zeros((n, lanes)),
-        np.zeros(lanes),
-        np.zeros((len(operations), n), np.bool_),
-    )
+    rows = np.zeros((n, lanes))
+    a = np.zeros(lanes)
+    needed = np.zeros((len(operations), n), np.bool_)
     for k in range(len(terms)):
         needed[terms[k, BASIS], terms[k, COLUMN]] = True
     x, D, F = np.zeros((n, lanes)), np.zeros((n * n, lanes)), np.zeros((n * n, lanes))

@@ -1,12 +1,12 @@
 """The power series of a matrix A(t) in many steps at once: those of its basis functions, operation
 by operation.
 
-A matrix is a sum of `terms` (basis, row, column, number): number * basis function;
-`measures.floquet.trace` makes it of a user's code. `operations` (count, 5) are the rows (code, a,
-b, first, last) of the basis functions: a and b those that they are made of, first to last the rows
-(basis, number) of `inside` that a combination adds. The series of a function h(y) follows from h'
-y': b is h', with the sign in `signs`; where y is linear in t its code is larger by OF_LINE. A state
-of a nonlinear system x' = f(t, x) begins with the number a; first to last are the rows of `inside`
+A matrix is a sum of `terms` (BASIS, ROW, COLUMN, NUMBER): number * basis function;
+`measures.floquet.trace` makes it of a user's code. `operations` (count, OPERATION) are the rows of
+the basis functions: LEFT and RIGHT those that they are made of, FIRST to LAST the rows of `inside`
+(ADDED, FACTOR) that a combination adds. The series of a function h(y) follows from h' y': RIGHT is
+h', with the sign in `signs`; where y is linear in t its code is larger by OF_LINE. A state of a
+nonlinear system x' = f(t, x) begins with the number LEFT; FIRST to LAST are the rows of `inside`
 that make up its f, whose lower orders give its own (`measures.floquet.orbit`).
 
 S[basis, n, lane] is the coefficient of tau^n, t = middle + tau * half; V[number, lane] are the
@@ -30,6 +30,10 @@ CODES = {
 CODES |= {"state": STATE} | {name: FUNCTIONS + k for k, name in enumerate(NAMES)}
 OF_LINE = 32
 BASIS, ROW, COLUMN, NUMBER = range(4)  # columns of `terms`
+TERM = 4
+CODE, LEFT, RIGHT, FIRST, LAST = range(5)  # of `operations`
+OPERATION = 5
+ADDED, FACTOR = range(2)  # of `inside`: a basis function, and the number before it
 
 
 @kernel
@@ -38,7 +42,7 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
     lanes = S.shape[2]
     for at in range(len(order)):
         i = order[at]
-        code, a, b = operations[i, 0], operations[i, 1], operations[i, 2]
+        code, a, b = operations[i, CODE], operations[i, LEFT], operations[i, RIGHT]
         own = S[i, n]
         if code == ONE:
             own[:] = 1.0 if n == 0 else 0.0
@@ -47,8 +51,8 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                 own[lane] = middle[lane] if n == 0 else (half[lane] if n == 1 else 0.0)
         elif code == COMBINATION:
             own[:] = 0.0
-            for k in range(operations[i, 3], operations[i, 4]):
-                one, number = S[inside[k, 0], n], V[inside[k, 1]]
+            for k in range(operations[i, FIRST], operations[i, LAST]):
+                one, number = S[inside[k, ADDED], n], V[inside[k, FACTOR]]
                 for lane in range(lanes):
                     own[lane] += one[lane] * number[lane]
         elif code == STATE:
@@ -57,8 +61,8 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
                     own[lane] = V[a, lane]
             else:
                 own[:] = 0.0
-                for k in range(operations[i, 3], operations[i, 4]):
-                    one, number = S[inside[k, 0], n - 1], V[inside[k, 1]]
+                for k in range(operations[i, FIRST], operations[i, LAST]):
+                    one, number = S[inside[k, ADDED], n - 1], V[inside[k, FACTOR]]
                     for lane in range(lanes):
                         own[lane] += one[lane] * number[lane]
                 for lane in range(lanes):

@@ -8,7 +8,17 @@ import math
 
 import numpy as np
 
-from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, ROW, extend
+from survey.kernels.floquet.program import (
+    ADDED,
+    BASIS,
+    COLUMN,
+    FACTOR,
+    FIRST,
+    LAST,
+    NUMBER,
+    ROW,
+    extend,
+)
 from survey.kernels.floquet.steps import lanes_of
 from survey.kernels.jit import kernel
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
@@ -75,12 +85,10 @@ def factors(
             new = K[stage]
             new[:] = 0.0
             for q in range(len(terms)):
-                row, column, weight, basis = (
-                    terms[q, ROW] * n,
-                    terms[q, COLUMN] * n,
-                    W[q],
-                    S[terms[q, BASIS], 0],
-                )
+                row = terms[q, ROW] * n
+                column = terms[q, COLUMN] * n
+                weight = W[q]
+                basis = S[terms[q, BASIS], 0]
                 for c in range(n):
                     one, two = new[row + c], Y[column + c]
                     for lane in range(lanes):
@@ -118,12 +126,10 @@ def motion(operations, signs, inside, order, terms, numbers, states_at, x0, span
     `flow.flow`.
     """
     n = x0.shape[1]
-    S, V, t, zero = (
-        np.zeros((len(operations), 1, 1)),
-        np.empty((numbers.shape[1], 1)),
-        np.empty(1),
-        np.zeros(1),
-    )
+    S = np.zeros((len(operations), 1, 1))
+    V = np.empty((numbers.shape[1], 1))
+    t = np.empty(1)
+    zero = np.zeros(1)
     y, K, new = np.empty((n, n + 1)), np.empty((STAGES, n, n + 1)), np.empty((n, n + 1))
     for i in range(len(x0)):
         for k in range(numbers.shape[1]):
@@ -149,8 +155,8 @@ def motion(operations, signs, inside, order, terms, numbers, states_at, x0, span
                 own = K[stage]
                 own[:] = 0.0
                 for c in range(n):
-                    for k in range(operations[order[c], 3], operations[order[c], 4]):
-                        own[c, 0] += S[inside[k, 0], 0, 0] * V[inside[k, 1], 0]
+                    for k in range(operations[order[c], FIRST], operations[order[c], LAST]):
+                        own[c, 0] += S[inside[k, ADDED], 0, 0] * V[inside[k, FACTOR], 0]
                 for q in range(len(terms)):
                     value = S[terms[q, BASIS], 0, 0] * V[terms[q, NUMBER], 0]
                     for c in range(n):

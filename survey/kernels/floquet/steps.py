@@ -59,23 +59,17 @@ def factors(
     S, X = np.zeros((size, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
     B, C = np.zeros((size, ORDER + 1, n * lanes)), np.zeros((size, n, n * lanes))
     V, W = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), n * lanes))
-    a, w, e = (
-        np.zeros((ORDER + 1, lanes)),
-        np.empty((ORDER + 1 + BEYOND, lanes)),
-        np.empty((ORDER + 1, lanes)),
-    )
+    a = np.zeros((ORDER + 1, lanes))
+    w = np.empty((ORDER + 1 + BEYOND, lanes))
+    e = np.empty((ORDER + 1, lanes))
     rows, t, s, own = np.empty((n, lanes)), np.empty(lanes), np.empty(lanes), np.empty(lanes)
-    even, odd, work = (
-        np.empty((n, n * lanes)),
-        np.empty((n, n * lanes)),
-        np.empty((4, n, n * lanes)),
-    )
-    total, of_both, of_odd, found = (
-        np.empty(lanes),
-        np.empty(lanes),
-        np.empty(lanes),
-        np.empty(lanes),
-    )
+    even = np.empty((n, n * lanes))
+    odd = np.empty((n, n * lanes))
+    work = np.empty((4, n, n * lanes))
+    total = np.empty(lanes)
+    of_both = np.empty(lanes)
+    of_odd = np.empty(lanes)
+    found = np.empty(lanes)
     per_row, needed = np.zeros(n), np.zeros((size, n), np.bool_)
     for k in range(len(terms)):
         per_row[terms[k, ROW]] += 1.0
@@ -271,10 +265,8 @@ def _missing(a, w, e, s, total, of_both, of_odd):
             2.0 * last * fall / (1.0 - fall) if fall < 0.95 else (0.0 if last == 0.0 else math.inf)
         )
         # over two orders, as even and odd ones may differ
-        end, earlier = (
-            w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane],
-            w[ORDER + BEYOND - 2, lane],
-        )
+        end = w[ORDER + BEYOND, lane] + w[ORDER + BEYOND - 1, lane]
+        earlier = w[ORDER + BEYOND - 2, lane]
         ratio = w[ORDER + BEYOND, lane] / earlier if earlier > 0.0 else 0.0
         cut = cut + end * ratio / (1.0 - ratio) if ratio < 0.9 else math.inf
         cut += s[lane] * rest * total[lane] / (ORDER + 1)

@@ -24,6 +24,9 @@ FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number
 DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(0, 14, 2)
 FACTOR_ROWS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
 UNTRIED = -1
+# Of half the angle of a point, where more digits are known: sin^2 and cos^2.
+SINE, SINE_BAR, COSINE, COSINE_BAR = range(4)
+SQUARES = 4
 
 
 @kernel
@@ -107,7 +110,7 @@ def measure(
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
     `overflow`. `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count
-    for `missed`; `full_period` as in `_squares`; `squares` (n, 4, or empty) holds what it finds,
+    for `missed`; `full_period` as in `_squares`; `squares` (n, SQUARES, or empty) holds what it finds,
     where more digits of it are known.
     """
     for row in range(len(results)):
@@ -226,12 +229,8 @@ def _squares(result, squares, i, full_period):
         bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
     if len(squares) > 0:
-        sine, sine_bar, cosine, cosine_bar = (
-            squares[i, 0],
-            squares[i, 1],
-            squares[i, 2],
-            squares[i, 3],
-        )
+        sine, sine_bar = squares[i, SINE], squares[i, SINE_BAR]
+        cosine, cosine_bar = squares[i, COSINE], squares[i, COSINE_BAR]
     elif full_period:
         both, both_bar = _both(result)
         if abs(sine) < abs(cosine):

@@ -31,15 +31,19 @@ AXIS, BLOCK = 2, 4
 # A leaf: its block, its verdict, or UNSOLVED, and which parts of it are stable and unstable at least.
 VERDICT, STABLE_PART, UNSTABLE_PART = range(4, 7)
 LEAF = 7
+# What a factor of a block is off by: its series' tail in X, in Y, and all else.
+TAIL_X, TAIL_Y, OTHER = range(3)
+# Of a factor on a cell: c_00, and the sum of the other |c_jk|.
+CONSTANT, REST = range(2)
 
 
 @kernel
 def descend(series, doubts, blocks, depth, halves):
     """Halve B blocks until a cell is decided or `depth` halvings small: leaves (>= M, LEAF), and M.
 
-    `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor the series' tail in X, in Y, and its
-    other slack; `blocks` (B, BLOCK); `halves` (2, depth, 2, n, n): per axis and number of halvings
-    the matrices to the lower and to the upper half.
+    `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor TAIL_X to OTHER; `blocks` (B, BLOCK);
+    `halves` (2, depth, 2, n, n): per axis and number of halvings the matrices to the lower and to
+    the upper half.
     """
     n, most = series.shape[2], depth[0] + depth[1] + 2
     stack, slack = np.empty((most, 4, n, n)), np.empty((most, 4))
@@ -93,7 +97,7 @@ def _begin(series, doubt, block, own, slack, where, size):
     for i in range(BLOCK):
         where[i] = block[i]
     for f in range(4):
-        slack[f] = doubt[f, 0] + doubt[f, 1] + doubt[f, 2]
+        slack[f] = doubt[f, TAIL_X] + doubt[f, TAIL_Y] + doubt[f, OTHER]
         for j in range(series.shape[1]):
             for k in range(series.shape[2]):
                 own[f, j, k] = series[f, j, k]
@@ -109,32 +113,28 @@ def _write(here, verdict, stable, unstable, leaf):
 
 @inline
 def _add_up(own, size, sums):
-    """Per factor c_00, and the sum of the other |c_jk|."""
+    """Fill `sums` (4, 2): of each factor CONSTANT and REST."""
     for f in range(4):
         total = 0.0
         for j in range(size[0]):
             for k in range(1 if j == 0 else 0, size[1]):
                 total += abs(own[f, j, k])
-        sums[f, 0], sums[f, 1] = own[f, 0, 0], total
+        sums[f, CONSTANT], sums[f, REST] = own[f, 0, 0], total
 
 
 @inline
 def _sure(sums, bars, f):
     """Has factor f one sign? Not where anything is NaN."""
-    return abs(sums[f, 0]) > (sums[f, 1] + bars[f]) * (1.0 + 256.0 * EPS)
+    return abs(sums[f, CONSTANT]) > (sums[f, REST] + bars[f]) * (1.0 + 256.0 * EPS)
 
 
 @inline
 def decide(sums, bars):
     """The verdict of the cell: unstable <=> y1 y2' < 0 or y1' y2 > 0."""
-    first, second = (
-        _sure(sums, bars, 0) and _sure(sums, bars, 1),
-        _sure(sums, bars, 2) and _sure(sums, bars, 3),
-    )
-    cosine, sine = (
-        (sums[0, 0] > 0.0) == (sums[1, 0] > 0.0),
-        (sums[2, 0] > 0.0) != (sums[3, 0] > 0.0),
-    )
+    first = _sure(sums, bars, 0) and _sure(sums, bars, 1)
+    second = _sure(sums, bars, 2) and _sure(sums, bars, 3)
+    cosine = (sums[0, CONSTANT] > 0.0) == (sums[1, CONSTANT] > 0.0)
+    sine = (sums[2, CONSTANT] > 0.0) != (sums[3, CONSTANT] > 0.0)
     if (first and not cosine) or (second and not sine):
         return UNSTABLE
     return STABLE if first and second else UNDECIDED
@@ -157,11 +157,12 @@ def _too_short(sums, bars, doubt, here, block, depth):
     share = ENOUGH * 0.5 ** max(left_x, left_y) if full else BLURRED
     for f in range(4):
         if not _sure(sums, bars, f):
-            most, size = max(share * sums[f, 1], doubt[f, 2]), abs(sums[f, 0]) + sums[f, 1]
-            x |= not doubt[f, 0] <= most
-            y |= not doubt[f, 1] <= most
-            hidden_x |= not doubt[f, 0] <= size
-            hidden_y |= not doubt[f, 1] <= size
+            most = max(share * sums[f, REST], doubt[f, OTHER])
+            size = abs(sums[f, CONSTANT]) + sums[f, REST]
+            x |= not doubt[f, TAIL_X] <= most
+            y |= not doubt[f, TAIL_Y] <= most
+            hidden_x |= not doubt[f, TAIL_X] <= size
+            hidden_y |= not doubt[f, TAIL_Y] <= size
     if not full:
         return x and here[HALVED_X] > block[HALVED_X], y and here[HALVED_Y] > block[HALVED_Y]
     if (hidden_x and left_x == 0) or (hidden_y and left_y == 0):
@@ -194,7 +195,9 @@ def _halve(stack, slack, where, size, top, axis, matrices, sums):
     for i in range(BLOCK):
         where[top + 1, i] = where[top, i]
     for i in range(4):
-        slack[top, i] += EPS * (4.0 + 2.0 * size[top, axis]) * (abs(sums[i, 0]) + sums[i, 1])
+        slack[top, i] += (
+            EPS * (4.0 + 2.0 * size[top, axis]) * (abs(sums[i, CONSTANT]) + sums[i, REST])
+        )
         slack[top + 1, i] = slack[top, i]
     size[top + 1, 0], size[top + 1, 1] = size[top, 0], size[top, 1]
     halved, index = AXIS * axis + HALVED_X, AXIS * axis + INDEX_X
@@ -233,7 +236,7 @@ def _shorten(own, slack, size, doubt):
             last, small = size[axis] - 1, True
             for f in range(4):
                 small &= _layer(own[f], size, axis, last) <= DROPPED * (
-                    doubt[f, 0] + doubt[f, 1] + doubt[f, 2]
+                    doubt[f, TAIL_X] + doubt[f, TAIL_Y] + doubt[f, OTHER]
                 )
             if not small:
                 break
@@ -265,13 +268,17 @@ def _cut(own, sums, bars, polygons):
         for f in range(4):
             x, y = own[f, 1, 0], own[f, 0, 1]
             rest = (
-                sums[f, 1] - abs(x) - abs(y) + bars[f] + 8.0 * EPS * (abs(sums[f, 0]) + sums[f, 1])
+                sums[f, REST]
+                - abs(x)
+                - abs(y)
+                + bars[f]
+                + 8.0 * EPS * (abs(sums[f, CONSTANT]) + sums[f, REST])
             )
             sign = 1.0 if (signs >> f) & 1 == 1 else -1.0
             corners = _clip(
                 polygons[f % 2],
                 corners,
-                sign * sums[f, 0] - rest,
+                sign * sums[f, CONSTANT] - rest,
                 sign * x,
                 sign * y,
                 polygons[1 - f % 2],

@@ -45,7 +45,8 @@ def hill_step(z, h):
 @unroll
 def _sums(z, h):
     """Of y and v of both columns: the slopes' sums with the weights B, E5 and E3, 12 numbers."""
-    sums, steps = [], [[h * float(a) for a in row[:STAGES]] for row in A]
+    sums = []
+    steps = [[h * float(a) for a in row[:STAGES]] for row in A]
     for start in ((1.0, 0.0), (0.0, 1.0)):
         slopes = []
         for i in range(STAGES):

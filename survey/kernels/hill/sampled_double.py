@@ -11,7 +11,21 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 
 import numpy as np
 
-from survey.kernels.hill.taylor_double import STEP, composed, rounded, step, workspace
+from survey.kernels.hill.answers import COSINE, COSINE_BAR, SINE, SINE_BAR
+from survey.kernels.hill.taylor_double import (
+    D11,
+    D12,
+    D21,
+    MOVED,
+    P12,
+    P21,
+    STEP,
+    composed,
+    entry,
+    rounded,
+    step,
+    workspace,
+)
 from survey.kernels.jit import kernel
 from survey.kernels.lanes import DY2_BAR, RESULTS, Y1_BAR
 from survey.kernels.math.double import add, div, mul
@@ -20,10 +34,7 @@ from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
 ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
 NODES = 20
-# What follows the results of a full period: sin^2 and cos^2 of half the angle, (2 - D) / 4 and (2 +
-# D) / 4, each with its error bound.
-SINE, SINE_BAR, COSINE, COSINE_BAR = range(RESULTS, RESULTS + 4)
-SQUARES = 4
+# From RESULTS on, of a full period: SINE to COSINE_BAR of `answers`, (2 - D) / 4 and (2 + D) / 4.
 
 
 def missing(before, last, size):
@@ -57,22 +68,18 @@ def solve(series, misses, lengths, full_period, out):
         size = np.abs(even[0]).sum() + np.abs(odd[0]).sum()
         miss = square[0] * misses[n] * size * size
         longer, shorter = div(h, unit), div(unit, h)
-        c[2], c[3] = mul((c[2], c[3]), longer)
-        c[4], c[5] = mul((c[4], c[5]), shorter)
-        c[8], c[9], c[10] = (
-            c[8] + miss,
-            (c[9] + miss) * longer[0],
-            (c[10] + 2.0 * miss) * shorter[0],
-        )
-        c[11] = 0.0
+        c[P12], c[P12 + 1] = mul(entry(c, P12), longer)
+        c[P21], c[P21 + 1] = mul(entry(c, P21), shorter)
+        c[D11] = c[D11] + miss
+        c[D12] = (c[D12] + miss) * longer[0]
+        c[D21] = (c[D21] + 2.0 * miss) * shorter[0]
+        c[MOVED] = 0.0
     y1, v1, y2, v2 = composed(chain, 0.0, out)
     if full_period:
-        bar, trace = (
-            out[Y1_BAR] + out[DY2_BAR] + PAIR_ROUNDOFF * (abs(y1[0]) + abs(v2[0]) + 2.0),
-            add(y1, v2),
-        )
-        out[SINE] = 0.25 * add((2.0, 0.0), (-trace[0], -trace[1]))[0]
-        out[COSINE] = 0.25 * add((2.0, 0.0), trace)[0]
-        out[SINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[SINE])
-        out[COSINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[COSINE])
+        bar = out[Y1_BAR] + out[DY2_BAR] + PAIR_ROUNDOFF * (abs(y1[0]) + abs(v2[0]) + 2.0)
+        trace = add(y1, v2)
+        out[RESULTS + SINE] = 0.25 * add((2.0, 0.0), (-trace[0], -trace[1]))[0]
+        out[RESULTS + COSINE] = 0.25 * add((2.0, 0.0), trace)[0]
+        out[RESULTS + SINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[RESULTS + SINE])
+        out[RESULTS + COSINE_BAR] = 0.25 * bar + ROUNDOFF_UP * abs(out[RESULTS + COSINE])
     rounded(y1, v1, y2, v2, unit, out)

@@ -17,6 +17,14 @@ TILE = 64
 TERMS = 8  # as many as `_sum` spells out
 ROOT_2 = math.sqrt(2.0)
 ROWS = 8
+# Of a series of factors, in the order of `lanes`: y1, y1', y2, y2'.
+FACTORS = 4
+# At a node: the rotation number, the least and the largest number of zeros of y1, and of y2.
+NEAR, Y1_LEAST, Y1_MOST, Y2_LEAST, Y2_MOST = range(5)
+TURNS = 5
+# Around a point of a panel: the two nodes across the rows, and the two along them.
+ACROSS, ALONG = range(2)
+LOW_ACROSS, HIGH_ACROSS, LOW_ALONG, HIGH_ALONG = range(4)
 
 
 @splice
@@ -145,37 +153,43 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
     (4, R, terms) within `bars` (4, R); if `even`, from those of (y1 + y2') / 2, y1', y2 and, odd,
     (y1 - y2') / 2.
 
-    The numbers of zeros follow from `turns` (5, R, nodes), rotation numbers, and the least and the
-    largest number of zeros of y1 and of y2, at the nodes `left` and `right` of x, `share` of the
+    The numbers of zeros follow from `turns` (TURNS, R, nodes) at the nodes `left` and `right` of x, `share` of the
     way between; NaN where they do not tell.
     """
     _, rows, terms = coefficients.shape
-    table, odd, sums = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((4, TILE))
+    table, odd, sums = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((FACTORS, TILE))
     for start in range(0, len(x), TILE):
         count = min(TILE, len(x) - start)
         _table(x[start : start + count], even, False, table)
         if even:
             _table(x[start : start + count], even, True, odd)
         for j in range(rows):
-            for f in range(4):
-                _sum(coefficients[f, j], odd if even and f == 3 else table, sums[f], count)
-            y1_bar, dy2_bar = bars[0, j], bars[3, j]
+            for f in range(FACTORS):
+                _sum(coefficients[f, j], odd if even and f == lanes.DY2 else table, sums[f], count)
+            y1_bar, dy2_bar = bars[lanes.Y1, j], bars[lanes.DY2, j]
             if even:
                 y1_bar = dy2_bar = y1_bar + dy2_bar
                 for i in range(count):
-                    sums[0, i], sums[3, i] = sums[0, i] + sums[3, i], sums[0, i] - sums[3, i]
+                    sums[lanes.Y1, i], sums[lanes.DY2, i] = (
+                        sums[lanes.Y1, i] + sums[lanes.DY2, i],
+                        sums[lanes.Y1, i] - sums[lanes.DY2, i],
+                    )
             for i in range(count):
                 own = results[j * len(x) + start + i]
-                for f in range(4):
+                for f in range(FACTORS):
                     own[lanes.Y1 + f] = sums[f, i]
-                own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1, j]
-                own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2, j], dy2_bar
+                own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[lanes.DY1, j]
+                own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[lanes.Y2, j], dy2_bar
                 one, other = left[start + i], right[start + i]
-                near = turns[0, j, one] + share[start + i] * (turns[0, j, other] - turns[0, j, one])
+                near = turns[NEAR, j, one] + share[start + i] * (
+                    turns[NEAR, j, other] - turns[NEAR, j, one]
+                )
                 _count(
                     own, even and x[start + i] < 0.0, full_period, near, one == other,
-                    min(turns[1, j, one], turns[1, j, other]), max(turns[2, j, one], turns[2, j, other]),
-                    min(turns[3, j, one], turns[3, j, other]), max(turns[4, j, one], turns[4, j, other]),
+                    min(turns[Y1_LEAST, j, one], turns[Y1_LEAST, j, other]),
+                    max(turns[Y1_MOST, j, one], turns[Y1_MOST, j, other]),
+                    min(turns[Y2_LEAST, j, one], turns[Y2_LEAST, j, other]),
+                    max(turns[Y2_MOST, j, one], turns[Y2_MOST, j, other]),
                 )  # fmt: skip
 
 
@@ -186,51 +200,63 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
     is multiplied by `scale` (N). Only the first `number` (4, terms along) of the terms across
     count.
 
-    `nodes` (4, N) are the two nodes across the rows, and the two along them, around each point,
-    `share` (2, N) of the way between, and `turns` (5, nodes across, nodes along).
+    `nodes` (4, N) are LOW_ACROSS to HIGH_ALONG, `share` (2, N) of the way between, and `turns` (TURNS,
+    nodes across, nodes along).
     """
     _, terms, across = coefficients.shape
     table, odd, rows = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((across, TILE))
-    sums, part = np.empty((4, TILE)), np.empty(TILE)
+    sums, part = np.empty((FACTORS, TILE)), np.empty(TILE)
     for start in range(0, x.shape[1], TILE):
         count = min(TILE, x.shape[1] - start)
-        _table(x[0, start : start + count], False, False, rows)
-        _table(x[1, start : start + count], even, False, table)
+        _table(x[ACROSS, start : start + count], False, False, rows)
+        _table(x[ALONG, start : start + count], even, False, table)
         if even:
-            _table(x[1, start : start + count], even, True, odd)
-        for f in range(4):
+            _table(x[ALONG, start : start + count], even, True, odd)
+        for f in range(FACTORS):
             for i in range(count):
                 sums[f, i] = 0.0
             for k in range(terms):
                 if number[f, k] == 0:
                     continue
                 _sum(coefficients[f, k, : number[f, k]], rows, part, count)
-                along = odd[k] if even and f == 3 else table[k]
+                along = odd[k] if even and f == lanes.DY2 else table[k]
                 for i in range(count):
                     sums[f, i] += along[i] * part[i]
         for i in range(count):
             own, at = results[start + i], start + i
-            y1, dy2, y1_bar, dy2_bar = sums[0, i], sums[3, i], bars[0], bars[3]
+            y1, dy2, y1_bar, dy2_bar = (
+                sums[lanes.Y1, i],
+                sums[lanes.DY2, i],
+                bars[lanes.Y1],
+                bars[lanes.DY2],
+            )
             if even:
                 dy2_bar = y1_bar = y1_bar + dy2_bar * scale[at]
                 y1, dy2 = y1 + dy2 * scale[at], y1 - dy2 * scale[at]
             own[lanes.Y1], own[lanes.DY1], own[lanes.Y2], own[lanes.DY2] = (
                 y1,
-                sums[1, i],
-                sums[2, i],
+                sums[lanes.DY1, i],
+                sums[lanes.Y2, i],
                 dy2,
             )
-            own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[1]
-            own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[2], dy2_bar
-            a, b, c, d = nodes[0, at], nodes[1, at], nodes[2, at], nodes[3, at]
-            low = turns[0, a, c] + share[0, at] * (turns[0, b, c] - turns[0, a, c])
-            high = turns[0, a, d] + share[0, at] * (turns[0, b, d] - turns[0, a, d])
+            own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[lanes.DY1]
+            own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[lanes.Y2], dy2_bar
+            a, b, c, d = (
+                nodes[LOW_ACROSS, at],
+                nodes[HIGH_ACROSS, at],
+                nodes[LOW_ALONG, at],
+                nodes[HIGH_ALONG, at],
+            )
+            low = turns[NEAR, a, c] + share[ACROSS, at] * (turns[NEAR, b, c] - turns[NEAR, a, c])
+            high = turns[NEAR, a, d] + share[ACROSS, at] * (turns[NEAR, b, d] - turns[NEAR, a, d])
+            y1_least, y1_most = turns[Y1_LEAST], turns[Y1_MOST]
+            y2_least, y2_most = turns[Y2_LEAST], turns[Y2_MOST]
             _count(
-                own, even and x[1, at] < 0.0, full_period, low + share[1, at] * (high - low), c == d,
-                min(min(turns[1, a, c], turns[1, b, c]), min(turns[1, a, d], turns[1, b, d])),
-                max(max(turns[2, a, c], turns[2, b, c]), max(turns[2, a, d], turns[2, b, d])),
-                min(min(turns[3, a, c], turns[3, b, c]), min(turns[3, a, d], turns[3, b, d])),
-                max(max(turns[4, a, c], turns[4, b, c]), max(turns[4, a, d], turns[4, b, d])),
+                own, even and x[ALONG, at] < 0.0, full_period, low + share[ALONG, at] * (high - low), c == d,
+                min(min(y1_least[a, c], y1_least[b, c]), min(y1_least[a, d], y1_least[b, d])),
+                max(max(y1_most[a, c], y1_most[b, c]), max(y1_most[a, d], y1_most[b, d])),
+                min(min(y2_least[a, c], y2_least[b, c]), min(y2_least[a, d], y2_least[b, d])),
+                max(max(y2_most[a, c], y2_most[b, c]), max(y2_most[a, d], y2_most[b, d])),
             )  # fmt: skip
 
 
@@ -245,8 +271,8 @@ def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, ve
     for start in range(0, x.shape[1], TILE):
         count = min(TILE, x.shape[1] - start)
         end = start + count
-        _table(x[0, start:end], False, False, rows)
-        _table(x[1, start:end], even, False, table)
+        _table(x[ACROSS, start:end], False, False, rows)
+        _table(x[ALONG, start:end], even, False, table)
         for i in range(count):
             sums[i] = 0.0
         for k in range(terms):

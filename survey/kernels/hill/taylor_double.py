@@ -35,8 +35,10 @@ ORDER = 34
 SERVES = ()  # a last resort, never a user's choice
 PHASE, DISTANCE = 1.4, 0.1
 STEP_LIMIT = 100_000
-# A step: its propagator as four double-doubles, local bounds of truncation and rounding (3), dz of
-# the clock.
+# A step: its propagator, each entry in two columns, high and low; local bounds of truncation and
+# rounding, D11 = D22, D12 and D21; what the clock's error moves.
+P11, P12, P21, P22 = range(0, 8, 2)
+D11, D12, D21, MOVED = range(8, 12)
 STEP = 12
 SOLUTIONS = 3
 # Of a step, relative to its size in the largest norm: sums of products, the reciprocal steps, h.
@@ -82,15 +84,15 @@ def step(z, even, odd, square, reverse, out):
     p11, p12, p21, p22 = total(even), total(odd), slope(even), slope(odd)
     if reverse:
         p11, p22 = p22, p11
-    out[0], out[1] = p11
-    out[2], out[3] = p12
-    out[4], out[5] = p21
-    out[6], out[7] = p22
+    out[P11], out[P11 + 1] = p11
+    out[P12], out[P12 + 1] = p12
+    out[P21], out[P21 + 1] = p21
+    out[P22], out[P22 + 1] = p22
     a, b = tail(even), tail(odd)
     rounding = ROUNDING * PAIR_ROUNDOFF
-    out[8] = a + ORDER * b + rounding * (1.0 + size)
-    out[9] = b + rounding * (1.0 + size)
-    out[10] = ORDER * a + rounding * size
+    out[D11] = a + ORDER * b + rounding * (1.0 + size)
+    out[D12] = b + rounding * (1.0 + size)
+    out[D21] = ORDER * a + rounding * size
 
 
 @inline
@@ -123,7 +125,7 @@ def hill_walk(start, expand, potential, miss, row, p, span, before, after, work,
         for side in (1.0, -1.0):
             if j < (after if side > 0.0 else before):
                 index = before + j if side > 0.0 else before - 1 - j
-                chain[index, 11] = potential(side, row, p, clock, z) * square[0]
+                chain[index, MOVED] = potential(side, row, p, clock, z) * square[0]
                 step(z, even, odd, square, side < 0.0, chain[index])
         for c in range(len(clock)):
             clock[c, 0, 0], clock[c, 1, 0] = total(clock[c])
@@ -145,8 +147,10 @@ def composed(chain, doubt, out):
     zeros1, zeros2, sum_ = 0.0, 0.0, 0.0
     for n in range(len(chain)):
         c = chain[n]
-        moved = doubt * c[11]
-        matrix = (c[0], c[2], c[4], c[6], c[8] + moved, c[9] + moved, c[10] + 2.0 * moved)
+        moved = doubt * c[MOVED]
+        matrix = (
+            c[P11], c[P12], c[P21], c[P22], c[D11] + moved, c[D12] + moved, c[D21] + 2.0 * moved
+        )  # fmt: skip
         old1, old2 = y1[0], y2[0]
         _, _, s1, t1, w1 = column(matrix, y1[0], v1[0], s1, t1, w1)
         _, _, s2, t2, w2 = column(matrix, y2[0], v2[0], s2, t2, w2)
@@ -170,7 +174,13 @@ def rounded(y1, v1, y2, v2, h, out):
 
 
 @inline
+def entry(step, at):
+    """An entry of a step's propagator."""
+    return step[at], step[at + 1]
+
+
+@inline
 def applied(c, y, v):
     """A step's propagator times (y, v)."""
-    p11, p12, p21, p22 = (c[0], c[1]), (c[2], c[3]), (c[4], c[5]), (c[6], c[7])
+    p11, p12, p21, p22 = entry(c, P11), entry(c, P12), entry(c, P21), entry(c, P22)
     return add(mul(p11, y), mul(p12, v)), add(mul(p21, y), mul(p22, v))

@@ -161,8 +161,9 @@ def bars(work, i, steps):
     # Cauchy and Schwarz: V_ii sums the squares of 4 n - 3 terms, four of each step but one of the
     # last
     doubt, terms = np.exp(min(work[SUM, i], WORST)), 4.0 * steps - 3.0
-    e0, e1 = doubt * np.sqrt(terms * work[16, i]), doubt * np.sqrt(terms * work[20, i])
-    e2, e3 = doubt * np.sqrt(terms * work[23, i]), doubt * np.sqrt(terms * work[25, i])
+    v00, v11, v22, v33 = V, V + 4, V + 7, V + 9  # in the upper triangle
+    e0, e1 = doubt * np.sqrt(terms * work[v00, i]), doubt * np.sqrt(terms * work[v11, i])
+    e2, e3 = doubt * np.sqrt(terms * work[v22, i]), doubt * np.sqrt(terms * work[v33, i])
     return e0, e1, e2, e3
 
 

@@ -45,27 +45,32 @@ SCALED, BEFORE, SUM, OTHER, OFF, SCALED_OFF, BEFORE_OFF, BOUND, TAIL, LIVE = (
 SIZE = LIVE + LANES
 # Columns A to T of `traces` are leading parts; LOW columns further on follows what rounding left of
 # them, and BARS further on the bounds of their errors.
+# Of a point, each in two columns, high and low: d1 and d2 of `danby`; 1 + e and 1 - e.
+FIRST_RATE, SECOND_RATE = 0, 2
+ONE_PLUS, ONE_MINUS = 0, 2
 LOW, BARS, RESULTS = INVARIANTS, 2 * INVARIANTS, 3 * INVARIANTS
 
 
 @kernel
 def rates(mu, out):
-    """d1, d2 of `danby` as pairs, (N, 4): (3 / 2)(1 +- s) with s^2 = 1/4 + 3 (1/2 - mu)^2: nothing
+    """FIRST_RATE and SECOND_RATE, (N, 4): (3 / 2)(1 +- s) with s^2 = 1/4 + 3 (1/2 - mu)^2: nothing
     cancels.
     """
     for i in range(len(mu)):
         square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
         d1 = dd.times(dd.shifted(dd.sqrt(square), 1.0), 1.5)
-        out[i, 0], out[i, 1] = d1
-        out[i, 2], out[i, 3] = dd.div(dd.times(dd.times(dd.two_sum(1.0, -mu[i]), mu[i]), 6.75), d1)
+        out[i, FIRST_RATE], out[i, FIRST_RATE + 1] = d1
+        out[i, SECOND_RATE], out[i, SECOND_RATE + 1] = dd.div(
+            dd.times(dd.times(dd.two_sum(1.0, -mu[i]), mu[i]), 6.75), d1
+        )
 
 
 @kernel
 def shapes(e, out):
-    """1 + e and 1 - e as pairs, (N, 4)."""
+    """ONE_PLUS and ONE_MINUS, (N, 4)."""
     for i in range(len(e)):
-        out[i, 0], out[i, 1] = dd.two_sum(1.0, e[i])
-        out[i, 2], out[i, 3] = dd.two_sum(1.0, -e[i])
+        out[i, ONE_PLUS], out[i, ONE_PLUS + 1] = dd.two_sum(1.0, e[i])
+        out[i, ONE_MINUS], out[i, ONE_MINUS + 1] = dd.two_sum(1.0, -e[i])
 
 
 @kernel
@@ -96,10 +101,8 @@ def chain(shapes, rates, out):
                 for i in range(POINTS):
                     at = first + min(i, count - 1)
                     near = nearest(shapes[at]) if part else 1.0
-                    left, right = (
-                        step_end(n, numbers[part], near, part),
-                        step_end(n + 1, numbers[part], near, part),
-                    )
+                    left = step_end(n, numbers[part], near, part)
+                    right = step_end(n + 1, numbers[part], near, part)
                     prepare(left, right, shapes[at], part, rates[at], work, COLUMNS * i)
                 columns(work)
                 for i in range(count):
@@ -114,7 +117,7 @@ def chain(shapes, rates, out):
 @inline
 def nearest(shape):
     """How far off u = 0 the singularities of the second part are."""
-    return sqrt(shape[2] / shape[0])
+    return sqrt(shape[ONE_MINUS] / shape[ONE_PLUS])
 
 
 @inline
@@ -148,7 +151,8 @@ def prepare(left, right, shape, part, rates, work, lane):
     """The constants of a step in z, u = middle + half z, and the first coefficients, in the lanes
     of one point.
     """
-    more, less = (shape[0], shape[1]), (shape[2], shape[3])
+    more = shape[ONE_PLUS], shape[ONE_PLUS + 1]
+    less = shape[ONE_MINUS], shape[ONE_MINUS + 1]
     b0, b2 = (less, more) if part else (more, less)
     middle, half = dd.scaled(dd.two_sum(left, right), 0.5), dd.scaled(dd.two_sum(right, -left), 0.5)
     square, linear, last = dd.square(middle), dd.scaled(dd.mul(middle, half), 2.0), dd.square(half)
@@ -157,8 +161,8 @@ def prepare(left, right, shape, part, rates, work, lane):
     store(work, TURN + lane, dd.scaled(dd.div(half, a0), 2.0))
     store(work, TURN_1 + lane, dd.div(linear, a0))
     store(work, TURN_2 + lane, dd.div(last, a0))
-    store(work, RATE_G + lane, dd.mul(by_r, (-rates[2], -rates[3])))
-    store(work, RATE_K + lane, dd.mul(by_r, (rates[0], rates[1])))
+    store(work, RATE_G + lane, dd.mul(by_r, (-rates[SECOND_RATE], -rates[SECOND_RATE + 1])))
+    store(work, RATE_K + lane, dd.mul(by_r, (rates[FIRST_RATE], rates[FIRST_RATE + 1])))
     store(work, RATE_1 + lane, dd.div(dd.mul(b2, linear), c0))
     store(work, RATE_2 + lane, dd.div(dd.mul(b2, last), c0))
     for c in range(lane, lane + COLUMNS):
@@ -193,12 +197,10 @@ def extend(work, n):
     """Coefficient n + 1 of all series; the sum over its parity and the other one change places."""
     least = SMALL if n > FIRST else 0.0
     for i in range(LANES):
-        x, g, k, m = (
-            pair(work, NOW + X + i),
-            pair(work, NOW + G + i),
-            pair(work, NOW + K + i),
-            pair(work, NOW + M + i),
-        )
+        x = pair(work, NOW + X + i)
+        g = pair(work, NOW + G + i)
+        k = pair(work, NOW + K + i)
+        m = pair(work, NOW + M + i)
         off_x, off_g, off_k, off_m = (
             work[OFF + X + i],
             work[OFF + G + i],
@@ -283,10 +285,8 @@ def propagator(ends, doubt, step, off):
             s, bound = (0.0, 0.0), 0.0
             for n in range(4):
                 k, m, sign = (j + 2) % 4, (n + 2) % 4, 1.0 if (n < 2) == (j < 2) else -1.0
-                f, b = (
-                    (ends[0, 0, i, n], ends[0, 1, i, n]),
-                    (sign * ends[1, 0, k, m], sign * ends[1, 1, k, m]),
-                )
+                f = (ends[0, 0, i, n], ends[0, 1, i, n])
+                b = (sign * ends[1, 0, k, m], sign * ends[1, 1, k, m])
                 s = dd.add(s, dd.mul(f, b))
                 bound += (
                     doubt[0, i, n] * abs(b[0])
@@ -335,14 +335,10 @@ def finish(composed, spread, steps, out):
     row_bars(spread, steps, bars)
     for at in range(INVARIANTS - 1):
         i, j = 0 if at in (A, D) else 2, 0 if at in (A, C) else 2
-        a, b = (
-            (composed[0, i, j], composed[1, i, j]),
-            (composed[0, i, j + 1], composed[1, i, j + 1]),
-        )
-        c, d = (
-            (composed[0, i + 1, j], composed[1, i + 1, j]),
-            (composed[0, i + 1, j + 1], composed[1, i + 1, j + 1]),
-        )
+        a = (composed[0, i, j], composed[1, i, j])
+        b = (composed[0, i, j + 1], composed[1, i, j + 1])
+        c = (composed[0, i + 1, j], composed[1, i + 1, j])
+        d = (composed[0, i + 1, j + 1], composed[1, i + 1, j + 1])
         one, other = dd.mul(a, d), dd.mul(b, c)
         out[at], out[LOW + at] = dd.sub(one, other)
         bar = (
@@ -354,10 +350,8 @@ def finish(composed, spread, steps, out):
     t, bar = (0.0, 0.0), 0.0
     for i in range(2):
         for j in range(2):
-            a, b = (
-                (composed[0, i, j], composed[1, i, j]),
-                (composed[0, 2 + i, 2 + j], composed[1, 2 + i, 2 + j]),
-            )
+            a = (composed[0, i, j], composed[1, i, j])
+            b = (composed[0, 2 + i, 2 + j], composed[1, 2 + i, 2 + j])
             t = dd.add(t, dd.mul(a, b))
             bar += (
                 bars[i] * abs(b[0])

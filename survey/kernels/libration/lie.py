@@ -14,20 +14,30 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.lie_plan import (
+    BY,
     CLEAR,
+    COEFFICIENT_BAR,
     DELTA,
     DIVIDE,
     ETA,
     FACTOR,
     FINISH,
     FIRST,
+    FROM,
+    IMAGINARY,
     LAST,
     LINEAR,
     MULTIPLY,
+    NORM,
+    NORM_BAR,
+    NUMBER,
     ONE,
     OPERATION,
+    REAL,
+    SIGN,
     SOURCE,
     TARGET,
+    TO,
     XI,
 )
 from survey.kernels.math import double
@@ -48,9 +58,9 @@ NARROW = 1e-12  # a divisor below it is not divided by
 
 @kernel
 def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, norms):
-    """values (3, M, N): real and imaginary parts and bars of the M diagonal coefficients.
+    """values (3, M, N): REAL to COEFFICIENT_BAR of the M diagonal coefficients.
 
-    norms (measured, 2, 3, N): values and bars. NaN where mu lies outside (0, mu_R) or next to mu_R,
+    norms (measured, 2, 3, N): NORM, NORM_BAR. NaN where mu lies outside (0, mu_R) or next to mu_R,
     and in what a divisor below NARROW would enter.
     """
     big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), LANES))
@@ -61,9 +71,9 @@ def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, 
         run(code, indices, numbers, divisors, big, norms, first, count)
         for d in range(len(diagonal)):
             for i in range(count):
-                values[0, d, first + i] = big[diagonal[d], RE + i]
-                values[1, d, first + i] = big[diagonal[d], IM + i]
-                values[2, d, first + i] = big[diagonal[d], BAR + i] * SLACK
+                values[REAL, d, first + i] = big[diagonal[d], RE + i]
+                values[IMAGINARY, d, first + i] = big[diagonal[d], IM + i]
+                values[COEFFICIENT_BAR, d, first + i] = big[diagonal[d], BAR + i] * SLACK
 
 
 @inline
@@ -123,11 +133,11 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
         factor = np.uint64(code[c, FACTOR])
         if operation == MULTIPLY:
             for t in range(first, last):
-                _multiply(big[target + indices[0, t]], big[source + indices[1, t]], big[factor + indices[2, t]],
-                          numbers[0, t], numbers[1, t])  # fmt: skip
+                _multiply(big[target + indices[TO, t]], big[source + indices[FROM, t]], big[factor + indices[BY, t]],
+                          numbers[NUMBER, t], numbers[SIGN, t])  # fmt: skip
         elif operation == LINEAR:
             for t in range(first, last):
-                _linear(big[indices[0, t]], big[indices[1, t]], numbers[0, t])
+                _linear(big[indices[TO, t]], big[indices[FROM, t]], numbers[NUMBER, t])
         elif operation == CLEAR:
             for r in range(last):
                 row = big[target + np.uint64(r)]
@@ -139,10 +149,10 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
         elif operation == DIVIDE:
             for t in range(first, last):
                 _divide(
-                    big[target + indices[0, t]],
-                    big[source + indices[1, t]],
-                    divisors[indices[2, t]],
-                    numbers[0, t],
+                    big[target + indices[TO, t]],
+                    big[source + indices[FROM, t]],
+                    divisors[indices[BY, t]],
+                    numbers[SIGN, t],
                 )
         else:
             measure(
@@ -213,10 +223,12 @@ def measure(big, source, weights, first, last, out, real, imaginary, bar):
         for j in range(3):
             weight = 2.0 * float(weights[j, t])
             for i in range(out.shape[2]):
-                out[0, j, i] += weight * sqrt(
+                out[NORM, j, i] += weight * sqrt(
                     row[real + i] * row[real + i] + row[imaginary + i] * row[imaginary + i]
                 )
-                out[1, j, i] += weight * row[bar + i]
+                out[NORM_BAR, j, i] += weight * row[bar + i]
     for j in range(3):
         for i in range(out.shape[2]):
-            out[1, j, i] = out[1, j, i] * SLACK + (last - first + 4) * ROUNDOFF * out[0, j, i]
+            out[NORM_BAR, j, i] = (
+                out[NORM_BAR, j, i] * SLACK + (last - first + 4) * ROUNDOFF * out[NORM, j, i]
+            )

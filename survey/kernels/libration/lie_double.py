@@ -15,20 +15,29 @@ import numpy as np
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.lie import SLACK, K, frequencies, measure
 from survey.kernels.libration.lie_plan import (
+    BY,
     CLEAR,
+    COEFFICIENT_BAR,
     DELTA,
     DIVIDE,
     ETA,
     FACTOR,
     FINISH,
     FIRST,
+    FROM,
+    IMAGINARY,
+    LACK,
     LAST,
     LINEAR,
     MULTIPLY,
+    NUMBER,
     ONE,
     OPERATION,
+    REAL,
+    SIGN,
     SOURCE,
     TARGET,
+    TO,
     XI,
 )
 from survey.kernels.math import double
@@ -36,6 +45,8 @@ from survey.kernels.math import double
 LANES = 16
 RE, RE_LOW, IM, IM_LOW, SIZE, BAR = (n * LANES for n in range(6))
 WIDTH = 6 * LANES
+DIVISOR, DIVISOR_LOW, OFF = (n * LANES for n in range(3))
+DIVISOR_WIDTH = 3 * LANES
 # of one operation, relative: at most 7 squares of the unit roundoff, which is 2^-53
 DIGIT = 2.0**-103
 ROUND = 2.2 * DIGIT
@@ -47,7 +58,7 @@ NARROW = 1e-20  # a divisor below it is not divided by
 @kernel
 def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, norms):
     """As `lie.normal_forms`; the bars include the rounding of the values to float64."""
-    big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), 3 * LANES))
+    big, divisors = np.zeros((rows, WIDTH)), np.empty((len(harmonics), DIVISOR_WIDTH))
     for first in range(0, len(mu), LANES):
         count = min(LANES, len(mu) - first)
         for i in range(LANES):
@@ -56,8 +67,9 @@ def normal_forms(code, indices, numbers, harmonics, diagonal, rows, mu, values, 
         for d in range(len(diagonal)):
             row = big[diagonal[d]]
             for i in range(count):
-                values[0, d, first + i], values[1, d, first + i] = row[RE + i], row[IM + i]
-                values[2, d, first + i] = (
+                values[REAL, d, first + i] = row[RE + i]
+                values[IMAGINARY, d, first + i] = row[IM + i]
+                values[COEFFICIENT_BAR, d, first + i] = (
                     row[BAR + i] + abs(row[RE_LOW + i]) + abs(row[IM_LOW + i])
                 ) * SLACK
 
@@ -72,7 +84,7 @@ def _set(row, i, re, im, relative):
 
 @kernel
 def start(mu, i, harmonics, big, divisors):
-    """As `lie.start`; a divisor's row holds its high part, its low part and its relative error.
+    """As `lie.start`; a divisor's row holds DIVISOR, DIVISOR_LOW and OFF, its relative error.
 
     s^2 = 1 - 27 mu (1 - mu) has an absolute error of 6 DIGIT, since its terms are at most 1. So s
     has the error `e` below, v = (1 - s)/2 and u = 1 - v have at most 11 DIGIT + e/2, and their
@@ -105,9 +117,9 @@ def start(mu, i, harmonics, big, divisors):
         divisor = double.add(double.sub(double.times(w1, k1), double.times(w2, k2)), (k3, 0.0))
         size = abs(divisor[0])
         off = (abs(k1) + abs(k2)) * (known + 3.0 * DIGIT) + 3.0 * DIGIT * abs(k3)
-        divisors[n, i] = divisor[0] if size >= NARROW else nan
-        divisors[n, LANES + i] = divisor[1]
-        divisors[n, 2 * LANES + i] = off / size if off < 0.1 * size else inf
+        divisors[n, DIVISOR + i] = divisor[0] if size >= NARROW else nan
+        divisors[n, DIVISOR_LOW + i] = divisor[1]
+        divisors[n, OFF + i] = off / size if off < 0.1 * size else inf
 
 
 @kernel
@@ -119,11 +131,13 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
         factor = np.uint64(code[c, FACTOR])
         if operation == MULTIPLY:
             for t in range(first, last):
-                _multiply(big[target + indices[0, t]], big[source + indices[1, t]], big[factor + indices[2, t]],
-                          numbers[0, t], numbers[1, t])  # fmt: skip
+                _multiply(big[target + indices[TO, t]], big[source + indices[FROM, t]], big[factor + indices[BY, t]],
+                          numbers[NUMBER, t], numbers[SIGN, t])  # fmt: skip
         elif operation == LINEAR:
             for t in range(first, last):
-                _linear(big[indices[0, t]], big[indices[1, t]], numbers[0, t], numbers[1, t])
+                _linear(
+                    big[indices[TO, t]], big[indices[FROM, t]], numbers[NUMBER, t], numbers[LACK, t]
+                )
         elif operation == CLEAR:
             for r in range(last):
                 row = big[target + np.uint64(r)]
@@ -135,10 +149,10 @@ def run(code, indices, numbers, divisors, big, norms, lane, count):
         elif operation == DIVIDE:
             for t in range(first, last):
                 _divide(
-                    big[target + indices[0, t]],
-                    big[source + indices[1, t]],
-                    divisors[indices[2, t]],
-                    numbers[0, t],
+                    big[target + indices[TO, t]],
+                    big[source + indices[FROM, t]],
+                    divisors[indices[BY, t]],
+                    numbers[SIGN, t],
                 )
         else:
             measure(
@@ -201,11 +215,11 @@ def _finish(row):
 def _divide(out, f, divisor, sign):
     """out = sign f / divisor, f conjugated if sign = -1."""
     for i in range(LANES):
-        scale = double.div((sign, 0.0), (divisor[i], divisor[LANES + i]))
+        scale = double.div((sign, 0.0), (divisor[DIVISOR + i], divisor[DIVISOR_LOW + i]))
         re = double.mul(scale, (f[RE + i], f[RE_LOW + i]))
         im = double.mul(double.times(scale, sign), (f[IM + i], f[IM_LOW + i]))
         out[RE + i], out[RE_LOW + i], out[IM + i], out[IM_LOW + i] = re[0], re[1], im[0], im[1]
-        off = 1.2 * divisor[2 * LANES + i]
+        off = 1.2 * divisor[OFF + i]
         out[SIZE + i] = abs(scale[0]) * f[SIZE + i] * (1.0 + off) * SLACK
         out[BAR + i] = (
             abs(scale[0]) * f[BAR + i] * (1.0 + off) * SLACK

@@ -18,11 +18,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from survey.kernels.libration.monomials import brackets, monomials, norm, products
+from survey.kernels.libration.monomials import OUT, RIGHT, brackets, monomials, norm, products
 
 CLEAR, MULTIPLY, LINEAR, FINISH, DIVIDE, MEASURE = range(6)
 # A line of the code: the operation; rows of target, source and factor; first and last of the terms.
 OPERATION, TARGET, SOURCE, FACTOR, FIRST, LAST = range(6)
+# A term, in `indices`: rows of the target, of f and of g, past those of its line; of a quotient BY is
+# the divisor; of a norm the three are |k_1|, |k_2|, |k_3|.
+TO, FROM, BY = range(3)
+# In `numbers`: its factor, and the sign that says whether f is conjugated; of a multiple, what the
+# factor lacks.
+NUMBER, SIGN = range(2)
+LACK = SIGN
+# What the kernel fills of a coefficient, and of a norm.
+REAL, IMAGINARY, COEFFICIENT_BAR = range(3)
+NORM, NORM_BAR = range(2)
 # the rows set before the first operation, and the first other one
 XI, ETA, DELTA, ONE, WORK = 0, 4, 8, 9, 10
 NONE = -1
@@ -33,12 +43,8 @@ class Plan(NamedTuple):
     """What the kernel runs: arrays."""
 
     code: np.ndarray  # lines (n, OPERATION to LAST)
-    indices: np.ndarray  # (3, T) of the terms
-    numbers: (
-        np.ndarray
-        # (2, T): of a product its factor and the sign of f; of a multiple its factor and what that
-        # lacks
-    )
+    indices: np.ndarray  # (3, T) of the terms: TO, FROM, BY
+    numbers: np.ndarray  # (2, T) of the terms: NUMBER, SIGN
     harmonics: np.ndarray  # (m, 3) of the divisors
     diagonal: np.ndarray  # rows of the normal form's coefficients
     rows: int
@@ -78,9 +84,9 @@ class Draft:
 
     def multiply(self, name, terms, rows, target, source, factor):
         """target += the terms' sum, for the first `rows` rows of the target."""
-        first, _last = self.hold(terms[:3], terms[3:], name)
+        first, _last = self.hold(terms[: RIGHT + 1], terms[RIGHT + 1 :], name)
         self.add(
-            MULTIPLY, target, source, factor, first, first + int(np.searchsorted(terms[0], rows))
+            MULTIPLY, target, source, factor, first, first + int(np.searchsorted(terms[OUT], rows))
         )
 
     def linear(self, target, source, start, stop, number):
@@ -167,10 +173,8 @@ def solved(normal_forms, mu, order, remainders=False):
     norms (2, 3, N)}.
     """
     what, mu = plan(order, remainders), np.ascontiguousarray(mu, dtype=float)
-    values, norms = (
-        np.empty((3, len(what.diagonal), mu.size)),
-        np.empty((len(what.measured), 2, 3, mu.size)),
-    )
+    values = np.empty((3, len(what.diagonal), mu.size))
+    norms = np.empty((len(what.measured), 2, 3, mu.size))
     normal_forms(*what[:6], mu, values, norms)
     return values, dict(zip(what.measured, norms, strict=True))
 

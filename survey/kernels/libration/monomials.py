@@ -14,6 +14,8 @@ from itertools import product
 import numpy as np
 
 BASE = 64  # exponents are digits of a key
+# Rows of a table of terms: row of the product, row of f, index of g, C, sign of f.
+OUT, LEFT, RIGHT, NUMBER, SIGN = range(5)
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def monomials(degree, planar=False):
 
 @cache
 def products(degree, factor, planar=True):
-    """Terms (out, f, g, C, sign of f) of the product of polynomials of two degrees; f, out are
+    """Terms (OUT to SIGN, T) of the product of polynomials of two degrees; f, out are
     representatives' rows, g is an index among all monomials: out += C f g, where f is conjugated if
     its sign is -1."""
     f, g = monomials(degree, planar), monomials(factor, planar)
@@ -97,16 +99,14 @@ def brackets(degree, factor):
         number = (b * c - a * d) * (norm(g.harmonic) > 0)
         parts.append(_terms(monomials(degree + factor - 2), f, together, number))
     terms = np.concatenate(parts, axis=1)
-    return terms[:, np.lexsort((terms[2], terms[1], terms[0]))]
+    return terms[:, np.lexsort((terms[RIGHT], terms[LEFT], terms[OUT]))]
 
 
 def _terms(out, f, exponents, number):
-    """Columns (out row, f row, g index, C, sign) of the pairs with number != 0 whose product is a
-    representative.
-    """
+    """OUT to SIGN of the pairs with number != 0 whose product is a representative."""
     i, j = np.nonzero(number)
     index = out.find(exponents[i, j])
     kept = out.sign[index] > 0
     i, j, index = i[kept], j[kept], index[kept]
     terms = np.stack([out.row[index], f.row[i], j, number[i, j], f.sign[i]])
-    return terms[:, np.argsort(terms[0], kind="stable")]
+    return terms[:, np.argsort(terms[OUT], kind="stable")]

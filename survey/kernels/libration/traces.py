@@ -42,10 +42,8 @@ def measure(results, rtol, overflow, floats, verdict, collision, missed, status)
     for i in range(len(results)):
         if status[i] == 0:
             r = results[i]
-            values, bars = (
-                (r[A], r[B], r[C], r[D], r[T]),
-                (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR]),
-            )
+            values = (r[A], r[B], r[C], r[D], r[T])
+            bars = (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR])
             _settle(values, bars, i, rtol, overflow, floats, verdict, collision, missed, status)
 
 
@@ -139,10 +137,8 @@ def nearest(t, k, t_bar, k_bar):
     root, low = sqrt(max(k, 0.0)), sqrt(max(k - k_bar, 0.0))
     bar = t_bar + max(sqrt(k + k_bar) - root, root - low) + 4.0 * EPS
     one, two = t - 1.0 + root, t - 1.0 - root
-    gap, margin = (
-        one - two * (4.0 * two * two - 3.0),
-        bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar),
-    )
+    gap = one - two * (4.0 * two * two - 3.0)
+    margin = bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar)
     if gap > margin and two < -0.5 - bar:
         return MINUS_ONE
     return KREIN if gap < -margin or two > -0.5 + bar else UNDECIDED

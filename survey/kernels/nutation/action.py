@@ -105,10 +105,8 @@ def action(row):
     value = small(row, low, high)
     if value >= 0.0:
         return value, (64.0 * ROUNDOFF + noise + 2.5 * row[nu.NOISE_WIDTH]) * value
-    at_plus, at_minus = (
-        (row[nu.LOW_PLUS], row[nu.HIGH_PLUS]),
-        (row[nu.LOW_MINUS], row[nu.HIGH_MINUS]),
-    )
+    at_plus = (row[nu.LOW_PLUS], row[nu.HIGH_PLUS])
+    at_minus = (row[nu.LOW_MINUS], row[nu.HIGH_MINUS])
     square = 0.5 * nu.above(row, low * high)
     noise = row[nu.NOISE_LOW], row[nu.NOISE_HIGH], row[nu.NOISE_ABOVE]
     value, moved = positive(width, (low, high), square, at_plus, at_minus, noise)
@@ -128,10 +126,8 @@ def mend(work, answers):
             continue
         blur = (work[nl.BAR_V + i] + work[nl.BAR_W + i]) / width
         roots = (sqrt(work[nl.Q_LOW + i]), sqrt(work[nl.Q_HIGH + i]))
-        at_plus, at_minus = (
-            (work[nl.V_LOW + i], work[nl.V_HIGH + i]),
-            (work[nl.W_LOW + i], work[nl.W_HIGH + i]),
-        )
+        at_plus = (work[nl.V_LOW + i], work[nl.V_HIGH + i])
+        at_minus = (work[nl.W_LOW + i], work[nl.W_HIGH + i])
         value, _moved = positive(
             width, roots, 0.5 * work[nl.ABOVE + i], at_plus, at_minus, (0.0, 0.0, 0.0)
         )

@@ -82,9 +82,9 @@ def phase(row, theta, p_theta, start):
     bow = row[K] * width * width * left * done
     size = row[Q_LOW] * left + row[Q_HIGH] * done
     start[rc.START_BAR] = 8.0 * ROUNDOFF * min(v, w)
-    q, moved = (
-        size - bow,
-        (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[rc.START_BAR] / width,
+    q = size - bow
+    moved = (
+        (abs(row[Q_HIGH] - row[Q_LOW]) + abs(row[K]) * width * width) * start[rc.START_BAR] / width
     )
     rough = 16.0 * ROUNDOFF * (size + abs(bow)) + moved
     if q > 4.0 * rough:  # done left = c, done + left = 1
@@ -223,12 +223,10 @@ def heights_of_integrals(points, heights):
     for i in range(len(heights)):
         level, sign = points[rc.LEVEL, i], points[rc.SIGN, i]
         b, a = points[rc.P_PSI, i], points[rc.P_PHI, i]
-        pair, k, high, product = (
-            (level, 0.0),
-            (sign, 0.0),
-            dd.two_sum(level, sign),
-            dd.two_prod(a, b),
-        )
+        pair = (level, 0.0)
+        k = (sign, 0.0)
+        high = dd.two_sum(level, sign)
+        product = dd.two_prod(a, b)
         at_plus, at_minus = dd.sub(high, product)[0], dd.add(high, product)[0]
         found = barrier(
             a, b, k, about_equator(a, b, pair, k), looseness(a, b, 0.0), at_plus, at_minus

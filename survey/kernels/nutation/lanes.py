@@ -103,10 +103,8 @@ def polished(c0, c1, c2, c3, c4, x):
     what is left.
     """
     a0, a1, a2, a3, a4 = abs(c0[0]), abs(c1[0]), abs(c2[0]), abs(c3[0]), abs(c4[0])
-    size, steep = (
-        a0 + x * (a1 + x * (a2 + x * (a3 + x * a4))),
-        a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4)),
-    )
+    size = a0 + x * (a1 + x * (a2 + x * (a3 + x * a4)))
+    steep = a1 + x * (2.0 * a2 + x * (3.0 * a3 + x * 4.0 * a4))
     first = c1[0] + x * (2.0 * c2[0] + x * (3.0 * c3[0] + x * 4.0 * c4[0]))
     second = 2.0 * c2[0] + x * (6.0 * c3[0] + x * 12.0 * c4[0])
     inverse = 1.0 / first
@@ -240,10 +238,8 @@ def polish(work, i):
     """A step of Newton's method towards both turning points."""
     k, minus, plus = pair(work, K, i), pair(work, MINUS, i), pair(work, PLUS, i)
     c2, c3, c4 = dd.neg(dd.add(pair(work, L, i), dd.times(k, 5.0))), dd.times(k, 4.0), dd.neg(k)
-    at_plus, at_minus = (
-        dd.times(pair(work, PLUS_POLE, i), 2.0),
-        dd.times(pair(work, MINUS_POLE, i), 2.0),
-    )
+    at_plus = dd.times(pair(work, PLUS_POLE, i), 2.0)
+    at_minus = dd.times(pair(work, MINUS_POLE, i), 2.0)
     v, bar_v = polished(dd.neg(dd.mul(minus, minus)), at_plus, c2, c3, c4, work[V_HIGH + i])
     w, bar_w = polished(dd.neg(dd.mul(plus, plus)), at_minus, c2, c3, c4, work[W_LOW + i])
     store(work, V_HIGH, i, v)
@@ -257,11 +253,9 @@ def settle(work, i):
     k, level, v, w = pair(work, K, i), pair(work, L, i), pair(work, V_HIGH, i), pair(work, W_LOW, i)
     bar_v, bar_w = work[BAR_V + i], work[BAR_W + i]
     high, low = dd.shifted(dd.neg(v), 1.0), dd.shifted(w, -1.0)
-    v_low, w_high, total = (
-        dd.shifted(dd.neg(w), 2.0),
-        dd.shifted(dd.neg(v), 2.0),
-        dd.loose(w, dd.neg(v)),
-    )
+    v_low = dd.shifted(dd.neg(w), 2.0)
+    w_high = dd.shifted(dd.neg(v), 2.0)
+    total = dd.loose(w, dd.neg(v))
     width = (v_low[0] - v[0]) + (v_low[1] - v[1])
     rest, bow, double = dd.loose(level, dd.neg(k)), dd.mul(k, dd.square(total)), dd.scaled(k, 2.0)
     common = dd.loose(rest, bow)
@@ -392,10 +386,8 @@ def advance(gap, near, far, q_far, width, root_near, root_far, incline, bend, pe
     here, there = q_far * near, root_near * root_far * far
     both = here + there
     direct = near * both + 0.5 * width * (both + 0.5 * (here - there) * ratio)
-    first, second = (
-        incline * gap * gap,
-        0.25 * (root_far * near + root_near * far) * bend * ratio * near * far,
-    )
+    first = incline * gap * gap
+    second = 0.25 * (root_far * near + root_near * far) * bend * ratio * near * far
     part = 0.5 * period / (far * near * both if slanted else gap * line)
     value = part * (gap * direct if slanted else first + second)
     size = abs(value) if slanted else abs(part) * (abs(first) + abs(second))
@@ -436,10 +428,8 @@ def finish(work, size, drift, i, answers):
         else (25.0 * ROUNDOFF * rough, 2.0 * ROUNDOFF)
     )
     turned = 2.0 * ROUNDOFF * pi
-    precession, spin = (
-        pi * (turns_down + turns_up) + total,
-        pi * (turns_down - turns_up) + difference,
-    )
+    precession = pi * (turns_down + turns_up) + total
+    spin = pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
     rest = 0.5 * (

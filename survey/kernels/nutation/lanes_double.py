@@ -56,11 +56,9 @@ def prepare(work, i):
     k, near, far = pair(work, K, i), pair(work, Q_HIGH, i), pair(work, Q_LOW, i)
     high, low = dd.positive_root(near), dd.positive_root(far)
     g = dd.mul(high, low)
-    above, middle, bend = (
-        dd.loose(pair(work, MIDDLE, i), g),
-        pair(work, MIDDLE, i),
-        pair(work, BEND, i),
-    )
+    above = dd.loose(pair(work, MIDDLE, i), g)
+    middle = pair(work, MIDDLE, i)
+    bend = pair(work, BEND, i)
     if middle[0] < 0.0:  # (S10)
         width = dd.sub(pair(work, V_LOW, i), pair(work, V_HIGH, i))
         below = dd.scaled(dd.loose(g, dd.neg(middle)), 4.0)
@@ -89,11 +87,9 @@ def prepare(work, i):
 @inline
 def add_term(work, row, low_row, middle, root, i):
     """Add a term to the sum R (S12), see `lanes.take_mean`."""
-    rest, weight, total = (
-        pair(work, row + REST, i),
-        pair(work, row + WEIGHT, i),
-        pair(work, row + TOTAL, i),
-    )
+    rest = pair(work, row + REST, i)
+    weight = pair(work, row + WEIGHT, i)
+    total = pair(work, row + TOTAL, i)
     lower, e = dd.neg(rest), dd.shifted(dd.neg(rest), 1.0)
     term = dd.mul(weight, rest)
     low = work[low_row + i] == 1.0
@@ -142,12 +138,10 @@ def noise(work, i):
 
 @inline
 def finish(work, i):
-    high, low, incline, bow = (
-        pair(work, HIGH, i),
-        pair(work, LOW, i),
-        pair(work, INCLINE, i),
-        pair(work, BOW, i),
-    )
+    high = pair(work, HIGH, i)
+    low = pair(work, LOW, i)
+    incline = pair(work, INCLINE, i)
+    bow = pair(work, BOW, i)
     up = part(pair(work, MINUS, i), pair(work, V_HIGH, i), pair(work, V_LOW, i), high, low, incline, bow,
               pair(work, LINE_UP, i), pair(work, UP + TOTAL, i))  # fmt: skip
     down = part(pair(work, PLUS, i), pair(work, W_LOW, i), pair(work, W_HIGH, i), low, high, dd.neg(incline), bow,

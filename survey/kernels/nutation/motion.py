@@ -42,22 +42,20 @@ def since(far, near, middle, spread, ratio, rest, q_origin, root, width):
 
 @inline
 def locate(row, low, high, c, roots, kc, out):
-    """From (1 + c)/2, (1 - c)/2 and c, each with all its digits.
-
-    out = u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u) = g dn/(wl + wh), X0 + s of (S16)
-    from ul and uh.
+    """Fill `out` (LOCATED) from (1 + c)/2, (1 - c)/2 and c, each with all its digits; sqrt Q(u) = g
+    dn/(wl + wh).
     """
     left, right = roots[1] * low, roots[0] * high
     total = left + right
     left, right = left / total, right / total
-    out[1] = row[nu.LOW_PLUS] * left + row[nu.HIGH_PLUS] * right
-    out[2] = row[nu.LOW_MINUS] * left + row[nu.HIGH_MINUS] * right
-    out[0] = row[nu.LOW] * left + row[nu.HIGH] * right
-    out[3], out[4] = right, left
+    out[rc.TO_PLUS] = row[nu.LOW_PLUS] * left + row[nu.HIGH_PLUS] * right
+    out[rc.TO_MINUS] = row[nu.LOW_MINUS] * left + row[nu.HIGH_MINUS] * right
+    out[rc.HERE] = row[nu.LOW] * left + row[nu.HIGH] * right
+    out[rc.RISEN], out[rc.TO_RISE] = right, left
     g = roots[0] * roots[1]
-    out[5] = g * hypot(c, 2.0 * kc * sqrt(low * high)) / total
+    out[rc.ROOT] = g * hypot(c, 2.0 * kc * sqrt(low * high)) / total
     above = nu.above(row, g)
-    out[6], out[7] = above + g * c / high, above - g * c / low
+    out[rc.FROM_LOW], out[rc.FROM_HIGH] = above + g * c / high, above - g * c / low
 
 
 @inline
@@ -70,13 +68,29 @@ def angles(row, tau, half, down, at):
     if row[nu.MINUS] != 0.0:
         far = row[nu.LOW_PLUS]
         rest = tau / far + since(
-            far, at[1], at[6], spread, at[3], at[4], row[nu.Q_LOW], at[5], width
+            far,
+            at[rc.TO_PLUS],
+            at[rc.FROM_LOW],
+            spread,
+            at[rc.RISEN],
+            at[rc.TO_RISE],
+            row[nu.Q_LOW],
+            at[rc.ROOT],
+            width,
         )
         first = 0.5 * row[nu.MINUS] * rest
     if row[nu.PLUS] != 0.0:
         far = row[nu.HIGH_MINUS]
         rest = (half - tau) / far + since(
-            far, at[2], at[7], spread, at[4], at[3], row[nu.Q_HIGH], at[5], width
+            far,
+            at[rc.TO_MINUS],
+            at[rc.FROM_HIGH],
+            spread,
+            at[rc.TO_RISE],
+            at[rc.RISEN],
+            row[nu.Q_HIGH],
+            at[rc.ROOT],
+            width,
         )
         second = down - 0.5 * row[nu.PLUS] * rest
     return first, second
@@ -85,8 +99,8 @@ def angles(row, tau, half, down, at):
 @inline
 def rates(row, at):
     """(b - a)/(2(1 - u)) and (b + a)/(2(1 + u))."""
-    up = 0.5 * row[nu.MINUS] / at[1] if row[nu.MINUS] != 0.0 else 0.0
-    return up, (0.5 * row[nu.PLUS] / at[2] if row[nu.PLUS] != 0.0 else 0.0)
+    up = 0.5 * row[nu.MINUS] / at[rc.TO_PLUS] if row[nu.MINUS] != 0.0 else 0.0
+    return up, (0.5 * row[nu.PLUS] / at[rc.TO_MINUS] if row[nu.PLUS] != 0.0 else 0.0)
 
 
 @inline
@@ -106,7 +120,7 @@ def motion(cosine, row, start, period, times, out):
 
     cosine(z, kc, quarter, pairs, last) gives (1 + c)/2, (1 - c)/2 and c for z in [0, 2 K].
     """
-    pairs, at = np.empty((2, MEANS)), np.empty(8)
+    pairs, at = np.empty((2, MEANS)), np.empty(rc.LOCATED)
     roots = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
     g = roots[0] * roots[1]
     kc, rate = sqrt(0.5 * nu.above(row, g) / g), sqrt(g)
@@ -123,7 +137,9 @@ def motion(cosine, row, start, period, times, out):
     locate(row, low, high, c, roots, kc, at)
     first, second = angles(row, z0 / rate, half, down, at)
     base_up, base_down = start[rc.DIRECTION] * first, start[rc.DIRECTION] * second
-    start_delay = start[rc.START_BAR] / max(row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5], nu.TINY)
+    start_delay = start[rc.START_BAR] / max(
+        row[nu.WIDTH] * sqrt(at[rc.RISEN] * at[rc.TO_RISE]) * at[rc.ROOT], nu.TINY
+    )
     # an error of the initial phase shifts the start and what follows equally
     first_up, first_down = rates(row, at)
     z0 *= start[rc.DIRECTION]
@@ -148,13 +164,14 @@ def motion(cosine, row, start, period, times, out):
         change = abs(rate_up - first_up) + abs(rate_down - first_down)
         moved = (abs(rate_up) + abs(rate_down)) * delay + change * start_delay
         delay += start_delay
-        speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
+        speed = row[nu.WIDTH] * sqrt(at[rc.RISEN] * at[rc.TO_RISE]) * at[rc.ROOT]
         bend = (
             row[nu.WIDTH] * max(row[nu.Q_LOW], row[nu.Q_HIGH])
             + 4.0 * abs(row[nu.K]) * row[nu.WIDTH] ** 2
         )
         rounding = 3.0 * (row[nu.BAR_LOW] + row[nu.BAR_HIGH]) + 8.0 * ROUNDOFF * row[nu.WIDTH]
-        out[j, rc.U], out[j, rc.PSI], out[j, rc.PHI] = at[0], all_up + all_down, all_down - all_up
+        out[j, rc.U] = at[rc.HERE]
+        out[j, rc.PSI], out[j, rc.PHI] = all_up + all_down, all_down - all_up
         out[j, rc.U_BAR] = speed * delay + bend * delay * delay + rounding
         size = abs(first) + abs(second) + abs(base_up) + abs(base_down) + abs(up) + abs(down)
         turned = abs(n) * (period[rc.PRECESSION_BAR] + 4.0 * ROUNDOFF * (abs(up) + abs(down)))

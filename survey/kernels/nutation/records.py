@@ -24,6 +24,10 @@ MOTION = 6
 # Where a motion starts: (u0 - ul)/(uh - ul), 1 - that, the sign of u', the error of u0 in them.
 DONE, LEFT, DIRECTION, START_BAR = range(4)
 START = 4
+# A point on the way: u, 1 - u, 1 + u, (u - ul)/(uh - ul), 1 - that, sqrt Q(u), X0 + s of (S16) from ul
+# and from uh.
+HERE, TO_PLUS, TO_MINUS, RISEN, TO_RISE, ROOT, FROM_LOW, FROM_HIGH = range(8)
+LOCATED = 8
 # A height: L above the separatrix, its bar, |k|.
 ABOVE, ABOVE_BAR, FIELD = range(3)
 HEIGHT = 3

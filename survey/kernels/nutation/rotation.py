@@ -22,6 +22,8 @@ from survey.kernels.nutation.motion import angles, cosine_by_means, first_kind, 
 SINE, P_THETA, ACROSS = range(3)
 SINCE, PSI_SINCE, PHI_SINCE = range(3)
 PLACE = 3
+# Values, then their bounds.
+VALUES, BARS = range(2)
 FIRST_ORDER = 0.03  # of a radian of the nutation: greater errors of time are not of first order
 
 
@@ -41,10 +43,10 @@ def begin(row, start, period):
 
 @kernel
 def origins(rows, starts, periods, out):
-    """Fill `out` (n, 2, PLACE), values and bounds: SINCE in units of A, negative where u = ul comes
+    """Fill `out` (n, 2, PLACE), VALUES and BARS: SINCE in units of A, negative where u = ul comes
     after t = 0.
     """
-    at = np.empty(8)
+    at = np.empty(rc.LOCATED)
     for i in range(len(rows)):
         row, period = rows[i], periods[i]
         low, high, z, rate, quarter, kc = begin(row, starts[i], period)
@@ -52,13 +54,13 @@ def origins(rows, starts, periods, out):
         down = 0.25 * (period[rc.PRECESSION] + period[rc.SPIN])
         first, second = angles(row, z / rate, 0.5 * period[rc.PERIOD], down, at)
         side = starts[i, rc.DIRECTION]
-        out[i, 0, SINCE] = side * z / rate
-        out[i, 0, PSI_SINCE], out[i, 0, PHI_SINCE] = (
+        out[i, VALUES, SINCE] = side * z / rate
+        out[i, VALUES, PSI_SINCE], out[i, VALUES, PHI_SINCE] = (
             side * (first + second),
             side * (second - first),
         )
         relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
-        speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
+        speed = row[nu.WIDTH] * sqrt(at[rc.RISEN] * at[rc.TO_RISE]) * at[rc.ROOT]
         delay = (
             starts[i, rc.START_BAR] / max(speed, nu.TINY)
             + (16.0 * ROUNDOFF + relative) * (1.0 + quarter) / rate
@@ -68,22 +70,22 @@ def origins(rows, starts, periods, out):
             abs(first) + abs(second)
         )
         bar += period[rc.PRECESSION_BAR] + period[rc.SPIN_BAR] + 24.0 * ROUNDOFF * abs(down)
-        out[i, 1, SINCE], out[i, 1, PSI_SINCE], out[i, 1, PHI_SINCE] = delay, bar, bar
+        out[i, BARS, SINCE], out[i, BARS, PSI_SINCE], out[i, BARS, PHI_SINCE] = delay, bar, bar
         if delay * rate > FIRST_ORDER:
-            out[i, 1] = inf
+            out[i, BARS] = inf
 
 
 @kernel
 def fill_angles(rows, starts, periods, times, out):
-    """Fill `out` (n, m, 2, PLACE), values and bounds, at `times` (n, m), in units of A."""
-    pairs, at = np.empty((2, MEANS)), np.empty(8)
+    """Fill `out` (n, m, 2, PLACE), VALUES and BARS, at `times` (n, m), in units of A."""
+    pairs, at = np.empty((2, MEANS)), np.empty(rc.LOCATED)
     for i in range(len(rows)):
         row, period = rows[i], periods[i]
         low, high, z0, rate, quarter, kc = begin(row, starts[i], period)
         roots = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
         last = means(kc, pairs)
         locate(row, low, high, low - high, roots, kc, at)
-        speed = row[nu.WIDTH] * sqrt(at[3] * at[4]) * at[5]
+        speed = row[nu.WIDTH] * sqrt(at[rc.RISEN] * at[rc.TO_RISE]) * at[rc.ROOT]
         start_delay = starts[i, rc.START_BAR] / max(speed, nu.TINY)
         z0 *= starts[i, rc.DIRECTION]
         relative = period[rc.PERIOD_BAR] / period[rc.PERIOD]
@@ -102,36 +104,36 @@ def fill_angles(rows, starts, periods, times, out):
                 side = -1.0
             if row[nu.HIGH_PLUS] == 0.0 and n % 2.0 != 0.0:
                 side = -side
-            _fill_angles_at(row, at, rising, side, delay, out[i, j])
+            _place(row, at, rising, side, delay, out[i, j])
             if delay * rate > FIRST_ORDER:
-                out[i, j, 1] = inf
+                out[i, j, BARS] = inf
 
 
 @kernel
-def _fill_angles_at(row, at, rising, side, delay, out):
+def _place(row, at, rising, side, delay, out):
     """Of one time, from the numbers `at` of `motion.locate`; an error of time, `delay`, moves them
     by their slopes.
     """
-    width, near, far = row[nu.WIDTH], at[1], at[2]
+    width, near, far = row[nu.WIDTH], at[rc.TO_PLUS], at[rc.TO_MINUS]
     # P/(1 - u^2) = Q; a pole that is a turning point divides out
-    height = (1.0 if row[nu.HIGH_PLUS] == 0.0 else width * at[4] / near) * (
-        1.0 if row[nu.LOW_MINUS] == 0.0 else width * at[3] / far
+    height = (1.0 if row[nu.HIGH_PLUS] == 0.0 else width * at[rc.TO_RISE] / near) * (
+        1.0 if row[nu.LOW_MINUS] == 0.0 else width * at[rc.RISEN] / far
     )
-    sine, p_theta = sqrt(near * far), at[5] * sqrt(height)
+    sine, p_theta = sqrt(near * far), at[rc.ROOT] * sqrt(height)
     one = 0.5 * row[nu.MINUS] * sqrt(far / near) if row[nu.MINUS] != 0.0 else 0.0
     two = 0.5 * row[nu.PLUS] * sqrt(near / far) if row[nu.PLUS] != 0.0 else 0.0
     across, least = one + two, max(sine, nu.TINY)
     slope = (two - one) / least if one != 0.0 or two != 0.0 else 0.0
-    out[0, SINE], out[0, P_THETA], out[0, ACROSS] = (
+    out[VALUES, SINE], out[VALUES, P_THETA], out[VALUES, ACROSS] = (
         side * sine,
         -side * rising * p_theta,
         side * across,
     )
     noise = row[nu.NOISE_ENDS] + 16.0 * ROUNDOFF
     tilt = p_theta * delay + noise * min(near, far) / least
-    out[1, SINE] = abs(at[0]) * tilt + 4.0 * ROUNDOFF * sine
+    out[BARS, SINE] = abs(at[rc.HERE]) * tilt + 4.0 * ROUNDOFF * sine
     relative = 0.5 * (row[nu.NOISE_LOW] + row[nu.NOISE_HIGH]) + row[nu.NOISE_WIDTH] + noise
-    out[1, P_THETA] = (
-        abs(row[nu.K] * at[0]) * sine + abs(across * slope)
+    out[BARS, P_THETA] = (
+        abs(row[nu.K] * at[rc.HERE]) * sine + abs(across * slope)
     ) * delay + relative * p_theta
-    out[1, ACROSS] = abs(slope) * tilt + 8.0 * ROUNDOFF * (abs(one) + abs(two))
+    out[BARS, ACROSS] = abs(slope) * tilt + 8.0 * ROUNDOFF * (abs(one) + abs(two))

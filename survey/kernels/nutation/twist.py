@@ -103,20 +103,16 @@ def derivatives(row, out):
     width2 = width * width, 2.0 * (row[nu.NOISE_WIDTH] + ROUNDOFF) * width * width
     parts = x, width2, add(sines, cosines), sines, fifths
     # linear forms in c: W, u W, (1 - u) W, (1 + u) W, with c^1 over the width
-    both, total = (
-        add(low, high),
-        (row[nu.SUM], row[nu.BAR_LOW] + row[nu.BAR_HIGH] + ROUNDOFF * abs(row[nu.SUM])),
-    )
+    both = add(low, high)
+    total = (row[nu.SUM], row[nu.BAR_LOW] + row[nu.BAR_HIGH] + ROUNDOFF * abs(row[nu.SUM]))
     slope = div(mul(k, total), both)
     tilt = sub(scaled(mul(slope, total), 0.5), scaled(both, 0.25))
     end_low, end_high = (row[nu.LOW], row[nu.BAR_LOW]), (row[nu.HIGH], row[nu.BAR_HIGH])
     w = scaled(both, 0.5), slope
     uw = scaled(add(mul(high, end_low), mul(low, end_high)), 0.5), tilt
     plus_low, plus_high = (row[nu.LOW_PLUS], row[nu.BAR_LOW]), (row[nu.HIGH_PLUS], row[nu.BAR_HIGH])
-    minus_low, minus_high = (
-        (row[nu.LOW_MINUS], row[nu.BAR_LOW]),
-        (row[nu.HIGH_MINUS], row[nu.BAR_HIGH]),
-    )
+    minus_low = (row[nu.LOW_MINUS], row[nu.BAR_LOW])
+    minus_high = (row[nu.HIGH_MINUS], row[nu.BAR_HIGH])
     near = scaled(add(mul(high, plus_low), mul(low, plus_high)), 0.5), sub(slope, tilt)
     far = scaled(add(mul(high, minus_low), mul(low, minus_high)), 0.5), add(slope, tilt)
     # (b - a u) W, and (E + k u^2) W^2

@@ -34,7 +34,8 @@ def rotation(inertia, epsilon, rate):
     codes}, (4)-(7).
     """
     A1, A2, A3 = (bounded.of(A) for A in inertia)
-    e, square = bounded.of(epsilon), bounded.of(rate) * bounded.of(rate)
+    e = bounded.of(epsilon)
+    square = bounded.of(rate) * bounded.of(rate)
     over, other = A1 - A2, A1 - A3
     kappa = square - e
     two, three, free = over * kappa, other * kappa, A2 + A3 - A1
@@ -108,7 +109,8 @@ def _modes(a, b, c, d, verdict):
     inner = bounded.where(
         none, Bounded(0.0 * outer.value, abs(outer.value) + outer.bar), c / (a * outer)
     )
-    size, half = bounded.where(real, 1.0, c / a).sqrt(), b / (-2.0 * a)
+    size = bounded.where(real, 1.0, c / a).sqrt()
+    half = b / (-2.0 * a)
     # sqrt(x) = p + i q of complex x: 2 p^2 = |x| + Re x, 2 q^2 = |x| - Re x
     p, q = ((0.5 * clipped(size + side * half)).sqrt() for side in (1.0, -1.0))
     rises = [clipped(x).sqrt() for x in (inner, outer)]

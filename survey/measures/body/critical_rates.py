@@ -57,7 +57,8 @@ def _along_moment(name, low, high, fixed, axis, others):
     low, high = max(low, abs(y - z)), min(high, y + z)
     equal = {y, z} if name == axis else {fixed[axis]}
     cuts = sorted(x for x in equal if low < x < high)
-    points, complete = [], True
+    points = []
+    complete = True
     for first, last in pairwise([low, *cuts, high]):
         if not first < last:
             continue
@@ -85,10 +86,8 @@ def _side(A1, A2, A3):
 
 def _excess(A1, A2, A3, side, fixed):
     """Q (Bounded): positive where the rotation is fast enough."""
-    roots, turn = (
-        clebsch.roots(*map(bounded.of, (A1, A2, A3)), side),
-        bounded.of(A1) * fixed["Omega"],
-    )
+    roots = clebsch.roots(*map(bounded.of, (A1, A2, A3)), side)
+    turn = bounded.of(A1) * fixed["Omega"]
     return turn * turn - side * fixed["epsilon"] * (roots * roots)
 
 

@@ -116,7 +116,8 @@ def motion(inertia, here):
 
 def _excess(inertia, side, here):
     A1, A2, A3 = inertia
-    sine, omega = clebsch.roots(A1, A2, A3, side) / A1, bounded.of(here["Omega"])
+    sine = clebsch.roots(A1, A2, A3, side) / A1
+    omega = bounded.of(here["Omega"])
     return omega * omega - side * bounded.of(here["epsilon"]) * (sine * sine)
 
 

@@ -47,7 +47,8 @@ def of_fate(method, placed, rtol):
     fate.solve(method, placed.six, start, rtol, result, np.array([0]))
     for name in ("limit_phi", "limit_w", "multiplier"):
         result[f"{name}_error"] *= placed.widening
-    code, s = int(result["verdict"][0]), fate.remembered(method, placed.six)
+    code = int(result["verdict"][0])
+    s = fate.remembered(method, placed.six)
     if code in (kf.EQUILIBRIUM, kf.EQUILIBRIUM_START, kf.SADDLE):
         phi, bar = result["limit_phi"][0], result["limit_phi_error"][0]
         return result, _rest_of(s, phi, bar), transversal.at_rest(placed, phi, bar)

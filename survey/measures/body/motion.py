@@ -17,7 +17,8 @@ _REVERSED[B : B + 3] = _REVERSED[LAMBDA] = -1.0
 
 def trajectories(method, G, starts, times, rtol):
     """floats (rows, n, FLOATS) and status (rows, n) at `times` (rows, n), of either sign."""
-    floats, status = np.full((*times.shape, FLOATS), np.nan), np.zeros(times.shape, np.int64)
+    floats = np.full((*times.shape, FLOATS), np.nan)
+    status = np.zeros(times.shape, np.int64)
     for back in (False, True):
         mine = times < 0.0 if back else times >= 0.0
         picked = mine.any(axis=1)
@@ -40,14 +41,13 @@ def trajectories(method, G, starts, times, rtol):
 
 def _ahead(method, G, starts, times, rtol):
     order = np.argsort(times, axis=1, kind="stable")
-    ascending, back = np.take_along_axis(times, order, axis=1), np.argsort(order, axis=1)
+    ascending = np.take_along_axis(times, order, axis=1)
+    back = np.argsort(order, axis=1)
     floats, status = np.full((*times.shape, FLOATS), np.nan), np.full(times.shape, -1)
     left = np.arange(len(G))
     for tolerance in attempts(method, rtol):
-        new, ends = (
-            np.full((len(left), times.shape[1], FLOATS), np.nan),
-            np.zeros(len(left), np.int64),
-        )
+        new = np.full((len(left), times.shape[1], FLOATS), np.nan)
+        ends = np.zeros(len(left), np.int64)
         method.body_trajectories(
             np.ascontiguousarray(G[left]), np.ascontiguousarray(starts[left]), np.ascontiguousarray(ascending[left]),
             tolerance, STEPS * min(method.FLOW_WORK, 10), new, ends,

@@ -44,7 +44,7 @@ NAMES = (
 
 
 @dataclass(frozen=True)
-class System:
+class BodySystem:
     """A body in some axes: symmetric A, B, C (3, 3), lambda and s, and a state w, nu (3 each)."""
 
     A: np.ndarray
@@ -68,7 +68,7 @@ class System:
     def turned(self, Q):
         """The same in the axes that are the columns of Q."""
         tensors = (Q.T @ tensor @ Q for tensor in (self.A, self.B, self.C))
-        return System(
+        return BodySystem(
             *(0.5 * (t + t.T) for t in tensors),
             *(Q.T @ v for v in (self.moment, self.s, self.w, self.nu)),
         )
@@ -91,8 +91,9 @@ def _cross_matrix(v):
 
 
 def read(numbers):
-    """The System of one row of NAMES; None where A is not positive definite or gamma is 0."""
-    entries, tensors = dict(zip(NAMES, numbers, strict=True)), []
+    """The BodySystem of one row of NAMES; None where A is not positive definite or gamma is 0."""
+    entries = dict(zip(NAMES, numbers, strict=True))
+    tensors = []
     for tensor in TENSORS:
         matrix = np.empty((3, 3))
         for entry, (i, j) in ENTRIES.items():
@@ -105,7 +106,7 @@ def read(numbers):
     if not 0.0 < length < math.inf or not _positive(tensors[0]):
         return None
     vectors[3] = vectors[3] / length
-    return System(*tensors, *vectors)
+    return BodySystem(*tensors, *vectors)
 
 
 def _positive(matrix):
@@ -116,13 +117,13 @@ def _positive(matrix):
 
 @dataclass(frozen=True)
 class Placed:
-    """A System turned so that its axis of rotation is axis 1, and what the paper's conditions say
+    """A BodySystem turned so that its axis of rotation is axis 1, and what the paper's conditions say
     of it.
 
     On the set (`case` not OFF) the numbers that vanish there are exactly 0 in `system`.
     """
 
-    system: System
+    system: BodySystem
     turn: np.ndarray  # its axes in the body's own, by columns
     theta: float
     residuals: np.ndarray  # of CONDITIONS
@@ -144,10 +145,8 @@ class Placed:
 
         Each step of the flow counts four roundings of |f| |w| + |g|.
         """
-        b, c = (
-            np.hypot(*self.six[:2]),
-            np.hypot(0.5 * self.six[2], self.six[3]) + np.hypot(*self.six[4:]),
-        )
+        b = np.hypot(*self.six[:2])
+        c = np.hypot(0.5 * self.six[2], self.six[3]) + np.hypot(*self.six[4:])
         shares = [
             np.sum(bars) / size
             for bars, size in ((self.six_bars[:2], b), (self.six_bars[2:], c))
@@ -157,7 +156,7 @@ class Placed:
 
 
 def nearest(system):
-    """The Placed of a System: of its possible axes of rotation, the one on which it misses the set
+    """The Placed of a BodySystem: of its possible axes of rotation, the one on which it misses the set
     by least.
     """
     return min(
@@ -195,7 +194,8 @@ def frame(axis):
 def _placed(system, axis):
     Q = frame(axis)
     b = system.turned(Q)
-    a, norms = b.A[0, 0], [np.abs(x).max() for x in (b.A, b.B, b.C, b.moment, b.s)]
+    a = b.A[0, 0]
+    norms = [np.abs(x).max() for x in (b.A, b.B, b.C, b.moment, b.s)]
     cos, sin, phi0 = b.nu[0], math.hypot(b.nu[1], b.nu[2]), math.atan2(b.nu[1], b.nu[2])
     if abs(cos) <= ROUNDING:
         cos, sin = 0.0, 1.0
@@ -275,4 +275,4 @@ def _exact(b, case, cos, sin, phi0):
         s[0] = (C[0, 0] - C[2, 2]) * cos
     if case == VERTICAL:
         s[1:] = C[0, 1:] * cos
-    return System(A, B, C, moment, s, np.array([b.w[0], 0.0, 0.0]), nu)
+    return BodySystem(A, B, C, moment, s, np.array([b.w[0], 0.0, 0.0]), nu)

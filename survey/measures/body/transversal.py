@@ -79,12 +79,10 @@ def linear(placed):
         rows = (J @ columns)[1:4]
         return rows / np.array([unit, unit, sin])[:, None]
 
-    up, down, side, fast = (
-        matrix(0.0, 0.0, 1.0),
-        matrix(0.0, 0.0, -1.0),
-        matrix(0.0, 1.0, 0.0),
-        matrix(unit, 0.0, 1.0),
-    )
+    up = matrix(0.0, 0.0, 1.0)
+    down = matrix(0.0, 0.0, -1.0)
+    side = matrix(0.0, 1.0, 0.0)
+    fast = matrix(unit, 0.0, 1.0)
     constant = 0.5 * (up + down)
     M = np.ascontiguousarray([constant, (fast - up) / unit, side - constant, up - constant])
     slip = 4.0 * ROUNDING * np.linalg.cond(b.A)
@@ -194,7 +192,8 @@ def along(placed, start, rotates):
 
     Where the motion does not close within the bars, NOTHING.
     """
-    beside, p = linear(placed), np.ascontiguousarray(coefficients(*placed.six))
+    beside = linear(placed)
+    p = np.ascontiguousarray(coefficients(*placed.six))
     start, bars = np.array(start[:2], float), np.array(start[2:], float)
     found = [
         _monodromy(beside, p, start + side * bars, rotates)
@@ -243,7 +242,8 @@ def along(placed, start, rotates):
 
 def _monodromy(beside, p, start, rotates):
     """The matrix over a period and what the kernel notes of it; None where the motion does not close."""
-    matrix, notes = np.empty((kernel.SIZE, kernel.SIZE)), np.zeros(5)
+    matrix = np.empty((kernel.SIZE, kernel.SIZE))
+    notes = np.zeros(5)
     closed = kernel.monodromy(p, beside.M, beside.slip, start, bool(rotates), matrix, notes)
     return (
         (matrix, notes)
@@ -289,7 +289,8 @@ def steady(system, w, nu, off=0.0):
 
     `off` is what the state may be off. Where A nu vanishes it cannot: k always moves with w.
     """
-    J, momentum = system.jacobian(w, nu), system.A @ w + system.moment
+    J = system.jacobian(w, nu)
+    momentum = system.A @ w + system.moment
     tangent = _normal_to(nu)  # (3, 2)
     along_nu = system.A @ nu
     spins = _normal_to(along_nu)

@@ -78,11 +78,13 @@ def _trajectories(method, rtol, rows, times, served):
             results, _left_open(results, rtol), partial(solve, taylor_double), rows, times
         )
     results = solve(closed, rows, times)
-    missed, uncounted = solution.missed(results, rtol), results[1] == UNDETERMINED
+    missed = solution.missed(results, rtol)
+    floats, turnings, status = results
+    uncounted = turnings == UNDETERMINED
     if uncounted.any():
         missed |= uncounted
-        results[0][uncounted] = np.nan
-        results[2][uncounted & (results[2] == OK)] = closed.NO_CONVERGENCE
+        floats[uncounted] = np.nan
+        status[uncounted & (status == OK)] = closed.NO_CONVERGENCE
     return _further(solve, method, rtol, results, missed, rows, times)
 
 
@@ -117,7 +119,8 @@ def _left_open(results, rtol):
     """The points that double-double arithmetic may still answer: those that miss rtol, unless by
     too many steps or an overflow, and those that have turned an undetermined number of times.
     """
-    status, missed = results[-1], solution.missed(results, max(rtol, FINEST))
+    status = results[-1]
+    missed = solution.missed(results, max(rtol, FINEST))
     if missed.any():
         missed &= (
             (status == OK)
@@ -126,7 +129,8 @@ def _left_open(results, rtol):
             | (status == SEPARATRIX)
         )
     if len(results) == 3:
-        missed |= (results[1] == UNDETERMINED) & (status == OK)
+        _floats, turnings, _status = results
+        missed |= (turnings == UNDETERMINED) & (status == OK)
     return missed
 
 
@@ -139,7 +143,8 @@ def _completed(results, missed, solve, rows, columns):
     old = [result[some] for result in results]
     take = missed[some] & (solution.badness(others) <= solution.badness(old))
     if len(others) == 3:  # turnings that either knows are certain
-        np.copyto(others[1], old[1], where=others[1] == UNDETERMINED)
+        (_floats, known, _status), (_others, turnings, _other_status) = old, others
+        np.copyto(turnings, known, where=turnings == UNDETERMINED)
     for result, held, new in zip(results, old, others, strict=True):
         held[take] = new[take]
         result[some] = held

@@ -81,7 +81,7 @@ class Basins:
 
 
 @dataclass(frozen=True)
-class Map:
+class StartRange:
     """What of a whole survey decides how far curves are followed: the starts of one system, their
     largest |w|.
     """
@@ -91,7 +91,7 @@ class Map:
 
 
 def asked(request, names):
-    """The Map of a request for fates of systems with the parameters `names`; None if they are few,
+    """The StartRange of a request for fates of systems with the parameters `names`; None if they are few,
     or not known.
     """
     own = [request.lines.get(name) for name in ("phi0", "w0")]
@@ -106,7 +106,7 @@ def asked(request, names):
         return None  # how many belong to one system depends on values
     if math.prod(request.lines[name][0] for name in names if name in request.lines) > SYSTEMS:
         return None
-    return Map(size, max(abs(last[1]), abs(last[2])))
+    return StartRange(size, max(abs(last[1]), abs(last[2])))
 
 
 def cost(starts, each, system):
@@ -117,7 +117,7 @@ def cost(starts, each, system):
 
 
 def followed(method, six, s, starts, rtol, map_asked=None):
-    """`fate.followed`, of as few starts as can be where the Map `map_asked` says that there are many."""
+    """`fate.followed`, of as few starts as can be where the StartRange `map_asked` says that there are many."""
     basins = None
     if map_asked is not None and hasattr(method, "flow_pieces"):
         with _LOCK:  # threads that wait find it done
@@ -151,10 +151,8 @@ def found(method, s, rtol, map_asked):
     limits = _limits(s, scale)
     if limits is None:
         return None
-    top, most = (
-        min(max(map_asked.fastest, scale), 0.5 * limits.min()),
-        min(max(2 * map_asked.starts, PIECES[0]), PIECES[1]),
-    )
+    top = min(max(map_asked.fastest, scale), 0.5 * limits.min())
+    most = min(max(2 * map_asked.starts, PIECES[0]), PIECES[1])
     for cells in (COARSE, FINE):
         breaks, numbers, edges = _lattice(s, cells)
         falls = (_forces(s.p, 0.5 * (edges[1:] + edges[:-1])) < 0.0).astype(np.int64)
@@ -171,20 +169,19 @@ def found(method, s, rtol, map_asked):
     )
     pieces, curve = pieces[order], curve[order]
     keys = 2 * len(falls)
-    first, turning, resting = (
-        np.zeros(keys + 1, np.int64),
-        np.zeros(keys, np.int64),
-        np.zeros(keys, np.int64),
-    )
+    first = np.zeros(keys + 1, np.int64)
+    turning = np.zeros(keys, np.int64)
+    resting = np.zeros(keys, np.int64)
     if not kb.numbers(pieces, falls, first, turning, resting):
         return None
     gaps = len(pieces) + keys
-    links, seeds = np.zeros((2 * gaps + keys, 4), np.int64), np.zeros(len(curves) + 1, np.int64)
+    links = np.zeros((2 * gaps + keys, kb.LINK), np.int64)
+    seeds = np.zeros(len(curves) + 1, np.int64)
     size, cuts = kb.neighbours(pieces, order, curve, falls, first, turning, links, seeds)
     if size < 0:
         return None
     parent, turns, counts, loops = (
-        np.zeros(shape, np.int64) for shape in (gaps, gaps, gaps, (gaps, 2))
+        np.zeros(shape, np.int64) for shape in (gaps, gaps, gaps, (gaps, kb.LOOPS))
     )
     open_ = np.zeros(gaps, dtype=bool)
     kb.regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
@@ -348,9 +345,13 @@ def _fates(method, s, rtol, lattice, regions):
     for members, (one, two) in zip(regions_of, rows, strict=True):
         winds, counts = one[rc.NET_TURNS] != kf.NO_TURNS, one[rc.TURNINGS] >= 0
         loops = regions.loops[regions.parent[members[0]]]
-        if one[rc.VERDICT] == kf.UNDECIDED or not np.array_equal(one, two) or (winds and loops[0]):
+        if (
+            one[rc.VERDICT] == kf.UNDECIDED
+            or not np.array_equal(one, two)
+            or (winds and loops[kb.BY_TURNS])
+        ):
             continue
-        if (counts and loops[1]) or one[rc.TURNINGS] == kf.UNDETERMINED:
+        if (counts and loops[kb.BY_TURNINGS]) or one[rc.TURNINGS] == kf.UNDETERMINED:
             continue
         out[members] = _moved(
             np.tile(one, (len(members), 1)), regions.turns[members], regions.counts[members]

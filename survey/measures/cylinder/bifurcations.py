@@ -42,7 +42,7 @@ LATTICE = 2048  # angles at which roots are looked for
 
 
 @dataclass(frozen=True)
-class Plane:
+class ParameterPlane:
     """A map of two parameters, `fixed` being the others."""
 
     square: Square
@@ -157,7 +157,7 @@ def _spread(x):
 
 
 @dataclass(frozen=True)
-class Curve:
+class EquilibriumCurve:
     """Parameters xy(t) (m, 2), low <= t <= high, their error bounds bar(t), and the angle phi(t) of
     the equilibrium.
     """
@@ -170,7 +170,7 @@ class Curve:
 
 
 def _straight(plane, a, b, c, noise, phi=None):
-    """The Curve a x + b y + c = 0; noise(xy): error bound of the left side."""
+    """The EquilibriumCurve a x + b y + c = 0; noise(xy): error bound of the left side."""
     low, high = plane.square.low, plane.square.high
     steep = abs(a) * (high[0] - low[0]) >= abs(b) * (high[1] - low[1])
     along, (own, other) = (1, (a, b)) if steep else (0, (b, a))
@@ -185,7 +185,7 @@ def _straight(plane, a, b, c, noise, phi=None):
         return of(0.0 * t, (noise(xy(t)) + 4.0 * ROUNDOFF * (abs(c) + abs(other * t))) / abs(own))
 
     angle = None if phi is None else (lambda t: np.full(np.shape(t), phi))
-    return Curve(xy, bar, angle, low[along], high[along])
+    return EquilibriumCurve(xy, bar, angle, low[along], high[along])
 
 
 def _run(plane, curve, kind, tests=()):
@@ -200,7 +200,9 @@ def _run(plane, curve, kind, tests=()):
 
 def _drawn(plane, curve, kind, t):
     """One row of `found`."""
-    xy, bar, known = curve.xy(t), curve.bar(t), {}
+    xy = curve.xy(t)
+    bar = curve.bar(t)
+    known = {}
     # a point on the border to within its rounding is on it
     for border in (plane.square.low, plane.square.high):
         xy = np.where(abs(xy - border) <= bar, border, xy)
@@ -258,7 +260,7 @@ def _folds(plane):
     """g = g' = 0."""
     mine = [name for name in plane.axes if name in FORCES]
     if len(mine) == 2 and size(_rest(plane)) > 0.0:
-        curve = Curve(partial(_fold_at, plane), partial(_fold_bar, plane), np.asarray)
+        curve = EquilibriumCurve(partial(_fold_at, plane), partial(_fold_bar, plane), np.asarray)
         yield from _run(plane, curve, lambda t: "fold")
         yield from _marks(plane, curve, "cusp", partial(_bend, plane, curve))
     curves = [_all_at(plane, 0.5 * math.pi * k) for k in range(4)] if len(mine) == 2 else []
@@ -369,7 +371,7 @@ def _hopf_of_both(plane, name, side):
             0.0 * t, BARS * ROUNDOFF * size(plane.system(xy(t))) / abs(parts(other, phi(t))[0])
         )
 
-    return Curve(xy, bar, phi, plane.square.low[at], plane.square.high[at])
+    return EquilibriumCurve(xy, bar, phi, plane.square.low[at], plane.square.high[at])
 
 
 def _hopfs_at_rest(plane):
@@ -410,7 +412,8 @@ def _hopf(plane, curve):
     yield from _run(plane, curve, kind, (lambda t: slope(t)[0] < 0.0, lambda t: ends(t)[0] < 0.0))
     yield from _marks(plane, curve, "bogdanov_takens", slope)
     for mark in _marks(plane, curve, "generalised_hopf", ends):
-        if force(plane.system(mark[1]), mark[3]["equilibrium_phi"][0])[1][0] < 0.0:
+        _kind, xy, _error, known = mark
+        if force(plane.system(xy), known["equilibrium_phi"][0])[1][0] < 0.0:
             yield mark
 
 
@@ -422,10 +425,8 @@ def _ends(plane):
     rest = _rest(plane)
     slopes = {"b12": rest["s3"], "b31": -rest["s2"], "s3": rest["b12"], "s2": -rest["b31"]}
     a, b = (slopes.get(name, 0.0) for name in plane.axes)
-    both, c = (
-        {("b12", "s3"): 1.0, ("b31", "s2"): -1.0}.get(tuple(sorted(plane.axes)), 0.0),
-        constant(rest),
-    )
+    both = {("b12", "s3"): 1.0, ("b31", "s2"): -1.0}.get(tuple(sorted(plane.axes)), 0.0)
+    c = constant(rest)
     if both:
         curves = _hyperbola(plane, both, c)
     elif a or b:
@@ -448,22 +449,21 @@ def _hyperbola(plane, both, c):
             _straight(plane, 1.0, 0.0, 0.0, _nothing),
             _straight(plane, 0.0, 1.0, 0.0, _nothing),
         ]
-    ratio, found = -c / both, []
+    ratio = -c / both
+    found = []
 
     def curve(side, low, high):
         def xy(t):
             x = side * np.exp(t)
             return np.stack([x, ratio / x], axis=-1)
 
-        return Curve(xy, lambda t: 8.0 * ROUNDOFF * abs(xy(t)), None, low, high)
+        return EquilibriumCurve(xy, lambda t: 8.0 * ROUNDOFF * abs(xy(t)), None, low, high)
 
     for side in (1.0, -1.0):
         # log |x| where x has this sign, and where y has the sign that it has then, on the plane
         (x_low, x_high), (y_low, y_high) = _parts(plane, (side, math.copysign(side, side * ratio)))
-        low, high = (
-            max(x_low, math.log(abs(ratio)) - y_high),
-            min(x_high, math.log(abs(ratio)) - y_low),
-        )
+        low = max(x_low, math.log(abs(ratio)) - y_high)
+        high = min(x_high, math.log(abs(ratio)) - y_low)
         if low < high:
             beyond = 0.5 * (high - low)  # so that the borders are crossed
             found.append(curve(side, low - beyond, high + beyond))
@@ -483,7 +483,8 @@ def _parts(plane, signs):
 
 def _next_ends(plane, rest):
     """c23 (b12^2 - b31^2) - d b12 b31 = 0."""
-    axes, mine = plane.axes, [name for name in plane.axes if name in ("b12", "b31")]
+    axes = plane.axes
+    mine = [name for name in plane.axes if name in ("b12", "b31")]
     b12, b31, d, c23 = (rest[name] for name in ("b12", "b31", "d", "c23"))
     if not mine:
         slopes = {"d": -b12 * b31, "c23": (b12 - b31) * (b12 + b31)}
@@ -510,4 +511,4 @@ def _next_ends(plane, rest):
         return np.stack(np.broadcast_arrays(*((t, value) if at == 0 else (value, t))), axis=-1)
 
     bar = lambda t: 16.0 * ROUNDOFF * abs(xy(t))  # noqa: E731
-    return [Curve(xy, bar, None, plane.square.low[at], plane.square.high[at])]
+    return [EquilibriumCurve(xy, bar, None, plane.square.low[at], plane.square.high[at])]

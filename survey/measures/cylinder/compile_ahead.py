@@ -29,7 +29,8 @@ def of_functions(variables, options):
 
 
 def _compile(p, options):
-    question, none = options.get("question"), np.empty((0, rc.EXACT_START))
+    question = options.get("question")
+    none = np.empty((0, rc.EXACT_START))
     if question in ("fate", "portrait") and "separatrix" not in options:
         tables = np.empty((0, EQUILIBRIUM_SIZE)), *[np.empty((0, CYCLE_SIZE)) for _ in range(3)]
         sizes = np.zeros(kf.SIZES, np.int64)

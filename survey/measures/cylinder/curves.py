@@ -82,14 +82,14 @@ def searched(scene, square, axes, fixed, options):
         (flow,) = scene.flows(np.array([[fixed[p.name] for p in scene.own]]))
         found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, flow)]
         return joined(found, [output.name for output in ALONG])
-    plane = own_bifurcations.Plane(square, tuple(axes), fixed, scene)
+    plane = own_bifurcations.ScenePlane(square, tuple(axes), fixed, scene)
     return _of_parameters(plane, own_bifurcations.found)
 
 
 def closed(square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
     if set(axes) != set(STATE):
-        plane = bifurcations.Plane(square, tuple(axes), fixed)
+        plane = bifurcations.ParameterPlane(square, tuple(axes), fixed)
         return _of_parameters(plane, bifurcations.found)
     found = [
         (CLASSES[kind], *rest)

@@ -10,6 +10,7 @@ cycles nearly touch a saddle throughout, may be missed.
 
 import math
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,6 +35,17 @@ ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(3)
 # slowest and fastest rotation that is looked at, in velocities of the system
 LEAST, FASTEST = 1e-3, 30.0
 TWO_PI = 2.0 * math.pi
+
+
+class Node(NamedTuple):
+    """A return map at a coordinate: its class, its change (of log w), its slope less 1, and their bars."""
+
+    coordinate: float
+    own: int
+    change: float
+    slope: float
+    change_bar: float
+    slope_bar: float
 
 
 class Maps:
@@ -97,43 +109,45 @@ class Maps:
         for kind, coordinates in scans:
             yield from self._extrema(kind, coordinates)
 
+    def _node(self, kind, coordinate):
+        return Node(coordinate, *self.node(kind, coordinate))
+
     def _extrema(self, kind, coordinates):
-        nodes = [(x, *self.node(kind, x)) for x in coordinates]
+        nodes = [self._node(kind, x) for x in coordinates]
         for low, high in pairwise(nodes):
             parts = [low, high]
-            if low[1] != high[1]:
+            if low.own != high.own:
                 parts = self._beside(kind, low, high)
             for one, two in pairwise(parts):
-                if one[1] == two[1] > 0 and one[3] * two[3] < 0.0:
+                if one.own == two.own > 0 and one.slope * two.slope < 0.0:
                     x, a = self._extremum(kind, one, two)
-                    yield (kind, one[1]), two[3] > 0.0, x, a
+                    yield (kind, one.own), two.slope > 0.0, x, a
 
     def _beside(self, kind, low, high):
         """Nodes on both sides of the border of a class, that lies between two nodes."""
         ends = [low, high]
         one, two = low, high
         for _ in range(BISECTIONS):
-            x = 0.5 * (one[0] + two[0])
-            middle = (x, *self.node(kind, x))
-            one, two = (middle, two) if middle[1] == low[1] else (one, middle)
+            middle = self._node(kind, 0.5 * (one.coordinate + two.coordinate))
+            one, two = (middle, two) if middle.own == low.own else (one, middle)
         found = []
         for border, end in ((one, ends[0]), (two, ends[1])):
-            shares = 10.0 ** -np.arange(1.0, APPROACHES) if end[1] > 0 else np.zeros(0)
-            beside = [(x, *self.node(kind, x)) for x in border[0] + shares * (end[0] - border[0])]
+            shares = 10.0 ** -np.arange(1.0, APPROACHES) if end.own > 0 else np.zeros(0)
+            coordinates = border.coordinate + shares * (end.coordinate - border.coordinate)
+            beside = [self._node(kind, x) for x in coordinates]
             found += [end, *beside, border]
         return sorted(found)
 
     def _extremum(self, kind, one, two):
         """(coordinate, a) of the extremum between two nodes, to a few digits."""
         for _ in range(6):
-            share = min(max(one[3] / (one[3] - two[3]), 0.05), 0.95)
-            x = one[0] + share * (two[0] - one[0])
-            middle = (x, *self.node(kind, x))
-            if middle[1] != one[1]:
+            share = min(max(one.slope / (one.slope - two.slope), 0.05), 0.95)
+            middle = self._node(kind, one.coordinate + share * (two.coordinate - one.coordinate))
+            if middle.own != one.own:
                 break
-            one, two = (middle, two) if middle[3] * one[3] > 0.0 else (one, middle)
-        best = min((one, two), key=lambda node: abs(node[3]))
-        return best[0], best[2]
+            one, two = (middle, two) if middle.slope * one.slope > 0.0 else (one, middle)
+        best = min((one, two), key=lambda node: abs(node.slope))
+        return best.coordinate, best.change
 
 
 def found(plane):

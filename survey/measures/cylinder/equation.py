@@ -81,7 +81,7 @@ class Angle:
     ) = _rough
 
 
-class Record:
+class AngleRecord:
     """The operations on phi: a context for `multiprecision.lift`, with mpmath's functions where phi
     does not enter.
     """
@@ -89,7 +89,9 @@ class Record:
     def __init__(self):
         self.mp = multiprecision.context()
         self.operations = [(-1, 0, 0, 0.0)]
-        self._places, self._slopes, self._begun = {}, {}, set()
+        self._places = {}
+        self._slopes = {}
+        self._begun = set()
         self.angle = Angle(self, 0)
 
     def __getattr__(self, name):
@@ -216,7 +218,8 @@ class Record:
         if code == pg.CONSTANT:
             return None
         if code in (pg.PLUS, pg.FROM, pg.TIMES):
-            inner, factor = self.slope(first), {pg.PLUS: 1, pg.FROM: -1, pg.TIMES: number}[code]
+            inner = self.slope(first)
+            factor = {pg.PLUS: 1, pg.FROM: -1, pg.TIMES: number}[code]
             return None if inner is None else self.product(inner, factor)
         if code in (pg.ADD, pg.SUBTRACT):
             one, two = self.slope(first), self.slope(second)
@@ -308,7 +311,7 @@ def program(f, g, point, on_circle):
     or Raised.
     """
     with LOCK:
-        record = Record()
+        record = AngleRecord()
         p = [record.mp.mpf(value) for value in point]
         found = [recorded(h, name, record, p) for h, name in ((f, "f"), (g, "g"))]
         forces = len(record.operations)

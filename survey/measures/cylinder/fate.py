@@ -448,12 +448,10 @@ def _far_cycle(p, section, K, L, scale):
 
 def _librations(method, p, eqs, folded):
     """The Cycles of librations, by their right turning point, of every interval where g < 0."""
-    table, edges, fine, found = (
-        np.zeros((rt.MOST_CYCLES, rt.CYCLE_SIZE)),
-        np.zeros(rt.EDGES),
-        max(FINE, method.FLOW_FINEST),
-        0,
-    )
+    table = np.zeros((rt.MOST_CYCLES, rt.CYCLE_SIZE))
+    edges = np.zeros(rt.EDGES)
+    fine = max(FINE, method.FLOW_FINEST)
+    found = 0
     share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
@@ -525,10 +523,8 @@ def _by_tables(method, s, tolerance, more, known, starts):
     rows = [len(known[kind]) if kind in known else kf.NOT_KNOWN for kind in KINDS]
     stratum = kf.GENERIC if s.stratum == G else kf.REVERSIBLE
     sizes = np.array([len(s.equilibria), *rows, stratum, int(s.K < 0.0)])
-    size, limit = (
-        max(1, BATCH // (more * method.FLOW_WORK)),
-        min(more * STEPS * method.FLOW_WORK, MOST),
-    )
+    size = max(1, BATCH // (more * method.FLOW_WORK))
+    limit = min(more * STEPS * method.FLOW_WORK, MOST)
     for i in range(0, len(starts), size):
         part = np.ascontiguousarray(starts[i : i + size])
         method.flow_fates(

@@ -16,10 +16,8 @@ from survey.methods import taylor
 from survey.scene import Trajectory
 
 AROUND, POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001
-ON_CYLINDER, ON_PLANE = (
-    (("cylinder", "phi", "w"), ("lines", "t", "w")),
-    (("plane", "phi", "w"), ("lines", "t", "w")),
-)
+ON_CYLINDER = (("cylinder", "phi", "w"), ("lines", "t", "w"))
+ON_PLANE = (("plane", "phi", "w"), ("lines", "t", "w"))
 LINES = ("unstable_branch", "stable_branch", "unstable_cycle", "stable_cycle")
 ALONG = 601  # points of a branch or a cycle
 FURTHEST = 5.0 * np.pi  # rad, along a branch: what winds on would fill the picture

@@ -32,7 +32,7 @@ F0, F1, F2, G0, G1, G2, G3 = range(7)
 
 
 @dataclass(frozen=True)
-class Plane(bifurcations.Plane):
+class ScenePlane(bifurcations.ParameterPlane):
     """A map of two parameters of the `scene`, an AbelScene."""
 
     scene: object

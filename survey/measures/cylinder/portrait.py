@@ -8,6 +8,7 @@ cycle is followed again for its period, and the branches of the saddles are foll
 
 import math
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,17 @@ ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
 TINY = 1e-300
 
 
+class Listed(NamedTuple):
+    """A cycle: number `at` of point `i`, of a kind, its row of `returns`, and its system."""
+
+    i: int
+    at: int
+    kind: int
+    row: np.ndarray
+    skeleton: object
+    system: np.ndarray
+
+
 def empty(count, status, columns=0):
     """The outputs of `solve` for `count` rows of so many columns, filled with what does not apply."""
     own = columns > COLUMNS
@@ -69,7 +81,8 @@ def solve(method, systems, rtol):
     of `ends`.
     """
     own = systems.shape[1] > COLUMNS
-    result, listed = empty(len(systems), OK, systems.shape[1]), []
+    result = empty(len(systems), OK, systems.shape[1])
+    listed = []
     for i, six in enumerate(systems):
         s = outline(six)
         (_ends_of_program if own else _ends)(s, six, result, i)
@@ -95,12 +108,12 @@ def solve(method, systems, rtol):
         ]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
-        listed += [(i, at, kind, row, s, six) for at, (kind, row) in enumerate(cycles[:CYCLES])]
+        listed += [Listed(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
     for kinds, timed in (
         ((ROTATION_PLUS, ROTATION_MINUS), _rotations),
         ((LIBRATION,), _librations),
     ):
-        some = [cycle for cycle in listed if cycle[2] in kinds]
+        some = [cycle for cycle in listed if cycle.kind in kinds]
         if some:
             _write(some, timed(method, some, rtol), result)
     return result
@@ -130,10 +143,8 @@ def _rests(s, result, i):
     """Equilibria with their types, and their numbers, of point i; in the stratum I0 every angle is one."""
     kinds = s.equilibria[:, eq.KIND]
     if s.stratum != I0:
-        result["equilibria"][i], result["saddles"][i] = (
-            len(kinds),
-            np.count_nonzero(kinds == eq.SADDLE),
-        )
+        result["equilibria"][i] = len(kinds)
+        result["saddles"][i] = np.count_nonzero(kinds == eq.SADDLE)
     for at, row in enumerate(s.equilibria):
         result["equilibrium_phi"][i, at] = row[eq.ANGLE]
         result["equilibrium_phi_error"][i, at] = row[eq.BAR] + 1e-15

@@ -48,10 +48,8 @@ def invariants(a, bars):
     a0, a1, a2, a3, a4 = a.T
     b0, b1, b2, b3, b4 = bars.T
     sizes = np.abs(a).T
-    g2, g3 = (
-        a0 * a4 - 4 * a1 * a3 + 3 * a2**2,
-        a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2**3 - a4 * a1**2 - a0 * a3**2,
-    )
+    g2 = a0 * a4 - 4 * a1 * a3 + 3 * a2**2
+    g3 = a0 * a2 * a4 + 2 * a1 * a2 * a3 - a2**3 - a4 * a1**2 - a0 * a3**2
     s0, s1, s2, s3, s4 = sizes
     d2 = (
         b0 * s4
@@ -108,7 +106,8 @@ def _discs(rows, bars, zeros):
     The bounds of the coefficients are `bars`.
     """
     degree = rows.shape[1] - 1
-    one, companion = np.eye(degree), np.zeros((len(rows), degree - zeros, degree - zeros))
+    one = np.eye(degree)
+    companion = np.zeros((len(rows), degree - zeros, degree - zeros))
     companion[:, 1:, :-1] = np.eye(degree - zeros)[1:, 1:]
     companion[:, :1] = -rows[:, None, 1 : degree - zeros + 1] / rows[:, :1, None]
     z = np.zeros((len(rows), degree), complex)

@@ -97,7 +97,8 @@ def _flipped(p):
 
 def _branches(window, s):
     """Both stable branches of every saddle."""
-    p, starts = _flipped(s.p), np.zeros((2 * max(len(s.equilibria), 1), rc.START))
+    p = _flipped(s.p)
+    starts = np.zeros((2 * max(len(s.equilibria), 1), rc.START))
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
     if not len(saddles):
         return
@@ -230,7 +231,8 @@ def _levels(window, s):
     for row in s.equilibria:
         if row[eq.KIND] != eq.SADDLE:
             continue
-        level, known = Level(s.p, row), {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
+        level = Level(s.p, row)
+        known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
         for side in (1.0, -1.0):
             far, turns = far_end(level, s, side)
             if not turns and side < 0.0 and abs(far) >= TWO_PI:

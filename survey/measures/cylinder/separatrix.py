@@ -63,7 +63,8 @@ def trajectories(method, rows, times, rtol, stable, left):
 
 def abel(method, rows, targets, rtol, stable, left):
     """As `solution.abel`, and the HEADS of each row; with None the best method is chosen."""
-    floats, status = np.full((*targets.shape, rc.STATE), np.nan), np.zeros(targets.shape, np.int64)
+    floats = np.full((*targets.shape, rc.STATE), np.nan)
+    status = np.zeros(targets.shape, np.int64)
     starts = Starts(method, rows, stable, left)
     side, sign_w = (-1.0 if left else 1.0), (-1.0 if stable != left else 1.0)
     order = np.argsort(side * targets, axis=1, kind="stable")
@@ -88,15 +89,14 @@ class Starts:
     """
 
     def __init__(self, method, rows, stable, left):
-        self.heads, self.status = (
-            np.full((len(rows), HEADS), np.nan),
-            np.full(len(rows), INVALID_PARAMETERS),
-        )
+        self.heads = np.full((len(rows), HEADS), np.nan)
+        self.status = np.full(len(rows), INVALID_PARAMETERS)
         plain, _starts = solution.split(rows)
         turned = solution.reverse(rows) if stable else rows
         turned = solution.mirror(turned) if left else turned
         self.P, starts = solution.split(turned)
-        self.phi0, self.branches = starts[:, rc.START_PHI].copy(), [None] * len(rows)
+        self.phi0 = starts[:, rc.START_PHI].copy()
+        self.branches = [None] * len(rows)
         for i in range(len(rows)):
             at_saddle = np.zeros(separatrix.SADDLE)
             if not separatrix.saddle(plain[i], rows[i, rc.NUMBER], at_saddle):
@@ -139,10 +139,8 @@ class Starts:
 
     def at(self, i, times):
         """floats, turnings, and the status where there are none, at ascending times of row i."""
-        floats, turnings = (
-            np.full((len(times), rc.STATE), np.nan),
-            np.full(len(times), UNDETERMINED),
-        )
+        floats = np.full((len(times), rc.STATE), np.nan)
+        turnings = np.full(len(times), UNDETERMINED)
         first, a, branch = self.branches[i]
         if a is not None:
             status = branch_double.trajectory(
@@ -160,7 +158,8 @@ class Starts:
 
     def passing(self, i, targets):
         """floats and status at ascending targets of row i."""
-        floats, status = np.full((len(targets), rc.STATE), np.nan), np.zeros(len(targets), np.int64)
+        floats = np.full((len(targets), rc.STATE), np.nan)
+        status = np.zeros(len(targets), np.int64)
         first, a, branch = self.branches[i]
         if a is not None:
             branch_double.abel(self.P[i], first, a, branch, self.phi0[i], targets, floats, status)
@@ -230,7 +229,8 @@ def branch_of(row):
     `row` holds six parameters, phi0 and w0 != 0, of which it is known that H(phi0, w0) is exactly
     that of a saddle. None if that saddle is not found, or phi0 is not reached from it.
     """
-    p, at_saddle = solution.split(np.array([row]))[0][0], np.zeros(separatrix.SADDLE)
+    p = solution.split(np.array([row]))[0][0]
+    at_saddle = np.zeros(separatrix.SADDLE)
     (d, c23, s2, s3), phi0, w0 = row[OF_G], row[rc.PHI0], row[rc.W0]
     level = w0 * w0 - quartic.square_of_w(d, c23, s2, s3, phi0)[0]
     missed = []

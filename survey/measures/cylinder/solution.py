@@ -60,10 +60,8 @@ def attempts(method, rtol):
 def split(rows):
     """Rows of GIVEN numbers (see `records`) as the kernels take them: coefficients and initial states."""
     own = rows.shape[1] > rc.GIVEN
-    P, starts = (
-        np.empty((len(rows), rows.shape[1] - (rc.GIVEN - rc.SIX) if own else COLUMNS)),
-        np.empty((len(rows), rc.EXACT_START)),
-    )
+    P = np.empty((len(rows), rows.shape[1] - (rc.GIVEN - rc.SIX) if own else COLUMNS))
+    starts = np.empty((len(rows), rc.EXACT_START))
     (spread_programs if own else spread)(np.ascontiguousarray(rows, dtype=float), P, starts)
     P.flags.writeable = own
     return P, starts
@@ -157,10 +155,8 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
     if len(rows) and (past == past[0]).all() and (targets >= phi0).all():  # as a rule
         return _branch(method, rows, targets, rtol, 1.0, past[0], by_row)
-    floats, status = (
-        np.full((*targets.shape, rc.STATE), np.nan),
-        np.zeros(targets.shape, dtype=np.int64),
-    )
+    floats = np.full((*targets.shape, rc.STATE), np.nan)
+    status = np.zeros(targets.shape, dtype=np.int64)
     for side in (1.0, -1.0):
         onward = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):

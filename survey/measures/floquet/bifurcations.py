@@ -72,7 +72,8 @@ def neimark_sacker(M, E):
 def collision(M, E):
     """The discriminant."""
     n, m = M.shape[1], M.shape[1] // 2
-    power, bar = np.broadcast_to(np.eye(n), M.shape), np.zeros_like(M)
+    power = np.broadcast_to(np.eye(n), M.shape)
+    bar = np.zeros_like(M)
     traces, bars = np.full((2, 2 * m - 1, len(M)), float(2 * m))
     bars[0] = 0.0
     for k in range(1, 2 * m - 1):
@@ -145,7 +146,8 @@ def passing(M, E, kind, structure):
     The angle is the argument of the multiplier, from 0 to pi, and `outside` the number of the
     others that are certainly outside the unit circle, NaN where the error bounds allow several.
     """
-    discs, rows = Discs(monodromy.Matrices.plain(M, E)), np.arange(len(M))
+    discs = Discs(monodromy.Matrices.plain(M, E))
+    rows = np.arange(len(M))
     centre, bars, n = discs.centre, discs.bars, M.shape[1]
     own = np.zeros(centre.shape, bool)
     paired = structure != "none"
@@ -154,11 +156,9 @@ def passing(M, E, kind, structure):
             goal = 1.0 if kind == PLUS_ONE else -1.0
             order = np.argsort(abs(centre - goal), axis=1)[:, : 2 if paired else 1]
             own[rows[:, None], order] = True
-            sure, angle, bar = (
-                np.ones(len(M), bool),
-                np.full(len(M), np.pi * (goal < 0)),
-                np.zeros(len(M)),
-            )
+            sure = np.ones(len(M), bool)
+            angle = np.full(len(M), np.pi * (goal < 0))
+            bar = np.zeros(len(M))
             bar += EPS * angle
         else:
             upper = centre.imag > bars

@@ -12,5 +12,6 @@ def compile_ahead(variables, options):
     steps.compile_others()
     yield
     steps.compile_further()
-    real, vectors = np.zeros((1, 1, 1)), np.ones((1, 1, 1), np.complex128)
+    real = np.zeros((1, 1, 1))
+    vectors = np.ones((1, 1, 1), np.complex128)
     discs.couplings(real, real, real, vectors[0], vectors, vectors, real.copy())

@@ -49,7 +49,7 @@ class Range(NamedTuple):
 
 
 @dataclass
-class Curve:
+class ContinuedCurve:
     """Points y (K, m) of a curve, its tangents, and the sizes that lengths are relative to. y ends with l."""
 
     y: np.ndarray
@@ -109,7 +109,7 @@ def _bisected(c, values, low, high):
     return 0.5 * (low + high)
 
 
-class Curves:
+class ContinuedCurves:
     """The curves of each of R rows, sets of parameters whose continued one does not matter.
 
     begin(points) gives [(states (R, n), periods (R))] from which Newton's method begins; the start
@@ -154,7 +154,7 @@ class Curves:
             joined = [np.concatenate([b[:0:-1], a]) for a, b in zip(there, back, strict=True)]
             joined[1][: max(len(back[0]) - 1, 0)] *= -1.0
             if len(joined[0]) > 1:
-                self.of_row[i].append(Curve(*joined))
+                self.of_row[i].append(ContinuedCurve(*joined))
 
     def _known(self, i, share, orbits, k):
         for curve in self.of_row[i]:
@@ -194,7 +194,8 @@ class _Walk:
         self.curves, self.rows, self.y = curves, rows, y.copy()
         self.n, self.free, self.equation = curves.equation.n, curves.free, curves.equation
         K, m = y.shape
-        self.step, self.kept = np.full(K, FIRST_STEP), [([], [], []) for _ in range(K)]
+        self.step = np.full(K, FIRST_STEP)
+        self.kept = [([], [], []) for _ in range(K)]
         self.size, self.tangent, self.plane = (
             np.ones((K, m)),
             np.zeros((K, m)),
@@ -245,7 +246,9 @@ class _Walk:
         """Move these tasks to the curve near y, across their tangents, if these turn by less than
         `most`; where.
         """
-        done, lost, last = np.zeros(len(y), bool), np.zeros(len(y), bool), self.step[those]
+        done = np.zeros(len(y), bool)
+        lost = np.zeros(len(y), bool)
+        last = self.step[those]
         tangent, size = np.empty_like(y), np.empty_like(y)
         for _ in range(CORRECTIONS):
             busy = np.flatnonzero(~done & ~lost)
@@ -345,11 +348,9 @@ def rough_flow(equation, points, x, T, derived=True):
     rounding; or NaN.
     """
     N, n = x.shape
-    X, M, size = (
-        np.full((N, n), np.nan),
-        np.full((N * derived, n, n), np.nan),
-        np.full((N, n), np.nan),
-    )
+    X = np.full((N, n), np.nan)
+    M = np.full((N * derived, n, n), np.nan)
+    size = np.full((N, n), np.nan)
     usable = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0))
     for inside, programs in equation.traced(points[usable], x[usable]):
         own = usable[inside]

@@ -69,7 +69,7 @@ class Critical(Equation):
 
     @property
     def angle_at(self):
-        """The place of the angle, or of the drift."""
+        """The index of the angle, or of the drift."""
         return self.moving
 
     @property
@@ -79,12 +79,12 @@ class Critical(Equation):
 
     @property
     def period_at(self):
-        """The place of T, if it is unknown."""
+        """The index of T, if it is unknown."""
         return self.moving + (self.kind == NEIMARK_SACKER or self.drifts)
 
     @property
     def parameters_at(self):
-        """The place of the first of the varied parameters."""
+        """The index of the first of the varied parameters."""
         return self.period_at + self.free
 
     @property

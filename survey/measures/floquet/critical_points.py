@@ -27,7 +27,7 @@ CHUNK = 64  # orbits that are shown to exist together
 
 
 @dataclass
-class Shown:
+class ShownCritical:
     """Which orbits exist; bounds of their y; their M by x(0) alone, with bounds, and f at x(0),
     with bounds.
     """
@@ -41,7 +41,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class Points:
+class CriticalPoints:
     """Of one `critical` equation; `given`: all parameters. The varied ones change by `scale`,
     relative if `log`.
     """
@@ -68,11 +68,9 @@ class Points:
     def flow(self, y, derived=True, reach=ROUGH_REACH, tolerance=ROUGH):
         """y(1) from y(0) = y (N, size), its derivatives, the largest moduli; NaN where there is none."""
         (N, n), points = y.shape, self.parameters(y)
-        X, M, size = (
-            np.full((N, n), np.nan),
-            np.full((N * derived, n, n), np.nan),
-            np.full((N, n), np.nan),
-        )
+        X = np.full((N, n), np.nan)
+        M = np.full((N * derived, n, n), np.nan)
+        size = np.full((N, n), np.nan)
         usable = np.flatnonzero(np.isfinite(y).all(axis=1))
         for inside, programs in self.critical.traced(points[usable], y[usable]):
             own = usable[inside]
@@ -86,7 +84,8 @@ class Points:
 
     def slopes(self, y):
         """x' (N, n) at t = 0."""
-        points, found = self.parameters(y), np.full((len(y), self.critical.n), np.nan)
+        points = self.parameters(y)
+        found = np.full((len(y), self.critical.n), np.nan)
         for own, programs in self.critical.traced(points, y):
             found[own] = programs.slopes(programs.numbers(points[own]), np.zeros(own.size), y[own])[
                 0
@@ -170,7 +169,8 @@ class Points:
         )
         y, good, _slope, _size = self.newton(y, rows, values)
         # to rounding
-        near, how = np.flatnonzero(good), {"reach": self.reach, "tolerance": ROUNDOFF}
+        near = np.flatnonzero(good)
+        how = {"reach": self.reach, "tolerance": ROUNDOFF}
         fine, found, _slope, _size = self.newton(y[near], rows[near], values[near], how, CONVERGED)
         y[near], good[near] = fine, found
         return y, good
@@ -182,12 +182,11 @@ class Points:
         `how` the flow is computed; `last` and `first`: the longest steps.
         """
         (N, n), y = y.shape, y.copy()
-        found, live, most = (
-            np.zeros(N, bool),
-            np.flatnonzero(np.isfinite(y).all(axis=1)),
-            np.full(N, first),
-        )
-        slopes, sizes = np.full((N, self.critical.moving, n), np.nan), np.ones((N, n))
+        found = np.zeros(N, bool)
+        live = np.flatnonzero(np.isfinite(y).all(axis=1))
+        most = np.full(N, first)
+        slopes = np.full((N, self.critical.moving, n), np.nan)
+        sizes = np.ones((N, n))
         for _ in range(TRIALS):
             if not live.size:
                 break
@@ -205,9 +204,9 @@ class Points:
         return y, found, slopes, sizes
 
     def shown(self, y, rows, values):
-        """Shown of the orbits near y under these conditions too."""
+        """ShownCritical of the orbits near y under these conditions too."""
         n, (N, size) = self.critical.n, y.shape
-        out = Shown(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
+        out = ShownCritical(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
                     *np.full((2, N, n), np.nan))  # fmt: skip
         own_rows, own_values = self.conditions(y)
         rows, values = (
@@ -230,7 +229,7 @@ class Points:
             return
         which, y, rows, values = which[there], y[there], rows[there], values[there]
         numbers = existence.chosen(numbers, there)
-        path = existence.Path(programs, numbers, y, span[there], counts[there], self.reach)
+        path = existence.OrbitSteps(programs, numbers, y, span[there], counts[there], self.reach)
         path.enough = existence.WIDEST * path.extent
         path.propagate(self.method)
         left = np.arange(len(y))
@@ -254,10 +253,8 @@ class Points:
         f, df = programs.slopes(numbers, np.zeros(len(y)), y, dy)
         out.good[which], out.dy[which] = True, dy
         out.M[which], out.dM[which] = M[:, :n, :n], E[:, :n, :n]
-        out.f[which], out.df[which] = (
-            f[:, :n],
-            existence.WIDER * df[:, :n] + 8 * EPS * abs(f[:, :n]),
-        )
+        out.f[which] = f[:, :n]
+        out.df[which] = existence.WIDER * df[:, :n] + 8 * EPS * abs(f[:, :n])
 
 
 def certified(path, y, rows, values, signs, factor):
@@ -265,7 +262,10 @@ def certified(path, y, rows, values, signs, factor):
     the module.
     """
     N, n = y.shape
-    m, point, last, s = len(signs), path.point, path.last, path.scale
+    m = len(signs)
+    point = path.point
+    last = path.last
+    s = path.scale
     delta = path.defect / s[point]
     wide, off = path.spread_of(delta)
     M, E, R = np.empty((3, N, n, n))

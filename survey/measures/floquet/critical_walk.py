@@ -17,7 +17,7 @@ CUSP = 1e-3  # of the map: the longest chord across a cusp
 
 
 class Walk:
-    """Follows curves of `points` (a `critical_points.Points`); positions(y) are those on the map."""
+    """Follows curves of `points` (`CriticalPoints`); positions(y) are those on the map."""
 
     def __init__(self, points, square, positions):
         self.points, self.square, self.positions = points, square, positions
@@ -45,7 +45,10 @@ class Walk:
 
     def _half(self, seed, sense):
         """Points after the seed to one side, their borders, and whether the curve closes."""
-        y, step, found, borders = seed, FIRST_STEP, [], []
+        y = seed
+        step = FIRST_STEP
+        found = []
+        borders = []
         _value, slope, size = self.points.linearised(seed[None])
         slope, size = slope[0], size[0]
         tangent = self._tangent(y, slope, size, None)

@@ -80,7 +80,9 @@ def searched(scene, square, axes, fixed, options):
             return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
         structure, number = "reversible", LINES_OF_ORBITS
         orbits = scene.family(square, axes, fixed, number)
-        matrices, roughly, on_lattice = orbits.matrices, orbits.rough, orbits.on_lattice()
+        matrices = orbits.matrices
+        roughly = orbits.rough
+        on_lattice = orbits.on_lattice()
     else:
         structure, number, roughly = scene.structure, LINES, None
         matrices = matrices_of(scene, square, axes, fixed, options)
@@ -133,10 +135,8 @@ def searched(scene, square, axes, fixed, options):
         )
         indices = partial(of_axis, rtol=ROUGH), names
         return _on_border(square, matrices, indices, structure, on_lattice, found)
-    drawn, passed = (
-        [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found],
-        {},
-    )
+    drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
+    passed = {}
     names = _indices(scene, square, axes) if structure == "symplectic" else {}
     indices = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
     on_lines = indices(contours.lattice(number), ROUGH) if names else {}

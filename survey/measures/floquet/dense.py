@@ -59,7 +59,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Map:
+class SeriesMap:
     """What series are made for: they are the same for equal maps. `fixed`: values of all parameters."""
 
     system: object
@@ -83,7 +83,7 @@ class Map:
 
 
 @dataclass(frozen=True)
-class Panel:
+class RootPanel:
     """A part of the map: middles and radii of its sides, series (n1, K n2), their bounds (K, PARTS
     n1, PARTS n2), where n1 is 1 (K, 1, PARTS n2), and roots at the nodes.
     """
@@ -146,7 +146,8 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
     `points` has the block's axes first; a parameter in `lines` varies along one of them.
     """
     axes, shape = axes_of(lines), points.shape[:-1]
-    index, along = np.arange(np.prod(shape)).reshape(shape), []
+    index = np.arange(np.prod(shape)).reshape(shape)
+    along = []
     for axis in axes:
         own = points[..., axis.column]
         varies = [k for k in range(len(shape)) if (own.take(0, k) != own.take(-1, k)).any()]
@@ -158,14 +159,15 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
     ]
     index = np.moveaxis(index, moved, range(-len(axes), 0))
     index = index.reshape(-1, *index.shape[-len(axes) :])
-    flat, left = points.reshape(-1, points.shape[-1]), np.ones(index.size, bool)
+    flat = points.reshape(-1, points.shape[-1])
+    left = np.ones(index.size, bool)
     for own in index:
         own = own.reshape(len(own), -1) if len(axes) == 2 else own.reshape(1, -1)
         fixed = flat[own[0, 0]].copy()
         fixed[[axis.column for axis in axes]] = 0.0
         if not np.isfinite(fixed).all():
             continue
-        key = Map(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+        key = SeriesMap(system, structure, rtol, flags(wanted), axes, tuple(fixed))
         with _ONE_AT_A_TIME:
             found = panels(key)
         rows = flat[own[:, 0], axes[0].column] if len(axes) == 2 else np.zeros(1)
@@ -196,7 +198,7 @@ def scattered(system, structure, points, rtol, wanted, ranges, answer):
     fixed[column] = 0.0
     if not np.isfinite(fixed).all():
         return left
-    key = Map(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+    key = SeriesMap(system, structure, rtol, flags(wanted), axes, tuple(fixed))
     with _ONE_AT_A_TIME:
         found = panels(key)
     for panel in found:
@@ -258,10 +260,11 @@ def _part(x, n):
 
 @lru_cache(maxsize=32)
 def panels(key):
-    """The Panels of a Map, in which its points are looked for in this order: the same for all blocks."""
+    """The RootPanels of a SeriesMap, in which its points are looked for in this order: the same for all blocks."""
     number = [axis.number for axis in key.axes]
     budget = float(np.prod(number)) / POINTS_PER_NODE
-    left, found = [(tuple((axis.low, axis.high) for axis in key.axes), 0)], []
+    left = [(tuple((axis.low, axis.high) for axis in key.axes), 0)]
+    found = []
     while left:
         sides, depth = left.pop(0)
         share = [
@@ -280,7 +283,7 @@ def panels(key):
 
 
 def _panel(key, sides, budget):
-    """(the Panel or None, points solved, the side to be cut or None) of a part of the map, within a
+    """(the RootPanel or None, points solved, the side to be cut or None) of a part of the map, within a
     budget.
     """
     middle = tuple(0.5 * (a + b) for a, b in sides)
@@ -324,7 +327,8 @@ def _degrees(key, middle, radius, budget):
     ends = [np.zeros(1)] if sides == 1 else [np.array([-0.97, 0.97])]
     if 2.0 * PROBED * sides * len(ends[0]) > budget:
         return None, 0
-    x, needed = chebyshev.symmetric_nodes(PROBED), []
+    x = chebyshev.symmetric_nodes(PROBED)
+    needed = []
     lines = [np.stack([x if k == side else np.full(PROBED, end) for k in range(sides)], axis=1)
              for side in range(sides) for end in ends[0]]  # fmt: skip
     known = _coefficients(key, middle, radius, np.concatenate(lines))
@@ -359,10 +363,12 @@ def at_points(system, structure, points):
     if not system.smooth(points[0]):
         return None
     with np.errstate(all="ignore"):
-        own = monodromy.Points(system, points, halves=True, paired=structure != "none")
+        own = monodromy.SystemPoints(system, points, halves=True, paired=structure != "none")
         if not _is_analytic(own):
             return None
-        every, n, paired = np.arange(len(points)), system.n, structure != "none"
+        every = np.arange(len(points))
+        n = system.n
+        paired = structure != "none"
         out = np.empty(
             (2, len(points), n // 2 * (2 if structure == "symplectic" else 1) if paired else n)
         )
@@ -385,7 +391,7 @@ def is_analytic(system, points):
     if not system.smooth(points[0]):
         return False
     with np.errstate(all="ignore"):
-        return _is_analytic(monodromy.Points(system, points))
+        return _is_analytic(monodromy.SystemPoints(system, points))
 
 
 def _is_analytic(own):
@@ -403,7 +409,8 @@ def coefficients(M, E, scale, structure, steps_of=None):
     """
     N, n = M.shape[:2]
     m, one = n // 2, np.eye(n)
-    size, near = abs(M), 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
+    size = abs(M)
+    near = 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
     own = np.linalg.eigvals(M).astype(complex)
     c, moduli = np.zeros((N, n + 1), complex), np.zeros((N, n + 1))
     c[:, 0] = moduli[:, 0] = 1.0
@@ -411,17 +418,17 @@ def coefficients(M, E, scale, structure, steps_of=None):
         c[:, 1 : i + 2] -= own[:, i, None] * c[:, : i + 1]
         moduli[:, 1 : i + 2] += abs(own[:, i, None]) * moduli[:, : i + 1]
     c, bars, kept = c.real.copy(), 4 * n * EPS * moduli, n if structure == "none" else m
-    B, off, wide = np.broadcast_to(one, M.shape).copy(), np.zeros_like(M), np.zeros_like(M)
+    B = np.broadcast_to(one, M.shape).copy()
+    off = np.zeros_like(M)
+    wide = np.zeros_like(M)
     found, form = np.empty((N, kept, n, n)), np.zeros((2, N, n))  # form: tr(B_k J)
     J = symplectic_form(n) * (scale[:, None, :] / scale[:, :, None])
     for k in range(1, n + 1):
         # off: rounding of B; wide: the same, and what the error of M does to it
         MB, tall = M @ B, size @ abs(B)
         off, wide = size @ off + n * EPS * tall, size @ wide + E @ abs(B) + n * EPS * tall
-        direct, doubt = (
-            -np.trace(MB, axis1=1, axis2=2) / k,
-            np.trace(off, axis1=1, axis2=2) / k + n * EPS * abs(np.trace(MB, axis1=1, axis2=2)),
-        )
+        direct = -np.trace(MB, axis1=1, axis2=2) / k
+        doubt = np.trace(off, axis1=1, axis2=2) / k + n * EPS * abs(np.trace(MB, axis1=1, axis2=2))
         bars[:, k] += near * abs(B).sum(axis=(1, 2))
         sharper = doubt < bars[:, k]
         c[:, k], bars[:, k] = (
@@ -484,11 +491,12 @@ def _sums(m):
 
 
 def _expanded(key, middle, radius, sizes, values, bars):
-    """The Panel of values (nodes, K) at the nodes; None if a bound is not finite."""
+    """The RootPanel of values (nodes, K) at the nodes; None if a bound is not finite."""
     K = values.shape[1]
     ulps = [(4 + abs(m) + r) / r for m, r in zip(middle, radius, strict=True)]
     n1, n2 = sizes if len(sizes) == 2 else (1, sizes[0])
-    series, doubts = np.empty((n1, K, n2)), []
+    series = np.empty((n1, K, n2))
+    doubts = []
     for k in range(K):
         grid = values[:, k].reshape(n1, n2)
         own, doubt = chebyshev.expand(grid, chebyshev.by_columns(n2), ulps[-1])
@@ -509,7 +517,9 @@ def _expanded(key, middle, radius, sizes, values, bars):
     companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
     roots = np.linalg.eigvals(companion)
     starts = np.stack([roots.real, roots.imag], axis=-1).reshape(n1, n2, d, 2)
-    return Panel(middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts))
+    return RootPanel(
+        middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts)
+    )
 
 
 def _in_parts(bars):

@@ -88,7 +88,8 @@ class Equation:
 
     def traced(self, points, x0):
         """[(indices, Programs)] of the points; raises Unsupported or Raised."""
-        left, found = np.arange(len(points)), []
+        left = np.arange(len(points))
+        found = []
         with LOCK:
             known = list(self._traces)
         while left.size:
@@ -204,12 +205,10 @@ class Programs:
         and series.
         """
         N, n = x0.shape
-        X, M, size, steps = (
-            np.full((N, n), np.nan),
-            np.zeros((N * derived, n, n)),
-            np.empty((N, n)),
-            np.zeros(N, int),
-        )
+        X = np.full((N, n), np.nan)
+        M = np.zeros((N * derived, n, n))
+        size = np.empty((N, n))
+        steps = np.zeros(N, int)
         total = 0 if first is None else first[-1]
         recorded = np.empty(total), np.empty(total), np.empty((total, n, ORDER + 1))
         A = self.A

@@ -41,7 +41,7 @@ WIDEST = 1e-3  # of the tube, relative to the largest state
 
 
 @dataclass
-class Shown:
+class ShownOrbits:
     """Orbits that exist: states, periods, M and what their multipliers follow from, each with
     bounds; mean squares of the states, without."""
 
@@ -63,11 +63,11 @@ class Shown:
 
 
 def certified(programs, numbers, x, T, guess, plane, counts, method, reach):
-    """Shown, of orbits near (x, T); see the head of the module. All is in the units that balance A,
+    """ShownOrbits, of orbits near (x, T); see the head of the module. All is in the units that balance A,
     but the results.
     """
     with np.errstate(all="ignore"):
-        path = Path(programs, numbers, x, T, counts, reach)
+        path = OrbitSteps(programs, numbers, x, T, counts, reach)
         path.enough = WIDEST * np.maximum(path.extent, (abs(guess) / path.scale).max(axis=1))
         path.propagate(method)
         shown = path.certify(x, T, plane, RADII[0])
@@ -77,7 +77,7 @@ def certified(programs, numbers, x, T, guess, plane, counts, method, reach):
         return shown
 
 
-class Path:
+class OrbitSteps:
     """The Taylor series of the steps along N orbits, whose bounds follow."""
 
     def __init__(self, programs, numbers, x, T, counts, reach):
@@ -94,7 +94,8 @@ class Path:
         self.begin, self.t = begin, begin[:, None] + self.h[:, None] * NODES
         k = np.arange(ORDER + 1.0)
         moduli = abs(series)
-        self.X, self.noise_X = _sum(series), ROUNDOFF_UP * _sum(moduli * (2 * k + 2))
+        self.X = _sum(series)
+        self.noise_X = ROUNDOFF_UP * _sum(moduli * (2 * k + 2))
         dX = _sum((series * k)[:, :, 1:]) / self.h[:, None, None]
         noise = ROUNDOFF_UP * _sum((moduli * k * (2 * k + 2))[:, :, 1:]) / self.h[:, None, None]
         f, df = (one[..., 0].swapaxes(1, 2) for one in self.along(programs.f, self.noise_X))
@@ -155,12 +156,13 @@ class Path:
 
     def bars(self, dx):
         """Error bounds of the series X (tasks, n, NODES), if x(0) is known to within dx (N, n)."""
-        radius, delta = (dx / self.scale).max(axis=1), self.defect / self.scale[self.point]
+        radius = (dx / self.scale).max(axis=1)
+        delta = self.defect / self.scale[self.point]
         tube = self.tube(radius, delta, *self.spread_of(delta))[1]
         return self.noise_X + (tube[:, None] * self.scale[self.point])[:, :, None]
 
     def certify(self, x, T, plane, factor):
-        """Shown of the orbits near x (N, n), T (N), within `factor` |B G|."""
+        """ShownOrbits of the orbits near x (N, n), T (N), within `factor` |B G|."""
         n, N, point, last, s = self.n, len(x), self.point, self.last, self.scale
         delta = self.defect / s[point]
         wide, off = self.spread_of(delta)
@@ -224,7 +226,9 @@ class Path:
             M, E, R, error, doubt, WIDER * shift * a_end, np.flatnonzero(shown), f, df
         )
         back = s[:, :, None] / s[:, None, :]
-        return Shown(shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others)
+        return ShownOrbits(
+            shown, x, dx + EPS * abs(x), T, dT, M * back, E * back, self.square, others
+        )
 
     def _sharp(self, M, E, R, error, doubt, time_bar, which, f, df):
         """The Matrices of the multipliers that are judged: those of M, or, if f is given, those but
@@ -236,7 +240,8 @@ class Path:
         N, n = M.shape[:2]
         judged, bounds = (M, E) if f is None else deflated(M, E, f, df)
         found = monodromy.Matrices.plain(judged, bounds)
-        values, vectors = np.ones((N, n), complex), np.full((N, n, n), np.nan, complex)
+        values = np.ones((N, n), complex)
+        vectors = np.full((N, n, n), np.nan, complex)
         own, directions = np.linalg.eig(judged[which])
         if f is None:
             values[which], vectors[which] = own, directions
@@ -330,7 +335,7 @@ def completed(M, f, values, directions):
 
 
 def _pivots(f):
-    """The place of the largest component of f (N, n), and the others."""
+    """The index of the largest component of f (N, n), and the others."""
     n = f.shape[1]
     k = abs(f).argmax(axis=1)
     return k, np.array([[j for j in range(n) if j != i] for i in range(n)])[k]

@@ -56,7 +56,7 @@ class Family:
             self._locate(lattice.ravel(), *self.equation.begin(self.points))
         else:
             along = self.continued.index
-            # the axis with a line for each place
+            # the axis with a line for each position
             across = 1 - self.varied.index(along) if along in self.varied else 0
             each = np.arange(lattice.shape[across])
             step = FOLLOWED if each.size > 1 else 1
@@ -99,9 +99,7 @@ class Family:
             return 0 if abs(self.branch) == 1 else None
         points = np.tile(point, (len(x), 1))
         found = orbit.shown(self.equation, points, x, T, self.method, ENOUGH, relax=False)
-        shown = [
-            (found.square[i], tuple(found.x[i]), found.T[i], i) for i in np.flatnonzero(found.good)
-        ]
+        shown = [orbit.Seen.of(found, i, i) for i in np.flatnonzero(found.good)]
         order = orbit.numbered(shown, free=False)
         return order[self.branch - (self.branch > 0)] if abs(self.branch) <= len(order) else None
 
@@ -177,8 +175,6 @@ def _spline(ticks, values):
         return lambda x: np.where(
             np.interp(x[:, 0], ticks[0], hole[:, 0]) > 0.0, np.nan, along(x[:, 0])
         )
-    both, outside = (
-        RectBivariateSpline(*ticks, values),
-        RectBivariateSpline(*ticks, hole, kx=1, ky=1),
-    )
+    both = RectBivariateSpline(*ticks, values)
+    outside = RectBivariateSpline(*ticks, hole, kx=1, ky=1)
     return lambda x: np.where(outside.ev(*x.T) > HOLE, np.nan, both.ev(*x.T))

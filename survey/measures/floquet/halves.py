@@ -60,21 +60,17 @@ class Images:
                 signs = signs * _signs(self.repetition)
             back = first[tasks] + 2 * count[tasks] - 1 - index
             own = here + count[tasks]
-            F[back], error[back], doubt[back] = (
-                F[own] * np.outer(signs, signs),
-                error[own],
-                doubt[own],
-            )
+            F[back] = F[own] * np.outer(signs, signs)
+            error[back] = error[own]
+            doubt[back] = doubt[own]
             done, here = 2, np.concatenate([here, back])
             tasks = np.concatenate([tasks, tasks])
         if self.repetition is not None:
             signs = _signs(self.repetition)
             later = here + done * count[tasks]
-            F[later], error[later], doubt[later] = (
-                F[here] * np.outer(signs, signs),
-                error[here],
-                doubt[here],
-            )
+            F[later] = F[here] * np.outer(signs, signs)
+            error[later] = error[here]
+            doubt[later] = doubt[here]
 
 
 def _signs(given):
@@ -154,7 +150,8 @@ class Waves:
 
     def _signs(self, n, turns, present, sign):
         """Signs r (n) with r_i r_j A_ij(image of t) = `sign` A_ij(t), or None."""
-        parity, allowed = self._parities(turns), np.ones((2, n, n), bool)
+        parity = self._parities(turns)
+        allowed = np.ones((2, n, n), bool)
         for (basis, i, j, _number), counts in zip(
             self.program.terms.tolist(), present, strict=True
         ):

@@ -44,12 +44,13 @@ def indices(system, points):
     """The index relative to each of GOALS (2, N) of a symplectic System at points (N, parameters);
     else UNKNOWN.
     """
-    own = monodromy.Points(system, points, halves=True)
+    own = monodromy.SystemPoints(system, points, halves=True)
     method = monodromy.method_of("auto")
     found = np.full((2, len(points)), UNKNOWN, dtype=np.int32)
     left, m = np.flatnonzero(own.valid), system.n // 2
     for finer in FINER:
-        turned, rough = np.empty((2, left.size)), np.zeros(left.size, bool)
+        turned = np.empty((2, left.size))
+        rough = np.zeros(left.size, bool)
 
         def follow(some, *given, turned=turned, rough=rough):
             turned[:, some], rough[some] = _followed(*given)
@@ -74,7 +75,9 @@ def _followed(matrices, scale, F, _error, _doubt, first):
     units = scale / np.concatenate([ratio, 1.0 / ratio], axis=1)
     to_units = units[:, :, None] / units[:, None, :]
     steps, X = np.diff(first), np.tile(np.eye(n), (N, 1, 1))
-    turn, largest, before = np.zeros(N), np.zeros(N), np.full(N, 2.0**m, complex)
+    turn = np.zeros(N)
+    largest = np.zeros(N)
+    before = np.full(N, 2.0**m, complex)
     with np.errstate(all="ignore"):
         for k in range(steps.max(initial=0)):
             live = np.flatnonzero(steps > k)
@@ -110,8 +113,10 @@ def _angles(X, goal):
     whether they are sure.
     """
     N, n = X.shape[:2]
-    angles, sure = np.full((N, n), np.nan), np.isfinite(X).all(axis=(1, 2))
-    Z, U = _frame(X[sure]), _frame(goal * np.eye(n)[None])[0] / np.sqrt(2.0)
+    angles = np.full((N, n), np.nan)
+    sure = np.isfinite(X).all(axis=(1, 2))
+    Z = _frame(X[sure])
+    U = _frame(goal * np.eye(n)[None])[0] / np.sqrt(2.0)
     U = U.conj().T
     W = (
         U

@@ -45,7 +45,7 @@ class Group:
     images: list
 
 
-class Points:
+class SystemPoints:
     """Points of a System as a method's steps need them: sizes, noise, and the units that balance A.
 
     `halves`: is no more integrated than symmetries of A require? `growth` (2, N): the integral of
@@ -98,7 +98,9 @@ class Points:
         """Norm and noise of A on each piece of the points `own`, and the units of their states."""
         self.rough[own] = False
         n, N = self.n, len(own)
-        largest, scale, sampled = np.zeros((N, n, n)), np.empty((N, n)), []
+        largest = np.zeros((N, n, n))
+        scale = np.empty((N, n))
+        sampled = []
         for k, (program, (*numbers, images, phase_bars)) in enumerate(
             zip(programs, given, strict=True)
         ):
@@ -148,7 +150,7 @@ class Points:
 
 
 def _of_those(piece, those):
-    """A piece of `Points._alike`, of some of its points."""
+    """A piece of `SystemPoints._alike`, of some of its points."""
     values, errors, images, phase_bars = piece
     # what is the same for all points has one row
     phase_bars = phase_bars and {
@@ -211,7 +213,7 @@ class Matrices:
 
 
 def solve(points, method, rtol, factor, those, sharp):
-    """The Matrices of some of the Points, in `factor` (K) times the steps asked for; `sharp`: see
+    """The Matrices of some of the SystemPoints, in `factor` (K) times the steps asked for; `sharp`: see
     Matrices.
 
     A function `sharp` takes, for some of `those` (their places there), the Matrices in the balanced
@@ -242,7 +244,8 @@ def solve(points, method, rtol, factor, those, sharp):
 
 
 def _call(points, method, those, row_at, group, count, sharp):
-    n, parts = points.n, np.array([images.parts for images in group.images])
+    n = points.n
+    parts = np.array([images.parts for images in group.images])
     count = -(-count // parts)  # of the first parts
     first = np.concatenate([[0], np.cumsum((count * parts).sum(axis=1))])
     F, error, doubt = np.empty((first[-1], n, n)), np.empty(first[-1]), np.empty(first[-1])

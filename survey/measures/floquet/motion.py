@@ -17,7 +17,7 @@ def solve(system, states, point, answer, time):
     """The Trajectory of one point (1, parameters) from the real part of the leading multiplier's
     eigenvector.
     """
-    points = monodromy.Points(system, point)
+    points = monodromy.SystemPoints(system, point)
     period, n = float(points.period[0]), system.n
     rate = abs(np.log(max(float(answer["spectral_radius"]), 1e-300)))
     periods = (

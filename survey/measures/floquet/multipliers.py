@@ -35,8 +35,10 @@ class Discs:
     def __init__(self, matrices):
         M, E, known = matrices.M, matrices.E, matrices
         N, n = M.shape[:2]
-        self.centre, self.radius = np.zeros((N, n), complex), np.full((N, n), np.inf)
-        self.V, self.coupling = np.zeros((N, n, n), complex), np.full((N, n, n), np.inf)
+        self.centre = np.zeros((N, n), complex)
+        self.radius = np.full((N, n), np.inf)
+        self.V = np.zeros((N, n, n), complex)
+        self.coupling = np.full((N, n, n), np.inf)
         good = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
         some = np.flatnonzero(good & known.sharp)
         if some.size:
@@ -295,17 +297,17 @@ def clusters(own, which):
         for one in np.unique(own.together[p], axis=0):
             if one.sum() < 2:
                 continue
-            two, inner = ~one, np.linalg.eigvalsh(form[np.ix_(one, one)])
-            blocks = [np.linalg.norm(C[np.ix_(a, b)]) for a in (one, two) for b in (one, two)]
-            gap = abs(centre[one][:, None] - centre[two]).min() if two.any() else np.inf
-            apart = gap - blocks[0] - blocks[3]
-            if not apart > 0 or not apart**2 > 4.0 * blocks[1] * blocks[2]:
-                continue
-            x = (
-                2.0 * blocks[2] / np.sqrt(apart**2 - 4.0 * blocks[1] * blocks[2])
-                if two.any()
-                else 0.0
+            two = ~one
+            inner = np.linalg.eigvalsh(form[np.ix_(one, one)])
+            # the norms of C_11, C_12, C_21 and C_22
+            c11, c12, c21, c22 = (
+                np.linalg.norm(C[np.ix_(a, b)]) for a in (one, two) for b in (one, two)
             )
+            gap = abs(centre[one][:, None] - centre[two]).min() if two.any() else np.inf
+            apart = gap - c11 - c22
+            if not apart > 0 or not apart**2 > 4.0 * c12 * c21:
+                continue
+            x = 2.0 * c21 / np.sqrt(apart**2 - 4.0 * c12 * c21) if two.any() else 0.0
             doubt = 2.0 * x * np.linalg.norm(form[np.ix_(one, two)]) + x * x * np.linalg.norm(
                 form[np.ix_(two, two)]
             )

@@ -132,7 +132,8 @@ def _shortened(index, segments, axis, ticks):
         segments = segments[long]
         if not segments.line.size:
             break
-        at, value = np.empty(segments.line.size), np.full(segments.line.size, UNKNOWN)
+        at = np.empty(segments.line.size)
+        value = np.full(segments.line.size, UNKNOWN)
         for share in SHARES:
             some = np.flatnonzero(value == UNKNOWN)
             if some.size:
@@ -156,8 +157,10 @@ def _linked(segments, axis, ticks):
     """[(positions (m, 2), errors (m))] of points on neighbouring lines at which the index takes the
     same step.
     """
-    middle, error = segments.ends.mean(axis=1), 0.5 * np.diff(segments.ends)[:, 0]
-    low, number = segments.index.min(axis=1), abs(np.diff(segments.index))[:, 0]
+    middle = segments.ends.mean(axis=1)
+    error = 0.5 * np.diff(segments.ends)[:, 0]
+    low = segments.index.min(axis=1)
+    number = abs(np.diff(segments.index))[:, 0]
     number[error > SURE] = 0
     k = np.repeat(np.arange(len(number)), number)
     step = low[k] + np.arange(k.size) - np.repeat(np.cumsum(number) - number, number)

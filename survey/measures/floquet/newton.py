@@ -78,12 +78,16 @@ class Newton:
 
     def __init__(self, programs, numbers, reach, x, T, equation):
         self.programs, self.numbers, self.reach, self.equation = programs, numbers, reach, equation
-        self.x, self.T, self.guess, self.period = x.copy(), T.copy(), x.copy(), T
+        self.x = x.copy()
+        self.T = T.copy()
+        self.guess = x.copy()
+        self.period = T
         self.phase = programs.slopes(numbers, np.zeros(len(x)), x)[0] if equation.free else None
 
     def restarted(self, those):
         """As `solve`, for some points, from the state after a long time."""
-        numbers, free = chosen(self.numbers, those), self.phase is not None
+        numbers = chosen(self.numbers, those)
+        free = self.phase is not None
         span = RELAXED * self.period[those]
         # the same whatever accuracy is asked: the plane in which an orbit begins rests on it
         reach = monodromy.method_of("auto").floquet_reach(RELAXED_RTOL)
@@ -112,7 +116,8 @@ class Newton:
         _X, begin, _length, series = self.programs.flow(
             numbers, x, RETURN * T, self.reach, False, first
         )
-        f, found = self.programs.slopes(numbers, np.zeros(len(x)), x)[0], np.full(len(x), np.nan)
+        f = self.programs.slopes(numbers, np.zeros(len(x)), x)[0]
+        found = np.full(len(x), np.nan)
         for i in range(len(x)):
             t, states = begin[first[i] : first[i + 1]], series[first[i] : first[i + 1], :, 0]
             along = ((states - x[i]) * f[i]).sum(axis=1)
@@ -136,7 +141,9 @@ class Newton:
         N = len(self.x)
         damping, found, live = np.ones(N), np.zeros(N, bool), those
         m = self.x.shape[1] + (self.phase is not None)
-        step, inverse, size = np.full((N, m), np.nan), np.full((N, m, m), np.nan), np.ones((N, m))
+        step = np.full((N, m), np.nan)
+        inverse = np.full((N, m, m), np.nan)
+        size = np.ones((N, m))
         value, inverse[live], size[live] = self._linearised(live, self.x[live], self.T[live], how)
         step[live] = -applied(inverse[live], value)
         live = live[np.isfinite(step[live]).all(axis=1)]

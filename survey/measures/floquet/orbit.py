@@ -10,13 +10,14 @@ made of all outputs, by `existence`.
 
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from survey import status
 from survey.kernels.floquet.flow import ORDER
 from survey.measures.floquet import existence, monodromy, shooting, stability
-from survey.measures.floquet.continuation import Curves
+from survey.measures.floquet.continuation import ContinuedCurves
 from survey.measures.floquet.newton import chosen, located
 from survey.measures.floquet.recomputed import recomputed
 from survey.scene import Output
@@ -60,7 +61,8 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     known = np.isfinite(points).all(axis=1) & (branch == np.floor(branch))
     different, row_of = np.unique(points[known], axis=0, return_inverse=True)
     row_of = row_of.reshape(-1)
-    parts, of_point = [], [[] for _ in different]
+    parts = []
+    of_point = [[] for _ in different]
     count = 0
     for where, x, T in followed(equation, continued, different, _reach(rtol)):
         for i in range(0, len(where), CHUNK):
@@ -70,7 +72,7 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
                 equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False
             )
             for k in np.flatnonzero(found.good):
-                of_point[own[k]].append((found.square[k], tuple(found.x[k]), found.T[k], count + k))
+                of_point[own[k]].append(Seen.of(found, k, count + k))
             full = np.ones(len(own), bool)
             parts.append(found.outputs(full, rtol, wanted, callable(equation.period)))
             count += len(own)
@@ -101,7 +103,7 @@ def followed(equation, continued, points, reach):
     rows, row = np.unique(others, axis=0, return_inverse=True)
     row = row.reshape(-1)
     for first in range(0, len(rows), ROWS):
-        curves = Curves(equation, continued, rows[first : first + ROWS], reach)
+        curves = ContinuedCurves(equation, continued, rows[first : first + ROWS], reach)
         where, x, T = [], [], []
         for k in range(len(curves.rows)):
             mine = np.flatnonzero(row == first + k)
@@ -113,29 +115,38 @@ def followed(equation, continued, points, reach):
         yield where, equation.pinned(points[where], x), T  # curves are cubics between their points
 
 
+class Seen(NamedTuple):
+    """An orbit that was found at a point: the mean square of its states, x0, T, and its number."""
+
+    square: float
+    x0: tuple
+    T: float
+    number: int
+
+    @classmethod
+    def of(cls, found, i, number):
+        """Orbit i of a Found."""
+        return cls(found.square[i], tuple(found.x[i]), found.T[i], number)
+
+
 def numbered(orbits, free):
-    """The numbers of different orbits, by the mean squares of their states, then x0, from (square,
-    x0, T, number).
-    """
+    """The numbers of different orbits that were Seen, by the mean squares of their states, then x0."""
     kept = []
     for one in sorted(orbits):
-        size = SAME * one[0] ** 0.5
-        same = (
-            abs(np.subtract(one[1], other[1])).max() <= size
-            for other in kept
-            if _near(one[0], other[0])
-        )
+        size = SAME * one.square**0.5
+        alike = [other for other in kept if _near(one.square, other.square)]
         if free:
-            same = (
-                abs(one[2] - other[2]) <= SAME * one[2] for other in kept if _near(one[0], other[0])
-            )
+            same = (abs(one.T - other.T) <= SAME * one.T for other in alike)
+        else:
+            same = (abs(np.subtract(one.x0, other.x0)).max() <= size for other in alike)
         if not any(same):
             kept.append(one)
     for i in range(1, len(kept)):
         for k in range(i, 0, -1):
-            if _near(kept[k][0], kept[k - 1][0]) and kept[k][1] < kept[k - 1][1]:
-                kept[k - 1], kept[k] = kept[k], kept[k - 1]
-    return [one[3] for one in kept]
+            before, after = kept[k - 1], kept[k]
+            if _near(after.square, before.square) and after.x0 < before.x0:
+                kept[k - 1], kept[k] = after, before
+    return [one.number for one in kept]
 
 
 def _near(a, b):
@@ -212,10 +223,11 @@ class Found:
         self.x, self.dx, self.T, self.dT = (
             np.full(shape, np.nan) for shape in ((N, n), (N, n), N, N)
         )
-        self.M, self.others = np.full((N, 2, n, n), np.nan), monodromy.Matrices.empty(N, m)
+        self.M = np.full((N, 2, n, n), np.nan)
+        self.others = monodromy.Matrices.empty(N, m)
 
     def write_at(self, points, shown):
-        """Keep what is Shown of these points."""
+        """Keep the ShownOrbits of these points."""
         to = points[shown.good]
         self.good[to] = True
         for name in ("x", "dx", "T", "dT", "square"):
@@ -230,10 +242,8 @@ class Found:
         answer = stability.assess(matrices, self.structure, rtol, wanted)
         answer.status[~self.good] = NO_ORBIT
         answer.status[~known] = status.INVALID_PARAMETERS
-        answer.verdict[~self.good], answer.crossing[~self.good] = (
-            stability.UNDECIDED,
-            stability.UNDECIDED,
-        )
+        answer.verdict[~self.good] = stability.UNDECIDED
+        answer.crossing[~self.good] = stability.UNDECIDED
         out = stability.outputs(answer, matrices, self.T, computed, wanted)
         ok = answer.status == status.OK
         if "exponent" in wanted:

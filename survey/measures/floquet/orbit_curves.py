@@ -23,9 +23,9 @@ import numpy as np
 from survey.kernels.math.roundoff import EPS
 from survey.measures import contours
 from survey.measures.floquet import bifurcations, existence, monodromy
-from survey.measures.floquet.continuation import Curves, Range, floored, rough_flow, slopes
+from survey.measures.floquet.continuation import ContinuedCurves, Range, floored, rough_flow, slopes
 from survey.measures.floquet.critical import Critical
-from survey.measures.floquet.critical_points import RTOL, Points
+from survey.measures.floquet.critical_points import RTOL, CriticalPoints
 from survey.measures.floquet.critical_walk import NEAREST, Walk
 from survey.measures.floquet.multipliers import MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
 from survey.measures.floquet.newton import bordered
@@ -46,7 +46,8 @@ def searched(scene, square, axes, fixed):
     varied = [names.index(name) for name in axes if name in names]
     given = np.array([fixed.get(name, np.nan) for name in names])
     on_map = _Map(scene.equation, square, varied, given, scene.continued)
-    found, seeds = [], on_map.seeds()
+    found = []
+    seeds = on_map.seeds()
     for how in on_map.kinds:
         points = on_map.points(how)
         for y, border in on_map.followed(points, seeds[how]):
@@ -69,8 +70,12 @@ class _Map:
     """A map of the parameters number `varied`, the unit square `square`; `given`: the others."""
 
     def __init__(self, equation, square, varied, given, continued):
-        self.equation, self.square, self.varied, self.given = equation, square, list(varied), given
-        self.continued, self.reach = continued, monodromy.method_of("auto").floquet_reach(RTOL)
+        self.equation = equation
+        self.square = square
+        self.varied = list(varied)
+        self.given = given
+        self.continued = continued
+        self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
         self.kinds = [
             How(kind) for kind in KINDS if kind != NEIMARK_SACKER or equation.n - equation.free > 1
@@ -93,7 +98,7 @@ class _Map:
             scale = np.where(
                 log, np.log(np.where(log, high, 1.0) / np.where(log, low, 1.0)), high - low
             )
-            self._points[how] = Points(
+            self._points[how] = CriticalPoints(
                 Critical.of(self.equation, self.varied, *how), self.given, scale, log
             )
         return self._points[how]
@@ -125,7 +130,7 @@ class _Map:
             rows[:, other] = self.square.parameters(lines)[:, k]
         elsewhere = self.continued is not None and self.continued.index not in self.varied
         begin = self._continued if elsewhere else None
-        curves = Curves(self.equation, Range(index, low, high), rows, self.reach, begin)
+        curves = ContinuedCurves(self.equation, Range(index, low, high), rows, self.reach, begin)
         for row, of_row in enumerate(curves.of_row):
             for curve in of_row:
                 yield from self._of_curve(curves, row, curve.finer(FINER), axis)
@@ -134,7 +139,8 @@ class _Map:
         """[(states, periods)] of the first, second, ... orbits at points (N, parameters), by the
         continuation.
         """
-        curves, n = Curves(self.equation, self.continued, points, self.reach), self.equation.n
+        curves = ContinuedCurves(self.equation, self.continued, points, self.reach)
+        n = self.equation.n
         found = [
             curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)
         ]
@@ -217,10 +223,8 @@ class _Map:
                 if not np.isfinite(away[best]):
                     continue
                 z = vectors[:, best]
-                y[k, n : 3 * n], y[k, own.angle_at] = (
-                    np.concatenate([z.real, z.imag]),
-                    np.angle(values[best]),
-                )
+                y[k, n : 3 * n] = np.concatenate([z.real, z.imag])
+                y[k, own.angle_at] = np.angle(values[best])
             else:
                 matrix = M[k] + (1.0 if how.kind == MINUS_ONE or how.branching else -1.0) * np.eye(
                     n

@@ -22,9 +22,10 @@ def solve(equation, states, point, answer, time):
     T = T[:, 0]
     method = monodromy.method_of("auto")
     [(_own, programs)] = equation.traced(point, x)
-    numbers, reach = programs.numbers(point), method.floquet_reach(RTOL)
+    numbers = programs.numbers(point)
+    reach = method.floquet_reach(RTOL)
     steps = programs.flow(numbers, x, T, reach, derived=False)[3]
-    path = existence.Path(programs, numbers, x, T, steps, reach)
+    path = existence.OrbitSteps(programs, numbers, x, T, steps, reach)
     path.propagate(method)
     bars = path.bars(dx)
     kept = slice(0, -1)  # of the nodes of a step: the last is the next one's first

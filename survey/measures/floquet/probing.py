@@ -32,7 +32,7 @@ def suspects(program):
             code, a, b, first, last = program.operations[node]
             if code == pg.COMBINATION:
                 degree[node] = max(
-                    (visit(int(k)) for k in program.inside[first:last, 0]), default=0
+                    (visit(int(k)) for k in program.inside[first:last, pg.ADDED]), default=0
                 )
             elif code == pg.PRODUCT:
                 degree[node] = visit(int(a)) + visit(int(b))
@@ -95,7 +95,7 @@ def combined(few, *given):
 
 
 def spikes(points):
-    """Where far more samples show a spike than those of a run (N; NaN: nowhere), of `monodromy.Points`."""
+    """Where far more samples show a spike than those of a run (N; NaN: nowhere), of `monodromy.SystemPoints`."""
     found = np.full(len(points.points), np.nan)
     for group in points.groups:
         own = group.own

@@ -11,7 +11,7 @@ import numpy as np
 
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
-from survey.measures.floquet.existence import Shown, deflated
+from survey.measures.floquet.existence import ShownOrbits, deflated
 from survey.measures.floquet.newton import applied, bordered, inverse
 
 DENSER = 4  # steps, relative to those of the Taylor series
@@ -20,7 +20,7 @@ ROUNDINGS = 16  # of a step
 
 
 def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
-    """As `existence.certified`: Shown, of orbits near x (N, n), T (N), or half of it."""
+    """As `existence.certified`: ShownOrbits, of orbits near x (N, n), T (N), or half of it."""
     N, n = x.shape
     count = DENSER * np.maximum(steps, 8)
     shift = SHIFT * abs(x).max(axis=1, keepdims=True) + 1e-300
@@ -73,7 +73,7 @@ def recomputed(programs, numbers, x, T, plane, steps, method, symmetry=None):
         if symmetry is not None:
             M, E, others = symmetry.matrices(M, E, f, df, symmetry.block(M), symmetry.block(E))
             T, dT = 2.0 * T, 2.0 * dT
-        return Shown(good, x, dx, T, dT, M, E, (x * x).sum(axis=1), others)
+        return ShownOrbits(good, x, dx, T, dT, M, E, (x * x).sum(axis=1), others)
 
 
 def _product(A, B):
@@ -81,7 +81,9 @@ def _product(A, B):
 
 
 def _motion(method, programs, numbers, x, T, steps):
-    X, M, A = np.empty_like(x), np.empty((*x.shape, x.shape[1])), programs.A
+    X = np.empty_like(x)
+    M = np.empty((*x.shape, x.shape[1]))
+    A = programs.A
     given = (
         np.ascontiguousarray(numbers[0]),
         programs.states_at,

@@ -23,7 +23,14 @@ from survey.kernels.floquet.flow import spread
 from survey.kernels.floquet.shooting import responses
 from survey.kernels.floquet.steps import products
 from survey.kernels.math.roundoff import EPS
-from survey.measures.floquet.existence import RADII, SAMPLED, WIDER, Path, Shown, product
+from survey.measures.floquet.existence import (
+    RADII,
+    SAMPLED,
+    WIDER,
+    OrbitSteps,
+    ShownOrbits,
+    product,
+)
 from survey.measures.floquet.newton import inverse
 
 SHOT = 0.5  # the logarithm of how much deviations may grow in a shot of several steps
@@ -31,11 +38,11 @@ SURE = 1e-2  # of 1 - B W, in the maximum norm
 
 
 def certified(programs, numbers, x, T, guess, plane, counts, method, reach, symmetry):
-    """As `existence.certified`: Shown, of symmetric orbits near x (N, n), half of whose period is
+    """As `existence.certified`: ShownOrbits, of symmetric orbits near x (N, n), half of whose period is
     near T (N).
     """
     with np.errstate(all="ignore"):
-        path = Path(programs, numbers, x, T, counts, reach)
+        path = OrbitSteps(programs, numbers, x, T, counts, reach)
         path.propagate(method)
         half = _Half(path, x, T, symmetry)
         shown = half.certify(RADII[0])
@@ -46,7 +53,7 @@ def certified(programs, numbers, x, T, guess, plane, counts, method, reach, symm
 
 
 class _Half:
-    """Half orbits along a Path, in the units that balance A."""
+    """Half orbits along OrbitSteps, in the units that balance A."""
 
     def __init__(self, path, x, T, symmetry):
         self.path, self.x, self.T, self.symmetry = path, x, T, symmetry
@@ -107,7 +114,9 @@ class _Half:
         path, N, last_steps = self.path, len(self.x), self.cuts[1:] - 1
         wide, off = np.empty((2, *delta.shape))
         spread(path.F, np.ascontiguousarray(delta), self.cuts, wide, off)
-        states, last, time_bar = np.empty((len(self.F), path.n)), np.empty_like(self.x), np.empty(N)
+        states = np.empty((len(self.F), path.n))
+        last = np.empty_like(self.x)
+        time_bar = np.empty(N)
         own = off[last_steps] + self.rounding * around[:, None]
         responses(
             self.F, own, self.first, self.back, self.symmetry.ends, at_end, states, last, time_bar
@@ -121,7 +130,7 @@ class _Half:
         return begins, last * more[:, None], time_bar * more
 
     def certify(self, factor):
-        """Shown, of the orbits in a box `factor` times as wide as the linear equations tell."""
+        """ShownOrbits, of the orbits in a box `factor` times as wide as the linear equations tell."""
         path, symmetry, s, point = self.path, self.symmetry, self.path.scale, self.path.point
         transverse = list(symmetry.transverse)
         a_end = path.norm[path.last]
@@ -174,7 +183,9 @@ class _Half:
         good = good & np.isfinite(E).all(axis=(1, 2))
         M, E, others = symmetry.matrices(M, E, f, df, *own)
         back = s[:, :, None] / s[:, None, :]
-        return Shown(good, x, dx, 2.0 * self.T, 2.0 * dT, M * back, E * back, path.square, others)
+        return ShownOrbits(
+            good, x, dx, 2.0 * self.T, 2.0 * dT, M * back, E * back, path.square, others
+        )
 
     def _product(self, F, error, doubt, time_bar):
         """dx(T/2)/dx(0) and its bounds, the shift of its end within `time_bar` included."""

@@ -64,7 +64,7 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     wanted.
 
     `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of
-    `monodromy.Points`.
+    `monodromy.SystemPoints`.
     """
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
@@ -145,7 +145,8 @@ def solve(system, structure, points, method, rtol, wanted, lines=None, ranges=No
         [o.name for o in maslov.OUTPUTS if o.name in wanted],
         wanted - {o.name for o in maslov.OUTPUTS},
     )
-    answer, left = Answers(len(flat), system.judged), np.arange(len(flat))
+    answer = Answers(len(flat), system.judged)
+    left = np.arange(len(flat))
     results = monodromy.Matrices.empty(len(flat) if "monodromy" in wanted else 0, n)
     period = system.periods(flat) if wanted & {"period", "exponent"} else None
     if method == "auto" and dense.serves(system, structure, wanted, lines or {}):
@@ -193,7 +194,7 @@ def _solve_some(system, structure, given, method, rtol, wanted, rows, answer, re
     """Answer points (N, parameters), each from its own monodromy matrix, at their `rows`."""
     # another method is asked to answer a second way: without what symmetries tell
     paired = structure != "none"
-    points = monodromy.Points(
+    points = monodromy.SystemPoints(
         system, given, halves=method is monodromy.method_of("auto"), paired=paired
     )
     where = np.flatnonzero(points.valid)
@@ -216,11 +217,9 @@ def _solve_some(system, structure, given, method, rtol, wanted, rows, answer, re
         out = assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
         if np.any(broken):  # what is said of A is not true here: nothing follows from it
             out.status[broken], out.missed[broken] = status.INVALID_PARAMETERS, False
-            out.verdict[broken], out.crossing[broken], out.signs[:, broken] = (
-                UNDECIDED,
-                UNDECIDED,
-                0,
-            )
+            out.verdict[broken] = UNDECIDED
+            out.crossing[broken] = UNDECIDED
+            out.signs[:, broken] = 0
         return out
 
     if where.size:

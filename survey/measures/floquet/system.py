@@ -141,7 +141,8 @@ class System:
 
         Points in no group, whose branches change within a piece, are rough.
         """
-        left, found = np.arange(len(points)), []
+        left = np.arange(len(points))
+        found = []
         with LOCK:
             known = list(self._traces)
         while left.size:
@@ -294,7 +295,9 @@ def solved(rows, sides, graph):
     """
     m = len(rows)
     work, sides = [list(row) for row in rows], [list(row) for row in sides]
-    left, columns, order = list(range(m)), list(range(m)), []
+    left = list(range(m))
+    columns = list(range(m))
+    order = []
     while left:
         i, j = _pivot(work, left, columns, graph)
         left.remove(i)
@@ -329,7 +332,8 @@ def _less(row, factor, other, columns):
 
 def _pivot(work, left, columns, graph):
     """The row and the column of the next pivot."""
-    found, size = [], {(i, j): abs(graph.lift(work[i][j]).value) for i in left for j in columns}
+    found = []
+    size = {(i, j): abs(graph.lift(work[i][j]).value) for i in left for j in columns}
     in_row = {i: sum(not _is_zero(work[i][j]) for j in columns) for i in left}
     in_column = {j: sum(not _is_zero(work[i][j]) for i in left) for j in columns}
     for i, j in size:

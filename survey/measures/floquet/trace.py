@@ -294,7 +294,10 @@ class Graph:
     """
 
     def __init__(self, point, time):
-        self.numbers, self.series, self.guards, self.equalities = [], [("one",), ("time",)], [], []
+        self.numbers = []
+        self.series = [("one",), ("time",)]
+        self.guards = []
+        self.equalities = []
         self._number_places, self._series_places = {}, {}
         self.values = []  # of the numbers at the example
         self.shared = [True, True]  # does the basis function depend on t alone?
@@ -568,8 +571,8 @@ class Program:
             if graph.numbers[number] != ("constant", 0.0)
         ]
         terms.sort()
-        self.terms = np.array(terms, dtype=np.int64).reshape(-1, 4)
-        self.used = np.unique(np.concatenate([[ONE], self.terms[:, 0]])).astype(np.int64)
+        self.terms = np.array(terms, dtype=np.int64).reshape(-1, pg.TERM)
+        self.used = np.unique(np.concatenate([[ONE], self.terms[:, pg.BASIS]])).astype(np.int64)
         rows, inside, weights = [], [], []
         for k, (operation, *operands) in enumerate(graph.series):
             code, a, b, first, last, sign = pg.CODES[operation], 0, 0, 0, 0, 1.0
@@ -593,7 +596,7 @@ class Program:
                     code += pg.OF_LINE
             rows.append((code, a, b, first, last))
             weights.append(sign)
-        self.operations = np.array(rows, dtype=np.int64).reshape(-1, 5)
+        self.operations = np.array(rows, dtype=np.int64).reshape(-1, pg.OPERATION)
         self.signs = np.array(weights)
         self.inside = np.array(inside, dtype=np.int64).reshape(-1, 2)
         self.order = self._order()
@@ -603,7 +606,7 @@ class Program:
         """Which numbers the kernel reads: those of the parameters on which nothing depends are not
         among them.
         """
-        return np.unique(np.concatenate([self.terms[:, 3], self.inside[:, 1]]))
+        return np.unique(np.concatenate([self.terms[:, pg.NUMBER], self.inside[:, pg.FACTOR]]))
 
     @property
     def analytic(self):
@@ -629,7 +632,9 @@ class Program:
         derivative may be made of what is being visited, as that of y = sqrt x is of 1 / y.
         """
         flow = self.graph.flow
-        found, begun, later = list(flow), set(flow), []
+        found = list(flow)
+        begun = set(flow)
+        later = []
 
         def visit(node):
             if node in begun:
@@ -692,16 +697,17 @@ class Program:
                 values[:, k], errors[:, k] = v, e
         return values, errors
 
-    def series(self, numbers, t, nodes, states=None, late=None):
+    def series(self, numbers, t, nodes, states=None, phase_bars=None):
         """{node: (values, error bounds)} (N or 1, m) of these basis functions at times t (N or 1,
         m).
 
-        `states` are values and error bounds (n, N, m) of the states, to first order in their errors; `late`, of waves
-        {node: (N or 1, 1)}, bounds of further errors of their phases.
+        `states` are values and error bounds (n, N, m) of the states, to first order in their
+        errors; `phase_bars`, of waves {node: (N or 1, 1)}, bounds of further errors of their phases.
         The bounds hold for the kernels, whose functions are those of the C library, rounded to 1 or 2 ulp.
         """
         values, errors = numbers
-        u, found = ROUNDOFF_UP, {}
+        u = ROUNDOFF_UP
+        found = {}
         needed = self.needed(nodes)
         with np.errstate(all="ignore"):
             for k in needed:
@@ -732,8 +738,8 @@ class Program:
                     e = (dx + abs(v) * dy) / abs(y) + u * abs(v)
                 else:
                     x, dx = found[o[0]]
-                    if late and k in late:
-                        dx = dx + late[k]
+                    if phase_bars and k in phase_bars:
+                        dx = dx + phase_bars[k]
                     function, slope = FUNCTIONS[operation]
                     v = function(x)
                     e = (
@@ -746,7 +752,8 @@ class Program:
 
     def needed(self, nodes):
         """Places of what these basis functions are made of, in order."""
-        found, begun = [], set()
+        found = []
+        begun = set()
 
         def visit(node):
             if node in begun:
@@ -795,18 +802,18 @@ class Program:
         rounding = len(diagonal) * ROUNDOFF_UP * abs(own).sum(axis=1)
         return own.sum(axis=1), errors[:, diagonal[:, pg.NUMBER]].sum(axis=1) + rounding
 
-    def sampled(self, numbers, t, late=None):
+    def sampled(self, numbers, t, phase_bars=None):
         """(terms, values, error bounds): the terms with their basis functions numbered from 0, and
         these functions (B, N, m) at times t (N, m); where they depend on t alone t may be (1, m),
-        and N is 1. `late` as in `series`.
+        and N is 1. `phase_bars` as in `series`.
         """
-        found = self.series(numbers, t, self.used, late=late)
+        found = self.series(numbers, t, self.used, phase_bars=phase_bars)
         wide = max((len(values) for values, _bars in found.values()), default=1)
         out = np.empty((2, len(self.used), wide, t.shape[1]))
         for k, node in enumerate(self.used):
             out[0, k], out[1, k] = found[node]
         terms = self.terms.copy()
-        terms[:, 0] = np.searchsorted(self.used, terms[:, 0])
+        terms[:, pg.BASIS] = np.searchsorted(self.used, terms[:, pg.BASIS])
         return terms, *out
 
     def holds(self, points, low, high):

@@ -10,7 +10,7 @@ from survey.kernels.jit import wait_for_other_compiler
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
-NO_SQUARES = np.zeros((0, 4))
+NO_SQUARES = np.zeros((0, kernels.SQUARES))
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,8 @@ def solve(problem, asked, answers, decide=True):
     if problem.exact is not None:
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
         if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:
-            d, bar = abs(answers.floats[DISCRIMINANT]), answers.floats[DISCRIMINANT + 1]
+            d = abs(answers.floats[DISCRIMINANT])
+            bar = answers.floats[DISCRIMINANT + 1]
             _exactly(
                 problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS
             )

@@ -133,7 +133,9 @@ def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descen
     depth = np.array([x.depth, y.depth])
     halves = np.full((2, max(depth.max(), 1), 2, NODES, NODES), np.nan)
     halves[0, : x.depth], halves[1, : y.depth] = x.halves(), y.halves()
-    todo, kept, points = _first(depth), [], 0
+    todo = _first(depth)
+    kept = []
+    points = 0
 
     def task(blocks):
         leaves, count = descend(*_series(solve, x, y, blocks, values), blocks, depth, halves)

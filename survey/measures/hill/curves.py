@@ -61,7 +61,7 @@ class Seeds:
 
 
 @dataclass
-class Curves:
+class FollowedCurves:
     """Curves one after another: `count` points each; `kind`, `index`, `complete` per curve.
 
     Per point its position `x` (m, 2), unit tangent `along` (m, 2) and `error`, a bound of its
@@ -79,7 +79,7 @@ class Curves:
 
 
 def trace(solve, square, seeds, each=in_turn):
-    """The Curves through all seeds.
+    """The FollowedCurves through all seeds.
 
     `solve(q, p, wanted)` gives outputs at q (m, 1), p (m, n), the square's parameters; `each`: see
     `measures.tasks`.
@@ -127,7 +127,7 @@ def _in_chunks(each, task, number, what):
 
 
 @dataclass
-class Path:
+class BracketedPath:
     """Points of a curve in order: positions, tangents, lines on which they are bracketed.
 
     `complete`: the curve is closed, or both its ends lie on borders.
@@ -257,7 +257,7 @@ def _joined(trail, ended, closed):
             forth = forth[1:]  # the seed is in both
         x, along, line = (np.concatenate([v[back], v[forth]]) for v in values)
         along[: back.size] *= -1
-        paths.append(Path(x, along, line, bool(ended[tip] and ended[tip + n])))
+        paths.append(BracketedPath(x, along, line, bool(ended[tip] and ended[tip + n])))
     return paths
 
 
@@ -283,13 +283,15 @@ def _on(path, x, towards):
 
 
 def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
-    """The Curves of the paths, each point bracketed on its line and counted by its rotation number."""
+    """The FollowedCurves of the paths, each point bracketed on its line and counted by its rotation number."""
     count = np.array([len(path.x) for path in paths], int)
     whose = np.repeat(np.arange(len(paths)), count)
     x, along, line = (np.concatenate([getattr(p, name) for p in paths] or [np.zeros((0, 2))])
                       for name in ("x", "along", "line"))  # fmt: skip
     kind, index = seeds.kind[starts], seeds.index[starts]
-    new, error, sure = x.copy(), np.zeros(len(x)), np.zeros(len(x), bool)
+    new = x.copy()
+    error = np.zeros(len(x))
+    sure = np.zeros(len(x), bool)
 
     def task(own):
         def at(who, t, wanted):
@@ -304,16 +306,14 @@ def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
         )  # fmt: skip
         sides = t[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
         good &= tongue(at(slice(None), sides, COUNTS), mine) == index[whose[own]]
-        new[own], error[own], sure[own] = (
-            x[own] + t[:, None] * line[own],
-            width + square.grain,
-            good,
-        )
+        new[own] = x[own] + t[:, None] * line[own]
+        error[own] = width + square.grain
+        sure[own] = good
 
     _in_chunks(each, task, len(x), "parts of the curves")
     complete = np.array([path.complete for path in paths], bool)
     complete[whose[~sure]] = False
-    return Curves(
+    return FollowedCurves(
         np.bincount(whose[sure], minlength=len(paths)), kind, index, complete, new[sure], along[sure], error[sure],
         of_seed,
     )  # fmt: skip

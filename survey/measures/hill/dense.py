@@ -31,8 +31,18 @@ import numpy as np
 from survey import status
 from survey.kernels import jit
 from survey.kernels.hill import answers as kernels
-from survey.kernels.hill.series import TERMS, discriminants, discriminants_at, factors, points
-from survey.kernels.lanes import RESULTS, Y1_ZEROS
+from survey.kernels.hill.series import (
+    NEAR,
+    TERMS,
+    TURNS,
+    Y1_MOST,
+    Y2_MOST,
+    discriminants,
+    discriminants_at,
+    factors,
+    points,
+)
+from survey.kernels.lanes import DY2, RESULTS, Y1, Y1_ZEROS
 from survey.kernels.math import chebyshev
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked
@@ -125,7 +135,7 @@ def compile_ahead(sample, no_rows, variables):
             np.ones((4, 1)),
             np.ones(1),
             False,
-            np.zeros((5, 1, 2)),
+            np.zeros((TURNS, 1, 2)),
             2,
             False,
         )
@@ -148,7 +158,9 @@ def scattered(box, method, asked, answers, position, p):
     """Answer points on their own (N each) from the series of their `box`; returns those (N, bool)
     to be solved.
     """
-    sought, axis, open_points = _sought(asked), _axis(box.line, box.even), np.ones(p.size, np.bool_)
+    sought = _sought(asked)
+    axis = _axis(box.line, box.even)
+    open_points = np.ones(p.size, np.bool_)
     served = _served_panels(box, method, asked, axis, sought)
     if not sought.factors and any(not bars[0] <= asked.rtol for _, _, _, bars, *_ in served):
         # where D varies by many powers of ten, bounds of the factors are nearer
@@ -160,10 +172,8 @@ def scattered(box, method, asked, answers, position, p):
         for some in np.split(inside, range(CALL_POINTS, inside.size, CALL_POINTS)):
             if not some.size:
                 continue
-            across, along = (
-                (position[some] - 0.5 * (low + high)) / (0.5 * (high - low)),
-                (p[some] - axis.middle) / axis.radius,
-            )
+            across = (position[some] - 0.5 * (low + high)) / (0.5 * (high - low))
+            along = (p[some] - axis.middle) / axis.radius
             alone = some[-1] - some[0] == some.size - 1
             found, first = (answers, some[0]) if alone else (Answers(some.size, asked), 0)
             if sought.factors:
@@ -233,14 +243,13 @@ def _shortened(series, bars):
 
 def _at_points(box, axis, series, number, bars, turns, across, along, position):
     """The results (N, RESULTS) at x `across` and `along` the rows of a panel."""
-    results, nodes = np.empty((position.size, RESULTS)), turns.shape[2] * (2 if axis.even else 1)
+    results = np.empty((position.size, RESULTS))
+    nodes = turns.shape[2] * (2 if axis.even else 1)
     *one, share = _between(across, turns.shape[1], turns.shape[1])
     *other, further = _between(abs(along) if axis.even else along, nodes, turns.shape[2])
-    x, around, shares = (
-        np.stack([across, along]),
-        np.stack([*one, *other]),
-        np.stack([share, further]),
-    )
+    x = np.stack([across, along])
+    around = np.stack([*one, *other])  # LOW_ACROSS to HIGH_ALONG
+    shares = np.stack([share, further])
     odd = _odd(box.row_axis, axis, position)
     points(series, number, bars, x, axis.even, odd, turns, around, shares, box.full_period, results)
     return results
@@ -274,7 +283,8 @@ def _axis(line, symmetric):
 
 def _rows(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of the `chosen` rows, each by a series of its own."""
-    sought, degree = _sought(asked), np.full(problem.span.size, DEGREES.size)
+    sought = _sought(asked)
+    degree = np.full(problem.span.size, DEGREES.size)
     degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
     first = degree.copy()
     # a row whose series has not converged goes on to the next degree
@@ -318,14 +328,15 @@ def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, ope
 
 
 def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points):
-    """Answer the points x of the rows from the series (4, R, n) of their factors, and `turns` (5,
-    R, nodes).
+    """Answer the points x of the rows from the series (FACTORS, R, n) of their factors, and `turns`
+    (TURNS, R, nodes).
     """
     padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
     padded[:, :, : series.shape[2]] = series
     number = turns.shape[2] * (2 if axis.even else 1)
     rule = None if problem.rule is None else problem.rule.reshape(-1)
-    most, apart = max(1, CALL_POINTS // x.size), np.flatnonzero(np.diff(rows) != 1) + 1
+    most = max(1, CALL_POINTS // x.size)
+    apart = np.flatnonzero(np.diff(rows) != 1) + 1
     for part in np.split(np.arange(rows.size), apart):
         for some in (part[i : i + most] for i in range(0, part.size, most)):
             some = slice(some[0], some[-1] + 1)
@@ -370,7 +381,9 @@ def _discriminants(answers, rows, series, bars, x, nodal):
     """D of the rows from their series at x, in place, within `bars`, or within what is `nodal`."""
     at_nodes, nodes = np.empty((len(series), 0)), 0
     if nodal is not None:
-        bars, at_nodes, nodes = nodal.doubts, _padded(nodal.bars), nodal.bars.shape[1]
+        bars = nodal.doubts
+        at_nodes = _padded(nodal.bars)
+        nodes = nodal.bars.shape[1]
     own = answers.asked.rtol, answers.floats, answers.verdict, answers.missed
     discriminants(rows, _padded(series), bars, at_nodes, nodes, x, *own)
 
@@ -417,21 +430,18 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
         chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((2, 0)), np.empty((0, 0)))
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
-    position, left = problem.positions[chosen], np.ones(chosen.size, np.bool_)
+    position = problem.positions[chosen]
+    left = np.ones(chosen.size, np.bool_)
     for low, high, series, bars, turns, of_nodes, nodal in served:
         inside = left & (position >= low) & (position <= high)
-        rows, own = (
-            chosen[inside],
-            np.empty((len(series), np.count_nonzero(inside), series.shape[2])),
-        )
+        rows = chosen[inside]
+        own = np.empty((len(series), np.count_nonzero(inside), series.shape[2]))
         if rows.size:
             x = (position[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
             for of, out in zip(series, own, strict=True):
                 chebyshev.restrict(of, x, np.empty((2, series.shape[2])), out)
-            bar, odd = (
-                np.repeat(bars[:, None], rows.size, axis=1),
-                _odd(problem.row_axis, axis, position[inside]),
-            )
+            bar = np.repeat(bars[:, None], rows.size, axis=1)
+            odd = _odd(problem.row_axis, axis, position[inside])
             # points may miss it: bounds of the rows themselves, which cost more
             if (bars > asked.rtol).any():
                 tails, bars_there = of_nodes
@@ -439,7 +449,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
                     bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1])
                 )
             if len(own) > 1:
-                own[3], bar[3] = own[3] * odd[:, None], bar[3] * odd
+                own[DY2], bar[DY2] = own[DY2] * odd[:, None], bar[DY2] * odd
             wide = nodal is not None and not (bar[0] <= asked.rtol).all()
             at_rows = nodal.across(x, of_nodes[0][0]) if wide else None
             _answer(
@@ -464,19 +474,18 @@ def _odd(row_axis, axis, positions):
 
 
 def _across(turns, x):
-    """The `turns` (5, R, m) of rows at x from those (5, n, m) at nodes: means, the least and the
-    largest numbers.
+    """The `turns` (TURNS, R, m) of rows at x from those (TURNS, n, m) at nodes: means, the least and
+    the largest numbers.
     """
     if turns is None:
         return None
     left, right, share = _between(x, turns.shape[1], turns.shape[1])
     one, other = turns[:, left], turns[:, right]
-    mean, low, high = (
-        one[0] + share[:, None] * (other[0] - one[0]),
-        np.minimum(one, other),
-        np.maximum(one, other),
-    )
-    return np.stack([mean, low[1], high[2], low[3], high[4]])
+    out = np.minimum(one, other)
+    for most in (Y1_MOST, Y2_MOST):
+        out[most] = np.maximum(one[most], other[most])
+    out[NEAR] = one[NEAR] + share[:, None] * (other[NEAR] - one[NEAR])
+    return out
 
 
 @lru_cache(maxsize=64)
@@ -487,7 +496,9 @@ def panels(row_axis, method, rtol, axis, sought):
     The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for
     it pays.
     """
-    left, found, budget = [(row_axis.low, row_axis.high, 1.0)], [], row_axis.number / ROWS_PER_NODE
+    left = [(row_axis.low, row_axis.high, 1.0)]
+    found = []
+    budget = row_axis.number / ROWS_PER_NODE
     while left:
         low, high, share = left.pop(0)
         if not high > low:
@@ -511,17 +522,20 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
     kind = np.abs(np.diff(ends.span * size))  # half the change of D's phase
     at = int(_enough(0.5 * kind if sought.factors else kind, rtol)[0])
-    degree, spent, doubt = int(_degrees(ends, axis, rtol, sought).max()), 0, np.inf
+    degree = int(_degrees(ends, axis, rtol, sought).max())
+    spent = 0
+    doubt = np.inf
     while at < DEGREES.size and degree < axis.most and spent + DEGREES[at] <= budget:
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = row_axis.at(middle + radius * chebyshev.symmetric_nodes(n))
         found = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis, sought)
         values, series, bars, turns, nodal = found
-        matrix, ulps = chebyshev.by_columns(n), (4 + abs(middle) + radius) / radius
+        matrix = chebyshev.by_columns(n)
+        ulps = (4 + abs(middle) + radius) / radius
         if sought.factors:
             odd = _odd(row_axis, axis, middle + radius * chebyshev.symmetric_nodes(n))
-            series[3], bars[3] = series[3] / odd[:, None], bars[3] / odd
+            series[DY2], bars[DY2] = series[DY2] / odd[:, None], bars[DY2] / odd
         surfaces, tails = zip(
             *(chebyshev.transform(of, matrix, ulps) for of in series), strict=True
         )
@@ -570,8 +584,7 @@ def _enough(kind, rtol):
 
 def _series(problem, method, rtol, rows, n, axis, sought):
     """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows),
-    and, of factors, the `turns` (5, rows, n) there: rotation numbers, and the least and the largest
-    numbers of zeros of y1, and of y2; of D what is `Nodal`.
+    and, of factors, the `turns` (TURNS, rows, n) there, NEAR to Y2_MOST; of D what is `Nodal`.
 
     If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 +
     y2') / 2, y1', y2 and, of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as
@@ -595,14 +608,15 @@ def _series(problem, method, rtol, rows, n, axis, sought):
             [found[kernels.ROTATION] if sought.turns else zeros[0], *np.repeat(zeros, 2, axis=0)]
         )
     ulps = (abs(axis.middle) + axis.radius) / axis.radius
-    matrix, odd = chebyshev.by_columns(x.size), sought.factors and axis.even
+    matrix = chebyshev.by_columns(x.size)
+    odd = sought.factors and axis.even
     if odd:
         y1, dy1, y2, dy2 = values
         values = np.stack([0.5 * (y1 + dy2), dy1, y2, 0.5 * (y1 - dy2)])
-        bars[[0, 3]] = 0.5 * (bars[0] + bars[3])
-    expanded = [chebyshev.expand(of, matrix, ulps) for of in values[: 3 if odd else None]]
+        bars[[Y1, DY2]] = 0.5 * (bars[Y1] + bars[DY2])
+    expanded = [chebyshev.expand(of, matrix, ulps) for of in values[: DY2 if odd else None]]
     if odd:  # T_{2k + 1}, whose arguments' rounding weighs four times as much
-        series, doubts = chebyshev.expand(values[3], chebyshev.odd_columns(x.size), ulps)
+        series, doubts = chebyshev.expand(values[DY2], chebyshev.odd_columns(x.size), ulps)
         expanded.append((series, 4 * doubts))
     series, doubts = (np.stack(of) for of in zip(*expanded, strict=True))
     nodal = None if sought.factors else Nodal(doubts[0], at_nodes[0])

@@ -69,7 +69,8 @@ def find(solve, rows, low, high, panels=4):
     `solve(row, x, wanted)` gives the outputs `wanted`, with their bounds, at x (m, n), one row
     number for each of m.
     """
-    found, left = [], np.arange(rows)
+    found = []
+    left = np.arange(rows)
     complete = np.zeros(rows, np.bool_)
     for attempt in range(HALVINGS):
         edges = _close_in(solve, *_candidates(solve, left, low, high, panels << attempt), low, high)
@@ -139,10 +140,8 @@ def _all_zeros(series):
     edges = np.pi * np.arange(CELLS + 1) / CELLS
     at_edges = series @ np.cos(k[:, None] * edges)
     middle = series @ np.cos(k[:, None] * (edges[:-1] + half))
-    slope, bend = (
-        abs(series @ (k[:, None] * np.sin(k[:, None] * (edges[:-1] + half)))),
-        abs(series) @ (k * k),
-    )
+    slope = abs(series @ (k[:, None] * np.sin(k[:, None] * (edges[:-1] + half))))
+    bend = abs(series) @ (k * k)
     none = abs(middle) > half * slope + (0.5 * half * half) * bend[:, None]
     changes = (at_edges[:, 1:] < 0) != (at_edges[:, :-1] < 0)
     clear = (none | (slope > half * bend[:, None])).all(axis=1)
@@ -196,7 +195,8 @@ def on_rows(solve, row, x, wanted):
     order = np.lexsort((x[:, 0], row))
     row, slot = row[order], np.arange(row.size)
     slot = (slot - np.searchsorted(row, row)) % TOGETHER
-    line, starts = np.cumsum(slot == 0) - 1, np.flatnonzero(slot == 0)
+    line = np.cumsum(slot == 0) - 1
+    starts = np.flatnonzero(slot == 0)
     together = np.repeat(x[order[starts], None], slot.max(initial=0) + 1, axis=1)
     together[line, slot] = x[order]
     out = solve(row[starts], together.reshape(starts.size, together[:1].size), wanted)
@@ -263,10 +263,8 @@ def _complete(solve, rows, edges, low, high):
     order = np.lexsort((edges[1], edges[0]))
     row, x, width, kind, index = (values[order] for values in edges)
     row_at = np.searchsorted(rows, row)
-    number, own = (
-        np.bincount(row_at, minlength=rows.size),
-        np.arange(row.size) - np.searchsorted(row, row),
-    )
+    number = np.bincount(row_at, minlength=rows.size)
+    own = np.arange(row.size) - np.searchsorted(row, row)
     # of each row both ends, the middles between them and its edges, and its upper end again
     listed = np.full((rows.size, number.max(initial=0) + 2), float(high))
     listed[:, 0], listed[row_at, own + 1] = low, x

@@ -58,7 +58,8 @@ def expander(solve, square):
         middle = np.clip(x, low + spacing, high - spacing)
         nine = square.parameters(middle[:, None] + spacing[:, None] * STENCIL[:, None])
         q, row = np.unique(nine[..., 0], return_inverse=True)  # seeds on one row share its values
-        wanted, p = FACTORS + COUNTS[:count], np.repeat(nine[..., 1], 3, axis=0)
+        wanted = FACTORS + COUNTS[:count]
+        p = np.repeat(nine[..., 1], 3, axis=0)
         out = on_rows(lambda own, x, names: solve(q[own, None], x, names), row.ravel(), p, wanted)
         f, _ = of_kind({name: values.reshape(-1, 3, 3) for name, values in out.items()}, kind)
         h, k = spacing.T

@@ -164,7 +164,8 @@ def of_rows(rows, sample, walk, exact=None):
         return out
 
     def walked(used, p, tolerance):
-        out, reached = np.full((used.size, RESULTS), np.nan), np.zeros(used.size, np.bool_)
+        out = np.full((used.size, RESULTS), np.nan)
+        reached = np.zeros(used.size, np.bool_)
         walk(rows[used], p, tolerance, out, reached)
         return out, reached
 

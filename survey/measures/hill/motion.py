@@ -37,10 +37,8 @@ def solve(problem, answer, time, name="t", damping=0.0):
     if time is not None:
         kept = t <= time * (1 + 1e-12)
         t, y, bars = t[kept], y[kept], bars[kept]
-    loss, trace = (
-        np.exp(-damping * period),
-        np.array([answer["discriminant"], answer["discriminant_error"]], float),
-    )
+    loss = np.exp(-damping * period)
+    trace = np.array([answer["discriminant"], answer["discriminant_error"]], float)
     pair, off = linear_motion.of_trace(*trace / loss)
     slack = 16 * EPS * abs(damping * period)  # of e^(-c T), relative, and so of both
     pair, off = loss * pair, loss * (off * (1 + 2 * slack) + 2 * slack * abs(pair) * bool(damping))

@@ -189,10 +189,8 @@ OTHERS = {  # of a context
 
 def _function(function, seen, mp):
     """A copy of a Python function whose names mean lifted values."""
-    code, scope = (
-        function.__code__,
-        {"__builtins__": {name: getattr(builtins, name) for name in BUILTINS}},
-    )
+    code = function.__code__
+    scope = {"__builtins__": {name: getattr(builtins, name) for name in BUILTINS}}
     scope["__builtins__"]["float"] = mp.mpf
     cells = tuple(CellType() for _ in function.__closure__ or ())
     made = FunctionType(code, scope, function.__name__, None, cells)
@@ -300,7 +298,8 @@ def _transforms(number):
     ]
     shifted = [[1], [-1, 2]]
     for _ in range(2, number):
-        one, before = shifted[-1], [*shifted[-2], 0, 0]
+        one = shifted[-1]
+        before = [*shifted[-2], 0, 0]
         up, same = [0, *one], [*one, 0]
         shifted.append([4 * u - 2 * s - b for u, s, b in zip(up, same, before, strict=True)])
     power = [

@@ -39,12 +39,13 @@ def solve(row, rho, found):
     k = np.broadcast_to(row.k[:, None], rho.shape)
     half = np.broadcast_to(row.half[0][:, None], rho.shape)
     those = (found["verdict"] == STABLE) & (k > 0) & (k <= LARGEST) & (np.abs(rho) <= LARGEST)
-    out = np.full((*rho.shape, 4), np.nan)
-    some = np.empty((np.count_nonzero(those), 4))
+    out = np.full((*rho.shape, twist.COLUMNS), np.nan)
+    some = np.empty((np.count_nonzero(those), twist.COLUMNS))
     twist.twists(k[those], half[those], c0, rho[those], some)
     some[~np.isfinite(some).all(axis=1)] = np.nan
     out[those] = some
-    turning, resonant, bar, other = np.moveaxis(out, -1, 0)
+    turning, bar = out[..., twist.TWIST], out[..., twist.TWIST_BAR]
+    resonant, other = out[..., twist.RESONANT], out[..., twist.RESONANT_BAR]
     with np.errstate(invalid="ignore"):
         twisted = np.abs(turning) > bar
         outweighs = np.abs(turning) - bar > np.abs(resonant) + other

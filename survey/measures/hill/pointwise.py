@@ -63,7 +63,8 @@ def _solve(problem, method, asked, answers, chosen):
 
     def run_at(points, rung):
         """The results (points, RESULTS) of these points of the flat problem on their rungs."""
-        on_rung, out = np.full_like(first, UNTRIED), np.empty((first.size, RESULTS))
+        on_rung = np.full_like(first, UNTRIED)
+        out = np.empty((first.size, RESULTS))
         on_rung.reshape(-1)[points] = rung
         run(problem, method, on_rung, out)
         return out[points]

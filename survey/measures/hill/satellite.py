@@ -53,7 +53,10 @@ def planar_angle(u, k, kc):
     kc is the complement, of 1/k for rotations. DLMF 22.20(ii): am by descending means of 1 and kc.
     """
     small, scale = min(k, 1.0 / k) if k > 0 else 0.0, max(k, 1.0)
-    pairs, a, b, c = [], 1.0, kc, small
+    pairs = []
+    a = 1.0
+    b = kc
+    c = small
     while c > CLOSE * a:
         a, b = 0.5 * (a + b), sqrt(a * b)
         c = c * c / (4.0 * a)

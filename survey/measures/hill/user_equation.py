@@ -22,6 +22,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from survey.kernels.hill import dop853, sampled_double
+from survey.kernels.hill.answers import SQUARES
 from survey.kernels.jit import fresh, inline, kernel
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math import chebyshev
@@ -224,7 +225,8 @@ def walked(z, points, rows, steps, scale, tolerance):
     """The results of the `points`, each of one of the `rows`, by DOP853, and which of them reached
     the end.
     """
-    out, reached = np.full((rows.size, RESULTS), np.nan), np.zeros(rows.size, np.bool_)
+    out = np.full((rows.size, RESULTS), np.nan)
+    reached = np.zeros(rows.size, np.bool_)
     stride = STRIDE / steps.rate[rows].max(axis=1)
     own = points, steps.edges[rows], steps.pieces[rows], steps.slack[rows], stride, scale[rows]
     kernels(z).walk(*own, tolerance, out, reached)
@@ -233,7 +235,7 @@ def walked(z, points, rows, steps, scale, tolerance):
 
 def solved_exactly(z, points, rows, steps, scale, even, exact, number):
     """The results of the `points`, each of one of the `rows`, in double-double, in its `number` of steps."""
-    out = np.full((rows.size, RESULTS + (0 if even else sampled_double.SQUARES)), np.nan)
+    out = np.full((rows.size, RESULTS + (0 if even else SQUARES)), np.nan)
     for i in np.flatnonzero(number <= EXACT_STEPS):
         start = steps.of(rows[i : i + 1], number[i])[0][0]
         with multiprecision.LOCK:
@@ -259,7 +261,8 @@ def unprobed(z, points, edges, slack, size):
     """
     if not len(points) or edges.shape[1] != 2 or slack.any():
         return np.zeros(len(points), np.bool_)
-    most, end = np.nan_to_num(abs(points)), float(np.nan_to_num(edges[:, -1]).max())
+    most = np.nan_to_num(abs(points))
+    end = float(np.nan_to_num(edges[:, -1]).max())
     found = bands.missed(z, tuple(most.max(axis=0).tolist()), end, SIZES[0])
     known = found <= 10 * RESOLVED * size
     if isfinite(found):  # where z is small by its parameters, each for itself
@@ -276,10 +279,8 @@ def measured(z, points, edges, period, slack, probes=PROBES):
     With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ.
     `probes` as PROBES.
     """
-    shape, owner = (
-        (len(points), edges.shape[1] - 1),
-        np.repeat(np.arange(len(points)), edges.shape[1] - 1),
-    )
+    shape = (len(points), edges.shape[1] - 1)
+    owner = np.repeat(np.arange(len(points)), edges.shape[1] - 1)
     left, right = edges[:, :-1].reshape(-1, 1), edges[:, 1:].reshape(-1, 1)
 
     def values(pieces, number, mirrored=False):
@@ -290,7 +291,8 @@ def measured(z, points, edges, period, slack, probes=PROBES):
 
     def probed(pieces):
         """The points, the ends (N, 2) and the number of probes of each piece."""
-        ends, own = np.concatenate([left[pieces], right[pieces]], axis=1), owner[pieces]
+        ends = np.concatenate([left[pieces], right[pieces]], axis=1)
+        own = owner[pieces]
         share = np.diff(ends, axis=1)[:, 0] / edges[own, -1]
         return (
             points[own],

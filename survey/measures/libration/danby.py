@@ -155,7 +155,8 @@ def _chain(method, e, d1, d2, number):
     """Results (N, RESULTS) by `number` (N) fixed steps; points of one mesh together, in calls of
     bounded work.
     """
-    results, key = np.empty((e.size, RESULTS)), number * 1000 + grading(e)
+    results = np.empty((e.size, RESULTS))
+    key = number * 1000 + grading(e)
     order = np.argsort(key, kind="stable")
     nodes = tuple(method.NODES)
     for same in np.split(order, np.flatnonzero(np.diff(key[order])) + 1):

@@ -49,10 +49,8 @@ def radius(remainders, time):
     )
     known = np.isfinite(safe).any(axis=0)
     best = np.where(known, orders[np.argmax(np.where(np.isfinite(safe), safe, -1.0), axis=0)], -1)
-    radius, least = (
-        np.full(known.shape, np.nan),
-        safe.max(axis=0, initial=-1.0, where=np.isfinite(safe)),
-    )
+    radius = np.full(known.shape, np.nan)
+    least = safe.max(axis=0, initial=-1.0, where=np.isfinite(safe))
     for r in np.unique(best[known]):
         radius[best == r] = _solve(
             r, norms[r][0].max(axis=0)[best == r], np.broadcast_to(time, best.shape)[best == r]

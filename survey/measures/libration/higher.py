@@ -64,7 +64,8 @@ def _missed(out, rtol):
 def _coefficients(mu, order, series):
     """Coefficients with their bounds (N, monomials)."""
     each, where = np.unique(mu, return_inverse=True)
-    (values, bars), out = series.coefficients(each, order), {}
+    (values, bars) = series.coefficients(each, order)
+    out = {}
     known = (bars < LARGEST_BAR) & np.isfinite(values)
     values, bars = np.where(known, values, np.nan), np.where(known, bars, np.nan)
     for n in ORDERS:

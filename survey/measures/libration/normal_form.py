@@ -71,11 +71,9 @@ def solve(mu, method, rtol):
 
 def answers(mu, method):
     """All outputs at mu (N), by one method."""
-    omega, nearest, distance = (
-        np.empty((2, mu.size)),
-        np.empty(mu.size, dtype=np.int64),
-        np.empty((2, mu.size)),
-    )
+    omega = np.empty((2, mu.size))
+    nearest = np.empty(mu.size, dtype=np.int64)
+    distance = np.empty((2, mu.size))
     linear(mu, VECTORS, omega, nearest, distance)
     c, combined = forms(method, mu, omega)
     ray = on_ray(c, combined, omega)

@@ -24,13 +24,14 @@ LEAST = 1e-17  # of the largest coefficient: what is less counts at no single po
 PI = "3.14159265358979323846264338327950288419716939937510582097494"
 # Orders in y and in 4 s - 3. A sum of T_n(x) c_n rounds its terms, T_n or Clenshaw's sum by n^2 / 2
 # EPS, and x, where T_n' <= n^2.
-IN_Y, IN_S = np.arange(panels.TERMS)[:, None], np.arange(traces.NODES)
+IN_Y = np.arange(panels.TERMS)[:, None]
+IN_S = np.arange(traces.NODES)
 ROUNDING = EPS * (8.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
 # In double-double n rounds |c_n| up to n + 1 times, each with a weight up to n + 1.
 PAIR_ROUNDING = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, NODES + 1) ** 3
 
 
-class Panel(NamedTuple):
+class TracePanel(NamedTuple):
     """Series on one panel; bars (5) are what A to t, divided by their growth, may be off."""
 
     middle: np.ndarray  # see `kernels.libration.panels.position` (4)
@@ -43,7 +44,7 @@ class Panel(NamedTuple):
 
 @lru_cache(maxsize=64)
 def panel(number):
-    """The Panel of this number."""
+    """The TracePanel of this number."""
     shapes, weights, middle = nodes(number)
     rates, matrix = tables()
     results = np.empty((NODES**2, kernels.RESULTS))
@@ -61,7 +62,7 @@ def panel(number):
     left_out = magnitudes.copy()
     left_out[:, : panels.TERMS, : traces.NODES][:, IN_S < lengths[:, None]] = 0.0
     short_bars = bars + left_out.sum(axis=(1, 2)) + (ROUNDING * abs(short)).sum(axis=(1, 2))
-    return Panel(middle, series, bars, short, lengths, short_bars)
+    return TracePanel(middle, series, bars, short, lengths, short_bars)
 
 
 def rows(e):
@@ -71,10 +72,8 @@ def rows(e):
     series, bars = np.empty((e.size, INVARIANTS, traces.NODES)), np.empty((e.size, INVARIANTS))
     for one in np.unique(number):
         mine = np.flatnonzero(number == one)
-        found, found_bars = (
-            np.empty((mine.size, INVARIANTS, traces.NODES)),
-            np.empty((mine.size, INVARIANTS)),
-        )
+        found = np.empty((mine.size, INVARIANTS, traces.NODES))
+        found_bars = np.empty((mine.size, INVARIANTS))
         own = panel(int(one))
         panels.rows(e[mine], one == 0, own.middle, own.series, own.bars, found, found_bars)
         series[mine], bars[mine] = found, found_bars
@@ -83,11 +82,9 @@ def rows(e):
 
 def row(e):
     """As `rows`, of one row as pairs (5, 2, NODES), and the bounds (5)."""
-    number, series, bars = (
-        np.empty(1, dtype=np.int64),
-        np.empty((INVARIANTS, 2, NODES)),
-        np.empty(INVARIANTS),
-    )
+    number = np.empty(1, dtype=np.int64)
+    series = np.empty((INVARIANTS, 2, NODES))
+    bars = np.empty(INVARIANTS)
     panels.panels(np.array([e]), number)
     own = panel(int(number[0]))
     panels.row(e, number[0] == 0, own.middle, own.pairs, own.pair_bars, series, bars)
@@ -100,7 +97,8 @@ def points(e, mu):
     panels.panels(e, number)
     for one in np.unique(number):
         mine = np.flatnonzero(number == one)
-        found, own = np.empty((mine.size, traces.RESULTS)), panel(int(one))
+        found = np.empty((mine.size, traces.RESULTS))
+        own = panel(int(one))
         panels.points(
             e[mine], mu[mine], one == 0, own.middle, own.series, own.lengths, own.bars, found
         )

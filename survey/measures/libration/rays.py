@@ -36,10 +36,8 @@ def answers(c, combined, omega):
     for name, both in zip(RAYS, (alpha, beta), strict=True):
         value, bar = (np.stack(part, axis=-1) for part in zip(*both, strict=True))
         known = np.isfinite(value) & np.isfinite(bar)
-        out[name], out[f"{name}_error"] = (
-            np.where(known, value, np.nan),
-            np.where(known, MARGIN * bar, np.nan),
-        )
+        out[name] = np.where(known, value, np.nan)
+        out[f"{name}_error"] = np.where(known, MARGIN * bar, np.nan)
     return out
 
 

@@ -128,7 +128,8 @@ def _traced(part, square, axes, s):
         return s < 0.0 or surface(*part.at(t), s)["nutation_square"][0] >= 0.0
 
     t = sampled(position, part.low, part.high)
-    borders, cusps = changes(inside, t), changes(stable, t) if s > 0.0 else np.array([])
+    borders = changes(inside, t)
+    cusps = changes(stable, t) if s > 0.0 else np.array([])
     t = np.unique(np.concatenate([t, borders, cusps]))
     cuts = np.unique(np.concatenate([t[[0, -1]], borders, cusps]))
     found = [(CUSP, _points(part, cusps[[i]], s)) for i in np.flatnonzero(inside(cusps))]

@@ -70,25 +70,21 @@ def _settled(solve):
                 now = None
             if now is not None and before is not None and _agree(before, now):
                 passes, number, found = now
-                return (
-                    passes,
-                    number,
-                    [_rounded(*pair) for pair in zip(before[2], found, strict=True)],
-                )
+                _passes, _number, rougher = before
+                return passes, number, [_rounded(*x) for x in zip(rougher, found, strict=True)]
         before, digits = now, 2 * digits
     return None
 
 
 def _agree(before, now):
     """Do two answers agree, that of fewer digits and that of more?"""
-    if before[:2] != now[:2] or any(
-        x.keys() != y.keys() for x, y in zip(before[2], now[2], strict=True)
-    ):
+    *kind, rougher = before
+    *same, found = now
+    if kind != same:
         return False
-    return all(
-        abs(x[name] - y[name]) <= CLOSE * (ONE + abs(y[name]))
-        for x, y in zip(before[2], now[2], strict=True)
-        for name in y
+    pairs = list(zip(rougher, found, strict=True))
+    return all(x.keys() == y.keys() for x, y in pairs) and all(
+        abs(x[name] - y[name]) <= CLOSE * (ONE + abs(y[name])) for x, y in pairs for name in y
     )
 
 
@@ -189,7 +185,8 @@ def _real_roots(k, level, a, b):
             sign * z.sqrt() for z in _of_quadratic(HALF * p, r, positive=True) for sign in (1, -1)
         ]
     y = _largest(TWO * p, p * p - FOUR * r, -q * q)
-    w, found = y.sqrt(), []
+    w = y.sqrt()
+    found = []
     for side in (1, -1):
         found += _of_quadratic(
             HALF * side * w, HALF * (p + y) - side * q / (TWO * w), abs(p) + abs(q / w)

@@ -22,7 +22,8 @@ def solve(given, valid, times, out, request):
     given: the parameters (n) of states in the order of the scene's, or of scaled integrals; times
     (n, m) or None.
     """
-    wanted, found = request.variables, {}
+    wanted = request.variables
+    found = {}
     with np.errstate(all="ignore"):
         if "saddle_growth" in wanted:
             found["saddle_growth"] = _growth(given, request)

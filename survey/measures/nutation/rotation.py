@@ -45,7 +45,8 @@ def constants(rows, kinds, starts, periods, points):
     some = np.empty((np.count_nonzero(turning), 2, rt.PLACE))
     rt.origins(rows[turning], starts[turning], periods[turning], some)
     found[turning] = some
-    (since, psi, phi), (delay, psi_bar, phi_bar) = found[:, 0].T, found[:, 1].T
+    since, psi, phi = found[:, rt.VALUES].T
+    delay, psi_bar, phi_bar = found[:, rt.BARS].T
     twice, field = (level - a * a) / size_a + a * a / size_c, epsilon * size_a
     sizes = (abs(level) + a * a) / size_a + a * a / size_c + abs(field)
     second = level - field * size_c
@@ -92,22 +93,22 @@ def at_times(rows, kinds, starts, periods, times, points, motion):
     found[still] = resting.rotations(
         points[still], motion["u"][still], motion["u_error"][still]
     ).transpose(2, 3, 0, 1)
-    values, bars = np.moveaxis(found, -1, 0)[:, :, :, 0], np.moveaxis(found, -1, 0)[:, :, :, 1]
-    sine, p_theta, across = values
+    sine, p_theta, across = np.moveaxis(found[:, :, rt.VALUES], -1, 0)
+    sine_bar, p_theta_bar, across_bar = np.moveaxis(found[:, :, rt.BARS], -1, 0)
     phi, off = motion["phi"], motion["phi_error"] + 4.0 * ROUNDOFF
     s, c = np.sin(phi), np.cos(phi)
     turned = off * np.hypot(p_theta, across)
     first, second = across * s + p_theta * c, across * c - p_theta * s
-    bar = bars[2] * np.abs(s) + bars[1] * np.abs(c) + turned
-    other = bars[2] * np.abs(c) + bars[1] * np.abs(s) + turned
+    bar = across_bar * np.abs(s) + p_theta_bar * np.abs(c) + turned
+    other = across_bar * np.abs(c) + p_theta_bar * np.abs(s) + turned
     spin = np.broadcast_to(a / size_c, times.shape)
     tilted = off * np.abs(sine)
     return {
-        "p_theta": (p_theta, bars[1]),
+        "p_theta": (p_theta, p_theta_bar),
         "omega1": (first / size_a, bar / size_a + 4.0 * ROUNDOFF * np.abs(first / size_a)),
         "omega2": (second / size_a, other / size_a + 4.0 * ROUNDOFF * np.abs(second / size_a)),
         "omega3": (spin, ROUNDOFF * np.abs(spin)),
-        "gamma1": (sine * s, bars[0] * np.abs(s) + tilted + 2.0 * ROUNDOFF * np.abs(sine * s)),
-        "gamma2": (sine * c, bars[0] * np.abs(c) + tilted + 2.0 * ROUNDOFF * np.abs(sine * c)),
+        "gamma1": (sine * s, sine_bar * np.abs(s) + tilted + 2.0 * ROUNDOFF * np.abs(sine * s)),
+        "gamma2": (sine * c, sine_bar * np.abs(c) + tilted + 2.0 * ROUNDOFF * np.abs(sine * c)),
         "gamma3": (motion["u"], motion["u_error"]),
     }

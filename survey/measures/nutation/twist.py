@@ -39,7 +39,8 @@ def determinants(rows, kinds, sizes, wanted):
     wanted = [name for name in NAMES if name in wanted]
     if not wanted:
         return {}
-    found, turning = np.full((len(rows), 2, twist.TWISTS), np.nan), kinds >= nu.NUTATION
+    found = np.full((len(rows), 2, twist.TWISTS), np.nan)
+    turning = kinds >= nu.NUTATION
     some = np.empty((np.count_nonzero(turning), 2, twist.TWISTS))
     twist.twists(rows[turning], np.column_stack(sizes)[turning], some)
     found[turning] = np.where(np.isfinite(some).all(axis=1, keepdims=True), some, np.nan)

@@ -25,8 +25,11 @@ def of_states(points):
     states (n, STATE).
     """
     n = len(points)
-    rows, kinds, count = np.zeros((n, nu.SIZE)), np.zeros(n, np.int64), np.full(n, -1)
-    heights, starts = np.full((n, rc.HEIGHT), np.nan), np.zeros((n, rc.START))
+    rows = np.zeros((n, nu.SIZE))
+    kinds = np.zeros(n, np.int64)
+    count = np.full(n, -1)
+    heights = np.full((n, rc.HEIGHT), np.nan)
+    starts = np.zeros((n, rc.START))
     brun.of_states(np.ascontiguousarray(points), rows, kinds, count, heights, starts)
     return rows, kinds, count, heights, starts
 
@@ -34,11 +37,9 @@ def of_states(points):
 def of_integrals(points, sign):
     """The same but starts for scaled integrals (n, INTEGRALS): rows (n, 2, SIZE), kinds (n, 2)."""
     n = len(points)
-    rows, kinds, heights = (
-        np.zeros((n, 2, nu.SIZE)),
-        np.zeros((n, 2), np.int64),
-        np.full((n, rc.HEIGHT), np.nan),
-    )
+    rows = np.zeros((n, 2, nu.SIZE))
+    kinds = np.zeros((n, 2), np.int64)
+    heights = np.full((n, rc.HEIGHT), np.nan)
     brun.of_integrals(np.ascontiguousarray(points), float(sign), rows, kinds, heights)
     count = np.where((kinds == nu.SEPARATRIX).any(axis=1), -1, (kinds >= nu.NUTATION).sum(axis=1))
     return rows, kinds, count, heights
@@ -125,10 +126,8 @@ def _smallest(rows):
 def _named(found, good):
     result = {}
     for name, (value, error) in found.items():
-        result[name], result[f"{name}_error"] = (
-            np.where(good, value, np.nan),
-            np.where(good, error, np.nan),
-        )
+        result[name] = np.where(good, value, np.nan)
+        result[f"{name}_error"] = np.where(good, error, np.nan)
     return result
 
 

@@ -8,7 +8,7 @@ from importlib import resources
 
 import numpy as np
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 from survey.scene import Request
 from survey.scenes import brun
 
@@ -116,7 +116,7 @@ def system(point, options):
     k = flat["epsilon"] * (1.0 - flat["C"] / flat["A"])
     level = p * p + ((b - a * u) / sine) ** 2 - k * u * u + a * a
     zero = np.zeros(u.size)
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.column_stack([u, -sine * p, zero, zero]),
         parameters=np.column_stack([2.0 * k, k - level, a * b, 0.5 * (b - a), 0.5 * (b + a)]),

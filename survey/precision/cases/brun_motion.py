@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 from mpmath import mp
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 SCENE = "brun"
 ERROR = "u"
@@ -27,7 +27,8 @@ def _states(number, seed):
 @cache
 def references(_work=None):
     """u at the last time: u'' = P'(u) / (2 A^2), (S2)."""
-    found, states = [], _states(6, 5)
+    found = []
+    states = _states(6, 5)
     for i in range(6):
         point = {name: float(values[i]) for name, values in states.items()}
         with mp.workdps(30):
@@ -58,12 +59,14 @@ def system(point, options):
     """u, u' and nothing else: a quartic's motion."""
     shape = np.broadcast_shapes(*(np.shape(values) for values in point.values()))
     values = {name: np.ravel(np.broadcast_to(v, shape)) for name, v in point.items()}
-    A, sin, u0 = values["A"], np.sin(values["theta0"]), np.cos(values["theta0"])
+    A = values["A"]
+    sin = np.sin(values["theta0"])
+    u0 = np.cos(values["theta0"])
     k = values["epsilon"] * A * (A - values["C"])
     a, b, p = values["p_phi"], values["p_psi"], values["p_theta0"]
     L = p**2 + ((b - a * u0) / sin) ** 2 - k * u0 * u0 + a * a
     rates = np.column_stack([-2.0 * k, k - L, a * b]) / (A * A)[:, None]
-    return System(
+    return PeerSystem(
         _slope,
         np.column_stack([u0, -sin * p / A]),
         rates,

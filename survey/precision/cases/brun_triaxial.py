@@ -8,7 +8,7 @@ from importlib import resources
 
 import numpy as np
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "w1"
 LAST, NUMBER, TIMES = 10.0, 4_000, 100
@@ -63,7 +63,7 @@ def system(point, options):
     A, B, C, epsilon, *state = columns
     w, nu = np.stack(state[:3]), np.stack(state[3:])
     shares = [(B - C) / A, (C - A) / B, (A - B) / C]
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.concatenate([w, nu / np.linalg.norm(nu, axis=0)]).T.copy(),
         parameters=np.column_stack([*shares, epsilon]),

@@ -13,7 +13,7 @@ from importlib import resources
 
 import numpy as np
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 from survey.request.user_scene import floquet
 
 ERROR = "spectral_radius"
@@ -65,7 +65,7 @@ def system(point, options):
     """A period of the four columns."""
     W, e = (np.ravel(values) for values in np.broadcast_arrays(point["W"], point["e"]))
     start = np.concatenate([[1.0, 0.0], np.eye(4).ravel()])
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.tile(start, (e.size, 1)),
         parameters=np.column_stack([W, e]),

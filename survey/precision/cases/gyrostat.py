@@ -12,7 +12,7 @@ import numpy as np
 from survey.kernels.cylinder import lockstep
 from survey.methods import taylor
 from survey.precision.flops import Counted
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "phi"
 LIMITED = "taylor"
@@ -67,7 +67,7 @@ def system(point, options):
     """(57) in time."""
     *rows, span = np.broadcast_arrays(*(np.atleast_1d(point[name]) for name in (*_NAMES, "t")))
     rows = np.column_stack([values.ravel() for values in rows])
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.ascontiguousarray(rows[:, 6:]),
         parameters=np.ascontiguousarray(rows[:, :6]),

@@ -13,7 +13,7 @@ import numpy as np
 from survey.kernels.cylinder import records as rc
 from survey.measures.cylinder import solution
 from survey.methods import taylor
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 SCENE = "gyrostat"
 ERROR = "w"
@@ -100,7 +100,7 @@ def system(point, options):
         if dense
         else np.broadcast_to(point["phi"], len(rows)) - rows[:, rc.PHI0]
     )
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=start,
         parameters=np.ascontiguousarray(rows[:, :6]),

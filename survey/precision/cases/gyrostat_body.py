@@ -12,7 +12,7 @@ from importlib import resources
 import numpy as np
 
 from survey.measures.body.system import ENTRIES, NAMES
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "w1"
 LAST, NUMBER, TIMES = 10.0, 4_000, 100
@@ -73,7 +73,7 @@ def system(point, options):
     w, nu = (np.stack([values[f"{name}{i}"] for i in (1, 2, 3)]) for name in ("omega", "gamma"))
     rest = [values[f"{name}{i}"] for name in ("lambda", "s") for i in (1, 2, 3)]
     span = span.ravel().astype(float)
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.concatenate([w, nu / np.linalg.norm(nu, axis=0)]).T.copy(),
         parameters=np.column_stack([*inverses, *tensors, *rest]),

@@ -8,7 +8,7 @@ from importlib import resources
 
 import numpy as np
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "phi"
 LAST, NUMBER = 20.0, 10_000
@@ -42,7 +42,8 @@ def references(work):
 def works():
     """Motions that share nothing."""
     random = np.random.default_rng(1)
-    time, start = np.full(NUMBER, LAST), random.uniform(-np.pi, np.pi, NUMBER)
+    time = np.full(NUMBER, LAST)
+    start = random.uniform(-np.pi, np.pi, NUMBER)
     moment = random.uniform(0.5, 2.0, NUMBER)
     five, rate = random.normal(size=(5, NUMBER)), random.normal(scale=1.5, size=NUMBER)
     elliptic = dict(zip(_ELLIPTIC, (moment, *five, start, rate), strict=True))
@@ -63,7 +64,7 @@ def system(point, options):
     else:
         parameters = [(p["C22"] - p["C33"]) * over, p["C23"] * over, p["S2"] * over, p["S3"] * over]
         start = [p["phi0"], p["w0"]]
-    return System(
+    return PeerSystem(
         slope=_inclined if inclined else _elliptic,
         start=np.column_stack(start),
         parameters=np.column_stack(parameters),

@@ -14,7 +14,7 @@ import numpy as np
 from survey.measures.cylinder import motion
 from survey.measures.cylinder.fate import remembered
 from survey.methods import taylor
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 SCENE = "gyrostat"
 ERROR = "cycle_multiplier"
@@ -46,7 +46,8 @@ def references(_work=None):
 @cache
 def works():
     """Random systems that have a cycle."""
-    random, found = np.random.default_rng(1), []
+    random = np.random.default_rng(1)
+    found = []
     while len(found) < _POINTS:
         six = random.normal(size=6) * [1, 1, 2, 2, 3, 3]
         if _first(tuple(six.tolist())) is not None:
@@ -67,7 +68,7 @@ def system(point, options):
         [np.ravel(values) for values in np.broadcast_arrays(*(point[name] for name in _NAMES))]
     )
     first = np.array([_first(tuple(row)) for row in rows.tolist()])
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.column_stack([first[:, :2], np.zeros(len(first))]),
         parameters=rows.astype(float),

@@ -13,7 +13,7 @@ from survey.kernels.libration import danby as lanes
 from survey.measures.libration import danby
 from survey.methods import taylor16
 from survey.precision.flops import Counted
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "b"
 LIMITED = "taylor16"
@@ -55,7 +55,7 @@ def system(point, options):
     """
     e, mu = (np.ravel(values) for values in np.broadcast_arrays(point["e"], point["mu"]))
     start = np.concatenate([[1.0, 0.0], np.eye(4).ravel()])
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.tile(start, (e.size, 1)),
         parameters=np.column_stack([e, *danby.rates(mu)]),

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 
 from survey.precision.known import references as known
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 from survey.truth.hill import mathieu
 
 ERROR = "discriminant"
@@ -61,7 +61,7 @@ def system(point, options):
     a, q = (np.ravel(values) for values in np.broadcast_arrays(point["a"], point["q"]))
     start = np.tile([1.0, 0.0, 1.0, 0.0, 0.0, 1.0], (a.size, 1))
     span = np.full(a.size, np.pi / 2)
-    return System(
+    return PeerSystem(
         _slope, start, np.column_stack([a, 2.0 * q]), span, np.sqrt(abs(a) + 2.0 * abs(q))
     )
 

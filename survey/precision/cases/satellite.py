@@ -13,7 +13,7 @@ from survey.kernels import lanes
 from survey.measures.hill import monodromy
 from survey.methods import taylor16
 from survey.precision.flops import operations
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 from survey.scenes.satellite import Motion, moduli
 
 ERROR = "discriminant"
@@ -67,7 +67,7 @@ def system(point, options):
     k, rho, span = (np.ravel(values) for values in np.broadcast_arrays(rows, point["rho"], halves))
     zero, one = np.zeros(k.size), np.ones(k.size)
     constant = rho * rho - k * k if oblate else rho * rho + (1 - k) * (1 + k)
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.column_stack([np.sqrt(2) * k, zero, one, zero, zero, one]),
         parameters=np.column_stack([2 * k * k - 1, np.sqrt(2) * rho, constant]),

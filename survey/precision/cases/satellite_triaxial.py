@@ -11,7 +11,7 @@ from importlib import resources
 import numpy as np
 from scipy.special import ellipk
 
-from survey.precision.peers import System
+from survey.precision.peers import PeerSystem
 
 ERROR = "spectral_radius"
 MOST = {"taylor16": 2_000, "dop853": 300, "rk4": 30}  # points that a slow method is timed on
@@ -71,7 +71,7 @@ def system(point, options):
     a, b, off = (1.0 - roll) / rest, (1.0 - yaw) / rest, (roll - yaw) / rest
     columns = np.tile(np.eye(4).ravel(), (k.size, 1))
     span = 4.0 * ellipk(k * k)
-    return System(
+    return PeerSystem(
         slope=_slope,
         start=np.column_stack([0.0 * k, k, columns]),
         parameters=np.column_stack([
@@ -87,11 +87,9 @@ def _slope(state, p, sin, cos):
     s, c, q = sin(state[0]), cos(state[0]), p[0] + state[1]
     both, square = s * c, q * q
     one, two = (1.0 - 0.5 * p[1]) * q, (1.0 - 0.5 * p[2]) * q
-    m1, m2, m3 = (
-        0.25 * p[2] * square + p[3] * (s * s),
-        0.25 * p[1] * square + p[4] * (c * c),
-        p[5] * both,
-    )
+    m1 = 0.25 * p[2] * square + p[3] * (s * s)
+    m2 = 0.25 * p[1] * square + p[4] * (c * c)
+    m3 = p[5] * both
 
     def column(e1, e2, p1, p2):
         return (

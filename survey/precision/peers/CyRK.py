@@ -16,7 +16,8 @@ POINTS = 600
 
 
 def integrate(system, rtol):
-    address, parameters = _compiled(system.slope).address, np.ascontiguousarray(system.parameters)
+    address = _compiled(system.slope).address
+    parameters = np.ascontiguousarray(system.parameters)
     if system.samples is None:
         ends = np.empty_like(system.start)
         _loop(address, system.start, parameters, system.span, rtol, ends)

@@ -16,7 +16,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class System:
+class PeerSystem:
     """An autonomous system of ODEs at many points, each over its own span from 0.
 
     `slope(state, parameters, sin, cos)` gives a tuple; it only indexes, adds, multiplies, divides

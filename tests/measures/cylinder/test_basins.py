@@ -14,7 +14,7 @@ from survey.scene import Request
 
 # an unstable cycle with the multiplier 1.006: windings beside it
 SIX = (0.7, -0.4, 1.1, 0.3, 0.5, -0.2)
-WHOLE = basins.Map(60_000, 14.0)
+WHOLE = basins.StartRange(60_000, 14.0)
 
 
 def random_system(random, i):
@@ -98,7 +98,7 @@ def test_a_map_says_what_its_points_say():
     parameters = dict(zip(("b12", "b31", "d", "c23", "s2", "s3"), SIX, strict=True))
     phi0, w0 = np.linspace(-3.1, 3.1, 40), np.linspace(-3.0, 3.0, 30)
     asked = Request({"question": "fate"}, lines={"phi0": (40, -3.1, 3.1), "w0": (30, -3.0, 3.0)})
-    assert basins.asked(asked, parameters) == basins.Map(1200, 3.0)
+    assert basins.asked(asked, parameters) == basins.StartRange(1200, 3.0)
     assert basins.asked(Request({"question": "fate"}), parameters) is None
     whole = survey.evaluate("gyrostat", phi0=phi0, w0=w0, **parameters)
     for i in (3, 17, 36):

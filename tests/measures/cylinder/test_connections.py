@@ -13,7 +13,7 @@ from survey.measures.square import Square
 
 FIXED = {"b12": 0.7, "b31": -0.4, "c23": 0.3, "s3": -0.2}
 SQUARE = Square(np.array([-2.0, -4.0]), np.array([2.0, 4.0]), np.array([False, False]))
-PLANE = bifurcations.Plane(SQUARE, ("s2", "d"), FIXED)
+PLANE = bifurcations.ParameterPlane(SQUARE, ("s2", "d"), FIXED)
 
 
 def of_system(six, system):
@@ -136,5 +136,5 @@ def test_curves_run_into_each_other_and_explain_the_numbers_of_cycles(monkeypatc
 
 
 def test_without_friction_there_are_no_curves_of_connections():
-    plane = bifurcations.Plane(SQUARE, ("s2", "d"), FIXED | {"b12": 0.0, "b31": 0.0})
+    plane = bifurcations.ParameterPlane(SQUARE, ("s2", "d"), FIXED | {"b12": 0.0, "b31": 0.0})
     assert not list(connections.curves(plane))

@@ -68,7 +68,7 @@ def test_an_equation_written_out_has_the_gyrostats_curves(monkeypatch):
     square = Square(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), EVEN)
     own = points(gyrostat(), square)
     fixed = {"b12": 0.7, "b31": -0.4, "c23": 0.3, "s3": -0.2}
-    plane, known = bifurcations.Plane(square, ("s2", "d"), fixed), {}
+    plane, known = bifurcations.ParameterPlane(square, ("s2", "d"), fixed), {}
     for kind, xy, error, _ in bifurcations.found(plane):
         known.setdefault(kind, []).append((xy, error))
     assert set(own) == set(known)

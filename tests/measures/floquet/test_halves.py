@@ -30,7 +30,7 @@ def oscillators(modulation, damping=0.0, coupling=lambda t, p: 0.0):
 
 
 def points_of(A, period, p=(0.3, 0.1), n=4, breaks=()):
-    return monodromy.Points(
+    return monodromy.SystemPoints(
         System({"A": A}, n, period, breaks, False), np.atleast_2d(np.array(p, float)), halves=True
     )
 
@@ -78,7 +78,7 @@ def test_what_follows_from_a_part_agrees_with_the_whole_period_and_has_no_wider_
     system, those, factor = System({"A": A}, 4, period, (), False), np.arange(30), np.full(30, 2.0)
     part, whole = (
         monodromy.solve(
-            monodromy.Points(system, p, halves=each), AUTO, 1e-13, factor, those, sharp=False
+            monodromy.SystemPoints(system, p, halves=each), AUTO, 1e-13, factor, those, sharp=False
         )
         for each in (True, False)
     )
@@ -94,7 +94,7 @@ def test_what_a_phase_lacks_to_a_multiple_of_pi_counts_as_an_error_of_A():
     assert parts(near) == [2] and near.noise[0, 0] - exact.noise[0, 0] > 0.9 * float(lacks)
     part, whole = (
         monodromy.solve(each, AUTO, 1e-14, np.ones(1), np.zeros(1, int), sharp=False)
-        for each in (near, monodromy.Points(near.system, near.points))
+        for each in (near, monodromy.SystemPoints(near.system, near.points))
     )
     assert (abs(part.M - whole.M) <= part.E + whole.E).all()
 
@@ -124,7 +124,7 @@ def test_each_piece_between_breaks_has_a_symmetry_of_its_own():
     assert parts(points) == [4, 1]
     found, whole = (
         monodromy.solve(each, AUTO, 1e-12, np.ones(1), np.zeros(1, int), sharp=False)
-        for each in (points, monodromy.Points(points.system, points.points))
+        for each in (points, monodromy.SystemPoints(points.system, points.points))
     )
     assert (abs(found.M - whole.M) <= found.E + whole.E).all() and found.E.max() < 1e-11
 

@@ -123,7 +123,7 @@ def test_smooth_systems_cost_nothing_more():
     point = np.array([[0.3, 0.2]])
     for A, suspected in ((coupled, 0), (smooth, 1)):
         system = System({"A": A}, 2, 2 * math.pi, (), symplectic=False)
-        points = monodromy.Points(system, point)
+        points = monodromy.SystemPoints(system, point)
         program = points.groups[0].programs[0]
         assert len(probing.suspects(program)) == suspected
         values, low = program.at(point, 2 * math.pi * monodromy.TIMES[None], 2)[0], np.zeros((1, 1))

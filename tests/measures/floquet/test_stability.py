@@ -103,7 +103,7 @@ def test_verdicts_do_not_depend_on_the_number_of_steps(steps):
     def A(t, p, out):
         out[:] = np.array(p, dtype=object).reshape(4, 4)
 
-    points = monodromy.Points(System({"A": A}, 4, 2 * math.pi, (), False), B.reshape(40, 16))
+    points = monodromy.SystemPoints(System({"A": A}, 4, 2 * math.pi, (), False), B.reshape(40, 16))
     method = monodromy.method_of("auto")
     own = points.steps(method.floquet_reach(1e-10), np.ones(40), np.arange(40)).sum(axis=1)
     for sharp in (False, True):
