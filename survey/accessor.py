@@ -3,6 +3,7 @@ or after xarray.
 """
 
 import contextlib
+import warnings
 
 import xarray as xr
 
@@ -56,8 +57,9 @@ class Survey:
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 
         `var`: a name, or booleans at the points, such as `a.survey.where("stable") &
-        b.survey.where("stable")`. `x` and `y`: which axes are drawn; others at their first value,
-        unless a `slice` fixes them. `cmap`, `vmin`, `vmax`: colours of a variable of numbers; by
+        b.survey.where("stable")`. `x` and `y`: which axes are drawn, by default the first two,
+        or those in whose planes [boundaries] found curves (a warning says so where the curves lie in
+        other planes); others at their first value, unless a `slice` fixes them. `cmap`, `vmin`, `vmax`: colours of a variable of numbers; by
         default they span its values except 1 % at either end, where the colour bar has arrows
         (`robust=False`: all of them), and diverge about 0 where values have both signs; for a curve
         `vmin` and `vmax` are the ends of its axis.
@@ -92,11 +94,13 @@ class Survey:
             own = ax is None
             ax = _new_axes(figure_size(style, width), figures.projection_of(var)) if own else ax
             try:
-                figures.onto(ax, ds, var, boundaries, style, (x, y), colours)
+                left_out = figures.onto(ax, ds, var, boundaries, style, (x, y), colours)
             except BaseException:
                 if own:  # a notebook would show it, empty
                     _close(ax.figure)
                 raise
+        if left_out:
+            warnings.warn(left_out, stacklevel=2)
         return ax
 
     def counts(self):

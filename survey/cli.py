@@ -465,7 +465,7 @@ def plot(path, output, var, style, width, at):
     suffix = ".pdf" if style == "paper" else ".png"
     target = Path(output or f"{path.removesuffix('.nc')}{f'_{var}' if var else ''}{suffix}")
     try:
-        figures.save(ds, target, var, style, width)
+        left_out = figures.save(ds, target, var, style, width)
     except BadInput:
         raise
     except (OSError, ValueError) as error:
@@ -473,6 +473,8 @@ def plot(path, output, var, style, width, at):
             f"{target}: the picture cannot be written ({reason_of(error)}); name a .png, .pdf or .svg file with -o"
         ) from None
     out.print(plain(str(target)), markup=False)
+    if left_out:
+        err.print(left_out, markup=False)
 
 
 @program.command()
@@ -503,6 +505,8 @@ def share(path, output, at, trust_scene):
         else f"of points: {written['why']}"
     )
     err.print(plain(f"{target}: {written['bytes']:,} bytes, {how}"), markup=False)
+    if written["left_out"]:
+        err.print(written["left_out"], markup=False)
     out.print(plain(target), markup=False)
 
 

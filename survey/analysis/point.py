@@ -28,7 +28,7 @@ MAX_ROWS = 1000  # of one output
 OF_FILE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
     "surfaces", "surfaces_left_out", "edge_left_out", "edge_incomplete_rows", "curves_lost", "curves_unexplained",
-    "complete",
+    "boundary_planes", "complete",
 )  # fmt: skip
 
 
@@ -68,6 +68,8 @@ def section(ds, coords):
     from survey.show.boundaries import in_plane  # loads matplotlib
 
     curves = in_plane(ds, ds.status.isel(indices))
+    if "boundary_planes" in ds.attrs:
+        part.attrs["boundary_planes"] = ds.attrs["boundary_planes"]
     return part.assign(
         {name: v for name, v in curves.data_vars.items() if name.startswith("curve_")}
     )

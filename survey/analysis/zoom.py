@@ -107,7 +107,11 @@ def _workflow(ds, ranges, num):
     """The workflow with new axes, as a mapping: from the one in the file and the attributes."""
     data = _further(ds) | workflow_of(ds, ranges, num)
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
-    if data.get("boundaries", {}).get("axis") not in (None, *axes):
+    table = data.get("boundaries", {})
+    plane = table.get("plane")
+    if isinstance(plane, list):
+        table["plane"] = plane = [name for name in plane if name in axes]
+    if table.get("axis") not in (None, *axes) or (plane is not None and len(plane) < 2):
         del data["boundaries"]
     if len(axes) != 3:
         data.get("boundaries", {}).pop("surfaces", None)

@@ -23,7 +23,7 @@ VARIABLES, FLAGS = 2000, 28
 REQUIRED = ("scene", "options", "method", "rtol")
 TEXTS = (
     "scene", "options", "method", "title", "summary", "scene_text", "scene_hash", "workflow", "boundaries", "surfaces",
-    "refine", "status_counts", "verdict_counts", "areas",
+    "boundary_planes", "refine", "status_counts", "verdict_counts", "areas",
 )  # fmt: skip
 PACKING = ("scale_factor", "add_offset", "missing_value", "_Unsigned")
 ENCODINGS = ("utf-8", "ascii")
@@ -221,6 +221,10 @@ def curves(ds):
     _along(ds, "curve_point", *(f"curve_{dim}" for dim in ds.status.dims))
     _divided(ds, "curve_count", "curve_point")
     _coded(ds, "curve_class")
+    planes = ds.attrs.get("boundary_planes")
+    pairs = [pair.split(", ") for pair in planes.split("; ")] if planes is not None else []
+    if not all(len(pair) == 2 and set(pair) <= set(ds.coords) for pair in pairs):
+        raise Damaged("the attribute boundary_planes must name pairs of axes, such as a, b; b, c")
 
 
 def surfaces(ds):

@@ -1,12 +1,14 @@
 """The tables [boundaries] and [refine], checked against the scene and the axes."""
 
+from itertools import combinations
+
 import numpy as np
 
 from survey import measures, modules
 from survey.errors import BadInput
 from survey.request.schema import Spread
 from survey.sweep.line import second_axis
-from survey.wording import short
+from survey.wording import short, shown
 
 # variables surface_NAME
 OF_SURFACES = ("vertices", "triangles", "class", "corners", "position_error", "axis")
@@ -14,12 +16,12 @@ MIN_FRACTION = 1e-6  # width of a cell as a fraction of its axis
 
 
 def check_boundaries(scene, name, table, given, options, proves=False):
-    """The axis along which edges are searched, the last one by default; None where no boundaries
-    are requested.
+    """(the axis along which edges are searched, the last one by default; the pairs of axes in whose
+    planes curves lie, of which rows follow the last); (None, ()) where no boundaries are requested.
     """
     if table is None:
-        return None
-    axes = [key for key, values in given.items() if np.ndim(values)]
+        return None, ()
+    axes = {key: values for key, values in given.items() if np.ndim(values)}
     measure = measures.curves(scene)
     if measure is None:
         raise BadInput(
@@ -27,24 +29,53 @@ def check_boundaries(scene, name, table, given, options, proves=False):
         )
     by_rows = measures.question(scene.FAMILY, "edges") is not None  # and so proofs are made
     if hasattr(measure, "refusal") and not (proves and by_rows):
-        return _check_closed(
-            measure, scene, name, table, {key: given[key] for key in axes}, given, options
-        )
+        return _check_closed(measure, scene, name, table, axes, given, options)
     if not axes:
         raise BadInput("boundaries: they are drawn along an axis, and there is none; add one")
     if table.axis is not None and table.axis not in axes:
-        raise BadInput(f"boundaries.axis: {modules.unknown('axis', table.axis, axes)}")
-    axis = table.axis or axes[-1]
-    if given[axis].size < 2:
+        raise BadInput(f"boundaries.axis: {modules.unknown('axis', table.axis, list(axes))}")
+    planes = _planes(table.plane, axes)
+    if planes and table.axis not in (None, *table.plane):
+        raise BadInput(
+            f"boundaries.axis = {shown(table.axis)}: it must be one of the axes of boundaries.plane, "
+            f"{', '.join(table.plane)}; leave one of the two out"
+        )
+    axis = table.axis or (table.plane or list(axes))[-1]
+    if axes[axis].size < 2:
         raise BadInput(
             f"boundaries: the axis {axis} has one value, but edges need a range; give two or more"
         )
-    return axis
+    if planes:
+        return axis, tuple(pair[::-1] if pair[0] == axis else pair for pair in planes)
+    across = next((key for key in axes if key != axis and axes[key].size > 1), None)
+    return axis, ((across, axis),) if across else ()
+
+
+def _planes(names, axes):
+    """The pairs of these axes, of {name: values}; none where none are named. Raises BadInput for
+    names that span no plane.
+    """
+    where = "boundaries.plane"
+    for key in names or ():
+        if key not in axes:
+            raise BadInput(f"{where}: {modules.unknown('axis', key, list(axes))}")
+        if axes[key].size < 2:
+            raise BadInput(
+                f"{where}: the axis {key} has one value, but curves need a range; give two or more"
+            )
+    if names is not None and len(set(names)) != max(len(names), 2):
+        raise BadInput(
+            f"{where} = {shown(names)}: give two different axes, or more for the planes of every two of them, "
+            f"such as {shown(list(axes)[:2])}"
+        )
+    return tuple(combinations(names or (), 2))
 
 
 def _check_closed(measure, scene, name, table, axes, given, options):
-    """The last of the axes {name: values}; raises BadInput where the measure knows no curves on these."""
-    names = list(axes)
+    """As `check_boundaries`, of axes {name: values}; raises BadInput where the measure knows no
+    curves on these.
+    """
+    names, planes = list(axes), _planes(table.plane, axes)
     refusal = None
     if len(names) == 1 and hasattr(measure, "closed"):
         fixed = {
@@ -52,23 +83,42 @@ def _check_closed(measure, scene, name, table, axes, given, options):
         } | {key: float(value) for key, value in given.items() if not np.ndim(value)}
         second_axis(measure, scene, names[0], fixed, options)
     else:
-        # further axes make a stack of maps
-        stacks = [[*names[:2], third] for third in names[2:]] or [names]
-        refusal = next(
-            filter(None, (measure.refusal(stack, scene, options) for stack in stacks)), None
-        )
+        default = (tuple(names[:2]),)
+        refusal = _refusal(measure, scene, options, names, planes or default)
     if refusal:
-        raise BadInput(f"boundaries: {name}: {refusal}; change that, or leave the table out")
+        others = [
+            pair
+            for pair in combinations(names, 2)
+            if not planes and not _refusal(measure, scene, options, names, (pair,))
+        ]
+        remedy = (
+            f"set plane = {shown(list(others[0]))} under [boundaries]" if others else "change that"
+        )
+        raise BadInput(f"boundaries: {name}: {refusal}; {remedy}, or leave the table out")
     if table.axis is not None:
         raise BadInput(
             f"boundaries.axis: the curves of {name} are found without rows, and no axis is searched; leave it out"
+            + ("; plane names the axes of their planes" if len(names) > 2 else "")
         )
-    for key in names[:2]:
+    for key in names[:2] if not planes else ():
         if axes[key].size < 2:
             raise BadInput(
                 f"boundaries: the axis {key} has one value, but curves need a range; give two or more"
             )
-    return names[-1]
+    return names[-1], planes or (tuple(names[:2]),) * (len(names) > 1)
+
+
+def _refusal(measure, scene, options, names, planes):
+    """Why there are no curves in these planes, in words; None if there are.
+
+    Further axes make a stack of maps.
+    """
+    for pair in planes:
+        further = [key for key in names if key not in pair]
+        for stack in [[*pair, third] for third in further] or [list(pair)]:
+            if refusal := measure.refusal(stack, scene, options):
+                return refusal
+    return None
 
 
 def check_surfaces(scene, name, table, given, proves=False):
@@ -89,6 +139,8 @@ def check_surfaces(scene, name, table, given, proves=False):
         raise BadInput(
             "boundaries.axis: surfaces are searched for along all three axes; leave it out"
         )
+    if table.plane is not None:
+        raise BadInput("boundaries.plane: surfaces lie in no plane; leave it, or surfaces, out")
     axes = {key: values for key, values in given.items() if np.ndim(values)}
     if len(axes) != 3 or min(values.size for values in axes.values()) < 2:
         shape = ", ".join(f"{key} ({values.size})" for key, values in axes.items())

@@ -57,6 +57,7 @@ class OutputTable(Table):
 
 class BoundariesTable(Table):
     axis: str | None = None
+    plane: list[str] | None = None
     surfaces: bool = False
 
 

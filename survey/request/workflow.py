@@ -37,9 +37,10 @@ SURFACES = "surfaces"  # a figure that is no variable
 class Workflow:
     """A checked survey: `scene` is the scene's module; `text` is the workflow as it was run.
 
-    `boundaries`: the axis along which edges are searched; `surfaces`: are surfaces searched
-    instead? `refine`: for each axis the width of the smallest cells as a fraction of it, and
-    whether it is logarithmic.
+    `boundaries`: the axis along which edges are searched; `planes`: the pairs of axes in whose
+    planes curves lie, rows being along the last of each; `surfaces`: are surfaces searched instead?
+    `refine`: for each axis the width of the smallest cells as a fraction of it, and whether it is
+    logarithmic.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Workflow:
     figures: tuple[str, ...]
     text: str
     boundaries: str | None = None
+    planes: tuple[tuple[str, str], ...] = ()
     surfaces: bool = False
     refine: Mapping[str, tuple[float, bool]] | None = None
     style: str = "screen"
@@ -185,6 +187,11 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
             "output.figures: a figure needs at least one axis, and every parameter is a single number"
         )
     grid = grid_of(parameters, given)
+    boundaries, planes = (
+        (None, ())
+        if surfaces
+        else check_boundaries(scene, name, file.boundaries, given, options, proves)
+    )
     user_scene.check(scene, grid)
     return Workflow(
         name=name,
@@ -197,9 +204,8 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
         ),
         figures=tuple(file.output.figures),
         text=text or _as_toml(data),
-        boundaries=None
-        if surfaces
-        else check_boundaries(scene, name, file.boundaries, given, options, proves),
+        boundaries=boundaries,
+        planes=planes,
         surfaces=surfaces,
         refine=check_refine(scene, name, file, given, proves),
         proves=proves,

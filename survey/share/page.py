@@ -69,13 +69,16 @@ HINT = (
 
 def write(ds, path, at=None, progress=None):
     """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?,
-    "why": else why not}.
+    "why": else why not,
+    "left_out": one line about curves in other planes, or ""}.
     """
     check_folder(path, ".html", ".htm")
     ds = point.plane(ds, at or {})
     content, why = made(ds, progress)
     write_atomically(Path(path), content.encode())
-    return {"bytes": len(content.encode()), "series": not why, "why": why}
+    axes = [dim for dim in ds.status.dims if ds.sizes[dim] > 1]
+    left_out = boundaries.elsewhere(ds, axes)
+    return {"bytes": len(content.encode()), "series": not why, "why": why, "left_out": left_out}
 
 
 def made(ds, progress=None):

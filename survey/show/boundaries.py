@@ -95,6 +95,47 @@ def limits_of(variable):
     return _LIMITS if is_trace and "damp" not in variable.attrs.get("long_name", "") else ()
 
 
+def planes_of(ds):
+    """The pairs of axes in whose planes the curves of the file lie; () where it has none."""
+    if "curve_count" not in ds:
+        return ()
+    if text := ds.attrs.get("boundary_planes"):
+        return tuple(tuple(pair.split(", ")) for pair in text.split("; "))
+    # an older file, or one of two axes: those of the planes come first
+    names = [
+        str(key).removeprefix("curve_") for key in ds.data_vars if ds[key].dims == ("curve_point",)
+    ]
+    pair = tuple(name for name in names if name in ds.coords)[:2]
+    return (pair,) if len(pair) == 2 else ()
+
+
+def plane_of(ds):
+    """The two axes that are drawn unless others are asked for, those of curves where more axes have
+    them; None for the first two.
+    """
+    known = list(ds.status.dims)
+    drawn = [
+        pair
+        for pair in planes_of(ds)
+        if set(pair) <= set(known) and min(ds.sizes[n] for n in pair) > 1
+    ]
+    if len(known) < 3 or not drawn or any(set(pair) == set(known[:2]) for pair in drawn):
+        return None
+    return list(drawn[0])
+
+
+def elsewhere(ds, drawn):
+    """One line where the curves of the file lie in other planes than that of the axes `drawn`, else ""."""
+    planes = planes_of(ds)
+    if len(drawn) != 2 or not planes or any(set(pair) == set(drawn) for pair in planes):
+        return ""
+    known = ", and of ".join(" and ".join(pair) for pair in planes)
+    return (
+        f"boundaries: the curves in this file lie in planes of {known}, not of {' and '.join(drawn)}; "
+        f"run the workflow with plane = {list(drawn)} under [boundaries] for these"
+    )
+
+
 def in_plane(ds, variable):
     """The curves that lie in the plane that is drawn, where a third axis makes a stack of planes.
 

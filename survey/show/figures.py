@@ -14,6 +14,7 @@ from survey import modules
 from survey.errors import BadInput
 from survey.file.labels import masked
 from survey.show import family, surfaces
+from survey.show.boundaries import elsewhere, plane_of
 from survey.show.ensemble import draw_ensemble, is_ensemble, over_parameters, points_of
 from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
@@ -26,15 +27,19 @@ MOST_LABELS = 30  # on an axis
 
 
 def save(ds, path, name=None, style=None, width="single"):
-    """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG)."""
+    """Draw variable `name` (the verdict, or the first output) of `ds` to `path` (PNG, PDF or SVG);
+    returns what `onto` does.
+    """
     # of ticks, near the largest number
     with matplotlib.rc_context(style_named(style).rc), np.errstate(over="ignore"):
         try:
-            draw(ds, name, style, width).savefig(path, dpi=style_named(style).dpi)
+            figure, left_out = _drawn(ds, name, style, width)
+            figure.savefig(path, dpi=style_named(style).dpi)
         except OverflowError:  # of ticks, before Matplotlib 3.11
             raise BadInput(
                 f"{path}: Matplotlib {matplotlib.__version__} draws no numbers near the largest; use 3.11 or newer"
             ) from None
+    return left_out
 
 
 def draw(ds, name=None, style=None, width="single"):
@@ -42,9 +47,14 @@ def draw(ds, name=None, style=None, width="single"):
     it in notebooks.
     """
     with matplotlib.rc_context(style_named(style).rc):
-        figure = Figure(figsize=figure_size(style, width), layout="constrained")
-        onto(figure.subplots(subplot_kw={"projection": projection_of(name)}), ds, name, style=style)
-    return figure
+        return _drawn(ds, name, style, width)[0]
+
+
+def _drawn(ds, name, style, width):
+    """(the figure, what `onto` returns)."""
+    figure = Figure(figsize=figure_size(style, width), layout="constrained")
+    axes = figure.subplots(subplot_kw={"projection": projection_of(name)})
+    return figure, onto(axes, ds, name, style=style)
 
 
 def projection_of(name):
@@ -57,7 +67,8 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     for an unknown one.
 
     `across`: the axes that are drawn, or None; `colours`: cmap, vmin, vmax, robust of a variable of
-    numbers, or None.
+    numbers, or None. Returns one line about curves of other planes that the file has in place of those
+    of this one, "" otherwise.
     """
     paper = style_named(style).paper
     _check_colours(colours or {})
@@ -69,7 +80,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
         surfaces.draw_surfaces(axes, ds)
         if not paper:
             axes.set_title(title_of(ds, ds.surface_class), fontsize=10 if alone(axes) else 8)
-        return
+        return ""
     if name not in drawable and name not in bars:
         raise BadInput(modules.unknown("variable", name, drawable))
     of_numbers = [key for key, value in (colours or {}).items() if value is not None]
@@ -89,7 +100,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
         if not paper:
             axes.set_title(title_of(ds, ds[name]), fontsize=10 if alone(axes) else 8)
         fit(axes)
-        return
+        return ""
     chosen = _chosen(ds, across)
     drawn = chosen or ds.status.dims[:2]
     labels = {dim: [str(label) for label in ds[dim].values] for dim in drawn
@@ -115,6 +126,7 @@ def onto(axes, ds, name=None, boundaries=True, style=None, across=(None, None), 
     if not paper:
         axes.set_title(title_of(ds, variable), fontsize=10 if alone(axes) else 8)
     fit(axes)
+    return elsewhere(ds, variable.dims) if boundaries else ""
 
 
 def _check_colours(asked):
@@ -161,10 +173,7 @@ def _chosen(ds, across):
         x = next((name for name in known if name != y), None) if x is None else x
         return [x, y] if x is not None else None
     if x is None:
-        # with two other axes or more, curves lie in planes of this one and the first
-        along = ds.attrs.get("boundaries")
-        drawn = len(known) > 2 and "edge_count" in ds and along in known[2:]
-        return [known[0], along] if drawn and min(ds.sizes[known[0]], ds.sizes[along]) > 1 else None
+        return plane_of(ds)
     return [x, *[name for name in known if name != x][:1]]
 
 

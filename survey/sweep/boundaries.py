@@ -41,7 +41,7 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     """
     measure = measures.curves(workflow.scene)
     if hasattr(measure, "refusal"):
-        about = {"boundaries": workflow.boundaries}
+        about = _about(workflow)
         if len(workflow.grid.sizes) < 2:
             variables, complete = _on_a_line(workflow, measure)
             lost = {"edge_incomplete_rows": 1} if complete is False else {}
@@ -51,22 +51,34 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
             variables, attrs=about | ({"curves_unexplained": unexplained} if unexplained else {})
         )
     grid, axis = workflow.grid, workflow.boundaries
-    other = [dim for dim in grid.sizes if dim != axis]
-    across = next((dim for dim in other if grid.sizes[dim] > 1), None)  # curves need a range
-    edges = _edges(workflow, axis, each, once)
-    found = _rows(workflow, axis, other, edges)
-    about = {"boundaries": axis, "edge_incomplete_rows": int((edges.complete == 0).sum())}
-    if across:
-        found |= _curves(workflow, across, axis, other, edges, each)
+    along = {
+        name: _edges(workflow, name, each, once)
+        for name in dict.fromkeys([axis, *(rows for _, rows in workflow.planes)])
+    }
+    edges = along[axis]
+    found = _rows(workflow, axis, [dim for dim in grid.sizes if dim != axis], edges)
+    about = _about(workflow) | {"edge_incomplete_rows": int((edges.complete == 0).sum())}
+    if workflow.planes:
+        found |= _curves(workflow, along, each)
         about["curves_lost"] = int((found["curve_complete"][1] == 0).sum())
     left_out = [
         f"{name} from {a:.12g} to {b:.12g}"
-        for name in filter(None, (axis, across))
+        for name in dict.fromkeys(
+            [axis, *(name for pair in workflow.planes for name in pair[::-1])]
+        )
         for (_, a), (b, _) in pairwise(_parts(workflow, name))
     ]
     if left_out:
         about["edge_left_out"] = ", ".join(left_out)
     return xr.Dataset(found, attrs=about)
+
+
+def _about(workflow):
+    """The attributes that say along which axis, and in which planes where there are several."""
+    about = {"boundaries": workflow.boundaries}
+    if len(workflow.grid.sizes) > 2 and workflow.planes:
+        about["boundary_planes"] = "; ".join(", ".join(pair) for pair in workflow.planes)
+    return about
 
 
 def along(scene, options, name, ends, fixed):
@@ -90,28 +102,35 @@ def plan(workflow, cost):
 
     `cost` is the scene's estimate for a point, in seconds.
     """
-    measure = measures.curves(workflow.scene)
+    measure, sizes = measures.curves(workflow.scene), workflow.grid.sizes
     if hasattr(measure, "refusal"):
-        sizes = workflow.grid.sizes
-        # measured, per map
-        seconds = measure.seconds(list(sizes)) if hasattr(measure, "seconds") else 0.1
-        if hasattr(measure, "searched") and not hasattr(measure, "seconds"):
-            # measured: some ten points solved for each point of a curve, and a lattice
-            seconds = getattr(workflow.scene, "curves_seconds", 1e5 * cost)
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
-        return {"bytes_per_curve_point": size}, seconds * prod(list(sizes.values())[2:])
-    sizes = [
-        size for dim, size in workflow.grid.sizes.items() if dim != workflow.boundaries and size > 1
-    ]
+        maps = [pair for pair, _ in _maps(workflow)] or [tuple(sizes)]  # or an axis alone
+        return {"bytes_per_curve_point": size}, sum(
+            _seconds_of_map(workflow.scene, measure, list(pair), cost) for pair in maps
+        )
     # measured: ten to twenty edges per row; about five hundred points of curves
-    seconds = prod(sizes) * (2e-3 + 250 * cost) + (
-        prod(sizes[1:]) * (0.2 + 1e4 * cost) if sizes else 0.0
-    )
+    rows = {
+        axis: prod(size for dim, size in sizes.items() if dim != axis)
+        for axis in dict.fromkeys([workflow.boundaries, *(pair[1] for pair in workflow.planes)])
+    }
+    seconds = sum(rows.values()) * (2e-3 + 250 * cost)
+    seconds += len(_maps(workflow)) * (0.2 + 1e4 * cost)
     return {
-        "rows": prod(sizes),
+        "rows": sum(rows.values()),
         "bytes_per_edge": 25,
-        "bytes_per_curve_point": 24 * len(sizes),
+        "bytes_per_curve_point": 8 * (1 + len(sizes)) if workflow.planes else 0,
     }, seconds
+
+
+def _seconds_of_map(scene, measure, axes, cost):
+    """Estimated seconds on one thread of the curves on one map, or along one axis."""
+    if hasattr(measure, "seconds"):
+        return measure.seconds(axes)  # measured
+    if hasattr(measure, "searched"):
+        # measured: some ten points solved for each point of a curve, and a lattice
+        return getattr(scene, "curves_seconds", 1e5 * cost)
+    return 0.1
 
 
 def _measure(workflow, question):
@@ -120,29 +139,30 @@ def _measure(workflow, question):
 
 
 def _closed(workflow, measure, each):
-    """The variables of curves found without rows, on one map, or on each map of the stack along
+    """The variables of curves found without rows, on one map, or on each map of the stacks along
     further axes; and along how many segments of lines across these a curve is missing.
     """
-    names, fixed = list(workflow.grid.sizes), fixed_of(workflow)
-    square, third = square_of(workflow, *names[:2]), names[2:]
-    planes = _planes(workflow, third)
+    names, fixed, maps = list(workflow.grid.sizes), fixed_of(workflow), _maps(workflow)
+    squares = {pair: square_of(workflow, *pair) for pair in workflow.planes}
     task = (
         partial(measure.searched, workflow.scene)
         if hasattr(measure, "searched")
         else measure.closed
     )
     found = each(
-        lambda plane: task(square, names[:2], fixed | plane, workflow.request.options),
-        planes,
+        lambda one: task(squares[one[0]], list(one[0]), fixed | one[1], workflow.request.options),
+        maps,
         "maps of the curves",
     )
-    count, kind, flat, error = (
+    count, kind, error = (
         np.concatenate([getattr(curves, name) for curves in found])
-        for name in ("count", "kind", "parameters", "error")
+        for name in ("count", "kind", "error")
     )
-    points = [curves.count.sum() for curves in found]
-    values = np.column_stack(
-        [flat, *(np.repeat([plane[name] for plane in planes], points) for name in third)]
+    values = np.concatenate(
+        [
+            _all_values(names, pair, curves.parameters, plane)
+            for (pair, plane), curves in zip(maps, found, strict=True)
+        ]
     )
     kind = flagged(measure.TITLE, measure.CLASSES, kind)
     variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
@@ -157,10 +177,26 @@ def _closed(workflow, measure, each):
     return variables, sum(getattr(curves, "unexplained", None) or 0 for curves in found)
 
 
-def _planes(workflow, names):
-    """{name: value} of each combination of the values of these axes, the last running fastest."""
-    axes = [np.asarray(workflow.grid.parameters[name][1], float) for name in names]
-    return [dict(zip(names, map(float, values), strict=True)) for values in product(*axes)]
+def _maps(workflow):
+    """[(pair of axes, {name: value} of the others)] of all maps on which curves are found, the last
+    of the other axes running fastest.
+    """
+    found = []
+    for pair in workflow.planes:
+        further = [name for name in workflow.grid.sizes if name not in pair]
+        axes = [np.asarray(workflow.grid.parameters[name][1], float) for name in further]
+        found += [
+            (pair, dict(zip(further, map(float, values), strict=True))) for values in product(*axes)
+        ]
+    return found
+
+
+def _all_values(names, pair, on_map, plane):
+    """(m, names) of points whose parameters `pair` are `on_map` (m, 2), the others those of the plane."""
+    columns = dict(zip(pair, np.asarray(on_map).T, strict=True))
+    return np.column_stack(
+        [columns[name] if name in columns else np.full(len(on_map), plane[name]) for name in names]
+    )
 
 
 def fixed_of(workflow):
@@ -233,14 +269,7 @@ def _edges(workflow, axis, each=in_turn, once=lambda name, make: make()):
 def _row_solver(workflow, axis, rows):
     """What `edges.find` asks of the scene, for these rows."""
     grid = workflow.grid
-    other = [dim for dim in grid.sizes if dim != axis]
-    at = dict(
-        zip(
-            other,
-            np.unravel_index(rows, [grid.sizes[dim] for dim in other]) if other else (),
-            strict=True,
-        )
-    )
+    place = _places(grid, [dim for dim in grid.sizes if dim != axis], rows)
     others = {
         name: values[at[dims[0]]] if dims else values
         for name, (dims, values) in grid.parameters.items()
@@ -283,63 +312,70 @@ def _rows(workflow, axis, other, edges):
     }  # fmt: skip
 
 
-def _curves(workflow, across, axis, other, edges, each):
-    """The variables of the curves on each map of the axes `across` (its rows) and `axis`, and of
-    their folds.
+def _curves(workflow, along, each):
+    """The variables of the curves on each map of two axes (its rows are along the second), and of
+    their folds; `along`: {axis: the Edges of all rows along it}.
     """
-    grid = workflow.grid
-    further = [dim for dim in other if dim != across]
-    at = dict(
-        zip(other, np.unravel_index(edges.row, [grid.sizes[dim] for dim in other]), strict=True)
-    )
-    found = []
-    square = square_of(workflow, across, axis)
-    curve_of, curves_before = np.full(edges.row.size, -1), 0
-    planes = _planes(workflow, further)
+    grid, axis, maps = workflow.grid, workflow.boundaries, _maps(workflow)
+    places = {
+        name: _places(grid, [dim for dim in grid.sizes if dim != name], edges.row)
+        for name, edges in along.items()
+    }
+    squares = {pair: square_of(workflow, *pair) for pair in workflow.planes}
+    first = next((pair for pair in workflow.planes if pair[1] == axis), None)
+    curve_of, curves_before = np.full(along[axis].row.size, -1), 0
 
-    def on_plane(plane, each=in_turn):
+    def on_map(one, each=in_turn):
+        pair, plane = one
+        edges, place = along[pair[1]], places[pair[1]]
         own = np.ones(edges.row.size, bool)
         for dim, value in plane.items():
-            own &= np.asarray(grid.parameters[dim][1])[at[dim]] == value
-        of_rows = np.asarray(grid.parameters[across][1])[at[across][own]]
+            own &= np.asarray(grid.parameters[dim][1])[place[dim]] == value
+        of_rows = np.asarray(grid.parameters[pair[0]][1])[place[pair[0]][own]]
         seeds = np.stack([of_rows, edges.position[own]], axis=1), edges.kind[own], edges.index[own]
-        return own, *_on_plane(workflow, square, across, axis, seeds, plane, each)
+        return own, *_on_plane(workflow, squares[pair], *pair, seeds, plane, each)
 
     # progress is told of one map by its parts, of several by the maps
-    solved = (
-        each(on_plane, planes, "maps of the curves")
-        if len(planes) > 1
-        else [on_plane(planes[0], each)]
-    )
-    for plane, (own, curves, folds) in zip(planes, solved, strict=True):
-        found.append((plane, curves, folds, curves_before))
-        of_seed = curves.of_seed[: own.sum()]
-        curve_of[own] = np.where(of_seed >= 0, of_seed + curves_before, of_seed)
+    solved = each(on_map, maps, "maps of the curves") if len(maps) > 1 else [on_map(maps[0], each)]
+    found = []  # (pair, its plane, the curves, their folds, number of curves before these)
+    for (pair, plane), (own, curves, folds) in zip(maps, solved, strict=True):
+        found.append((pair, plane, curves, folds, curves_before))
+        if pair == first:
+            of_seed = curves.of_seed[: own.sum()]
+            curve_of[own] = np.where(of_seed >= 0, of_seed + curves_before, of_seed)
         curves_before += curves.count.size
 
     def all_of(name):
-        return np.concatenate([getattr(curves, name) for _, curves, _, _ in found])
+        return np.concatenate([getattr(curves, name) for _, _, curves, _, _ in found])
 
-    values = [
-        [np.full((curves.error.size, 1), plane[dim]) for dim in further]
-        for plane, curves, _, _ in found
-    ]
-    on_curves = np.column_stack([
-        square.parameters(all_of("x")), *(np.concatenate([part[i] for part in values]) for i in range(len(further)))
-    ])  # fmt: skip
-    names, where = (across, axis, *further), "on the edge of a tongue"
-    kind = _class(workflow, all_of("kind"))
+    names = list(grid.sizes)
+    if len(workflow.planes) == 1:
+        names = [*workflow.planes[0], *(name for name in names if name not in workflow.planes[0])]
+    on_curves = np.concatenate(
+        [
+            _all_values(names, pair, squares[pair].parameters(curves.x), plane)
+            for pair, plane, curves, _, _ in found
+        ]
+    )
+    kind, where = _class(workflow, all_of("kind")), "on the edge of a tongue"
     variables = _of_curves(
         workflow, names, all_of("count"), kind, on_curves, all_of("error"), where
     )
+    seen = f", in the plane of {' and '.join(first)}" if first and len(workflow.planes) > 1 else ""
     variables |= {
         "edge_curve": ("edge", curve_of.astype(np.int32), {
-            "long_name": "curve through the edge, counted from 0", "units": "1"}),
+            "long_name": f"curve through the edge{seen}, counted from 0", "units": "1"}),
         "curve_index": ("curve", *_index(all_of("index"))),
         "curve_complete": ("curve", all_of("complete").astype(np.int8),
                            _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
     }  # fmt: skip
-    return variables | _of_folds(workflow, across, (across, axis), square, further, found)
+    return variables | _of_folds(workflow, names, squares, found)
+
+
+def _places(grid, dims, rows):
+    """{name: indices} along these dimensions of the rows with these numbers."""
+    shape = [grid.sizes[dim] for dim in dims]
+    return dict(zip(dims, np.unravel_index(rows, shape) if dims else (), strict=True))
 
 
 def _on_plane(workflow, square, across, axis, of_rows, plane, each):
@@ -367,31 +403,40 @@ def _on_plane(workflow, square, across, axis, of_rows, plane, each):
     return curves, _measure(workflow, "folds").find(solve, square, curves)
 
 
-def _of_folds(workflow, across, names, square, further, found):
+def _of_folds(workflow, names, squares, found):
     """The variables of the folds of all maps."""
-    x, error = (
-        np.concatenate([getattr(folds, name) for _, _, folds, _ in found])
-        for name in ("x", "error")
+    curve = np.concatenate([folds.curve + before for *_, folds, before in found])
+    at_folds = np.concatenate(
+        [
+            _all_values(names, pair, squares[pair].parameters(folds.x), plane)
+            for pair, plane, _, folds, _ in found
+        ]
     )
-    curve = np.concatenate([folds.curve + before for _, _, folds, before in found])
-    at_folds = square.parameters(x)
+    across = " or ".join(dict.fromkeys(pair[0] for pair in workflow.planes))
     variables = {"fold_curve": ("fold", curve.astype(np.int32), {
         "long_name": f"curve that turns back in {across}, counted from 0", "units": "1",
         "instance_dimension": "curve"})}  # fmt: skip
+    spanning = {name for pair in workflow.planes for name in pair}
     for i, name in enumerate(names):
         parameter, named = parameter_of(workflow, name)
+        if name not in spanning:
+            variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {"long_name": parameter.long_name})  # fmt: skip
+            continue
         variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
             "ancillary_variables": f"fold_{name}_error"})  # fmt: skip
-        ends = square.parameters(np.stack([x - error, x + error]))[..., i]
-        variables[f"fold_{name}_error"] = ("fold", abs(ends - at_folds[:, i]).max(axis=0), named | {
+        bars = []
+        for pair, _, _, folds, _ in found:
+            if name not in pair:
+                bars.append(np.zeros(len(folds.curve)))
+                continue
+            k, square = pair.index(name), squares[pair]
+            ends = square.parameters(np.stack([folds.x - folds.error, folds.x + folds.error]))[
+                ..., k
+            ]
+            bars.append(abs(ends - square.parameters(folds.x)[..., k]).max(axis=0))
+        variables[f"fold_{name}_error"] = ("fold", np.concatenate(bars), named | {
             "long_name": f"error bound of fold_{name}"})  # fmt: skip
-    for name in further:
-        parameter, named = parameter_of(workflow, name)
-        values = np.concatenate(
-            [np.full(len(folds.curve), plane[name]) for plane, _, folds, _ in found]
-        )
-        variables[f"fold_{name}"] = ("fold", values, named | {"long_name": parameter.long_name})
     return variables
 
 

@@ -15,6 +15,7 @@ from survey.errors import BadInput, Damaged
 from survey.file import schema
 from survey.file.labels import flag_codes, percent
 from survey.file.reading import load
+from survey.show.boundaries import plane_of
 from survey.show.text import options_in_words
 from survey.viewer import raster
 from survey.wording import plain
@@ -50,7 +51,7 @@ class ShownMap:
             raise BadInput(
                 f"{path}: this survey has fewer than two axes, so there is no map to view; draw it with survey plot"
             )
-        self.dims = ds.status.dims[:2]
+        self.dims = tuple(plane_of(ds) or ds.status.dims[:2])
         down = [dim for dim in self.dims if ds[dim].values[0] > ds[dim].values[-1]]
         self.ds = ds.isel({dim: slice(None, None, -1) for dim in down})
         self.axes = [raster.MapAxis(self.ds[dim].values) for dim in self.dims]
@@ -227,7 +228,7 @@ def _check(path, ds):
             raise BadInput(f"{path}: the axis {dim} has no values, so there is no map to view")
     if "cell_verdict" in ds:
         schema.cells(ds)
-    for dim in ds.status.dims[:2]:
+    for dim in plane_of(ds) or ds.status.dims[:2]:
         if ds[dim].dtype.kind not in "iuf":
             raise BadInput(
                 f"{path}: the axis {dim} holds names, and a viewer shows axes of numbers; use survey plot"
