@@ -420,7 +420,8 @@ def _of_folds(workflow, names, squares, found):
     for i, name in enumerate(names):
         parameter, named = parameter_of(workflow, name)
         if name not in spanning:
-            variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {"long_name": parameter.long_name})  # fmt: skip
+            about = named | {"long_name": parameter.long_name}
+            variables[f"fold_{name}"] = ("fold", at_folds[:, i], about)
             continue
         variables[f"fold_{name}"] = ("fold", at_folds[:, i], named | {
             "long_name": f"{parameter.long_name} at the fold of an edge",
