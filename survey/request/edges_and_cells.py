@@ -89,7 +89,7 @@ def _check_closed(measure, scene, name, table, axes, given, options):
         others = [
             pair
             for pair in combinations(names, 2)
-            if not planes and not _refusal(measure, scene, options, names, (pair,))
+            if not _refusal(measure, scene, options, names, (pair,))
         ]
         remedy = (
             f"set plane = {shown(list(others[0]))} under [boundaries]" if others else "change that"

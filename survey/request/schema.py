@@ -80,6 +80,7 @@ class File(Table):
 
 
 REMEDIES = {"step": "; give num, the number of values from start to stop, both included"}
+EXAMPLES = {"plane": '["NAME", "OTHER"]'}  # of lists
 TABLES = {
     "solver": SolverTable,
     "output": OutputTable,
@@ -115,8 +116,14 @@ def complaint(error):
         return f"{key}: bodies are named under [options], as in body = {shown(first['input'])}; several, in Python"
     if first["type"] in ("float_type", "int_type") and _is_number(first["input"]):
         return f"{key} = {shown(first['input'])}: it must be a number, without quotes{more}"
+    if first["loc"] == ("boundaries", "axis"):
+        return (
+            f"{key} = {shown(first['input'])}: it must be the name of one axis; "
+            f"plane names the two axes of a plane{more}"
+        )
     if first["type"] == "list_type":
-        example = "[0.1, 0.2]" if key.startswith("axes.") else '["NAME"]'
+        example = EXAMPLES.get(first["loc"][-1], '["NAME"]')
+        example = "[0.1, 0.2]" if key.startswith("axes.") else example
         return (
             f"{key} = {shown(first['input'])}: it must be a list, "
             f"such as --set '{key}={example}' (with quotes){more}"
