@@ -357,6 +357,27 @@ def test_a_zoom_is_the_same_workflow_on_a_part(tongues, tmp_path):
     )
 
 
+def test_points_without_axes_have_no_part_to_zoom_into():
+    points = {"mu": [0.01, 0.02, 0.03], "e": [0.1, 0.1, 0.2]}
+    along = {key: xr.DataArray(values, dims="k") for key, values in points.items()}
+    ds = survey.evaluate("libration_elliptic", **along)
+    for ranges in ({}, {"mu": (0.01, 0.02)}):
+        with pytest.raises(
+            survey.BadInput, match=r"^zoom: k only counts points, of mu, e: they do not lie"
+        ):
+            ds.survey.zoom(**ranges)
+    with pytest.raises(survey.BadInput, match=r"^zoom: this survey has no axis"):
+        survey.evaluate("libration_elliptic", mu=0.01, e=0.1).survey.zoom()
+
+
+def test_tuples_are_axes_as_lists_are(tmp_path):
+    for number, k in enumerate(((0.1, 0.2), {"values": (0.1, np.float64(0.2))})):
+        axes = {"k": k, "rho": 1.2}
+        ds = survey.run({"scene": "satellite", "axes": axes}, output=tmp_path / f"{number}.nc")
+        assert ds.k.values.tolist() == [0.1, 0.2]
+    assert survey.evaluate("satellite", k=(0.1, 0.2), rho=1.2).sizes == {"k": 2}
+
+
 def test_a_zoom_beyond_the_map_is_solved_and_said(mathieu, recwarn):
     inside = mathieu.survey.zoom(a=(-1.0, 5.0), num=3)
     assert not recwarn.list

@@ -70,10 +70,13 @@ def _of_names(ds, ranges, num, output):
 def _ranges(ds, ranges):
     """{axis: (low, high)}; raises BadInput for an unknown axis or an invalid range."""
     axes = [dim for dim in ds.status.dims if dim in ds.coords]
-    if not ranges:
+    if not axes:
+        refuse_members(ds, "zoom", "survey.evaluate solves further ones")
         raise BadInput(
-            f"zoom: give a range for at least one axis, such as {axes[0] if axes else 'k'}=(0.1, 0.2)"
+            "zoom: this survey has no axis of which a part could be solved; survey.evaluate solves further points"
         )
+    if not ranges:
+        raise BadInput(f"zoom: give a range for at least one axis, such as {axes[0]}=(0.1, 0.2)")
     for name, ends in ranges.items():
         if name not in axes:
             if name in ds.status.dims:

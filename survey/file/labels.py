@@ -326,7 +326,9 @@ def scene_statuses(ds):
 
 
 def undecided_share(ds):
-    """The fraction of a refined map covered by undecided cells."""
+    """The fraction of a refined map whose verdict is not known: less than undecided cells cover, of
+    which parts may be known.
+    """
     return max(1.0 - float((ds.area_fraction - ds.area_fraction_error).sum()), 0.0)
 
 

@@ -136,7 +136,7 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
             f"{shown(data)} is neither the path of a workflow file nor a mapping with its tables"
         )
     if isinstance(data.get("axes"), Mapping):
-        data = {**data, "axes": {key: _without_numpy(axis) for key, axis in data["axes"].items()}}
+        data = {**data, "axes": {key: _as_toml_axis(axis) for key, axis in data["axes"].items()}}
     given_scene = data.get("scene")
     if isinstance(given_scene, FunctionScene):
         data = {**data, "scene": given_scene.NAME}
@@ -213,11 +213,19 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
     )
 
 
-def _without_numpy(axis):
-    """An entry of [axes] from Python, whose numbers may be numpy's, as TOML would give it."""
+def _as_toml_axis(axis):
+    """An entry of [axes] from Python, whose numbers may be numpy's and whose lists tuples, as TOML
+    would give it.
+    """
     if isinstance(axis, dict):
-        return {key: value.tolist() if _is_numpy(value) else value for key, value in axis.items()}
-    return axis.tolist() if _is_numpy(axis) else axis
+        return {key: _as_toml_value(value) for key, value in axis.items()}
+    return _as_toml_value(axis)
+
+
+def _as_toml_value(value):
+    if isinstance(value, tuple):
+        return [_as_toml_value(one) for one in value]
+    return value.tolist() if _is_numpy(value) else value
 
 
 def _is_numpy(value):

@@ -5,7 +5,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 
 from survey.file import schema
-from survey.file.labels import flag_codes, percent, undecided_share
+from survey.file.labels import flag_codes, percent
 from survey.show.marks import marks
 from survey.show.palette import colours_of, hatch_of
 from survey.show.text import literal
@@ -20,7 +20,7 @@ def draw_cells(axes, ds, x, y, failed, number, paper):
         ds[f"cell_{axis.name}_{end}"].values for axis in (x, y) for end in ("low", "high")
     )
     corners = np.stack([left, low, left, high, right, high, right, low], axis=1).reshape(-1, 4, 2)
-    table = flag_codes(ds.cell_verdict.attrs)
+    table, sizes = flag_codes(ds.cell_verdict.attrs), (right - left) * (high - low)
     shares = dict(zip(flag_codes(ds.area_verdict.attrs), ds.area_fraction.values, strict=True))
     handles = []
     for name, code in reversed(table.items()):
@@ -37,17 +37,18 @@ def draw_cells(axes, ds, x, y, failed, number, paper):
             axes.add_collection(
                 PolyCollection(corners[here], facecolors="none", lw=0, hatch=hatch, rasterized=True)
             )
-        bar = float(ds.area_fraction_error[0])
-        part = (
-            percent(shares[name], bar) if name in shares else f"{100 * undecided_share(ds):.2g} %"
-        )
-        part = part.replace("+-", "±")
+        if name in shares:
+            part = percent(shares[name], float(ds.area_fraction_error[0])).replace("+-", "±")
+            label = f"{literal(name)} ({part})"
+        else:  # the areas in such cells may be known, so this is no share beside the others
+            part = 100.0 * sizes[here].sum() / sizes.sum()
+            label = f"{literal(name)} cells ({part:.2g} % of the map)"
         patch = Patch(
             facecolor=colour,
             edgecolor="black",
             lw=0.5,
             hatch=hatch,
-            label=f"{literal(name)} ({part})",
+            label=label,
         )
         handles += [patch] if here.any() else []
     axes.set(xlim=(left.min(), right.max()), ylim=(low.min(), high.max()))

@@ -8,7 +8,7 @@ from matplotlib.patches import Patch
 from survey import status
 from survey.file.labels import fill_of, masked, words_of
 from survey.show.layout import add_legend
-from survey.show.maps import IN_WORDS, colours_of_numbers
+from survey.show.maps import IN_WORDS, colours_of_numbers, ticks_of
 from survey.show.palette import kinds_of
 from survey.show.text import WIDE, label_of, spaced
 
@@ -71,9 +71,11 @@ def draw_ensemble(axes, ds, name, paper, asked):
         words = words_of(variable)
         values = variable.values.astype(float)
         shown = np.ma.masked_invalid(np.where(lost | np.isin(values, list(words)), np.nan, values))
-        colours = colours_of_numbers(shown, variable, asked, fill_of(variable) is not None)
+        whole = fill_of(variable) is not None
+        colours = colours_of_numbers(shown, variable, asked, whole)
         drawn = axes.scatter(x.values, y.values, SIZE, shown, **colours)
-        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE))
+        ticks = ticks_of(shown, colours, whole) if shown.count() else None
+        axes.figure.colorbar(drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks)
         handles = []
         for code, text in words.items():
             here = (values == code) & ~lost

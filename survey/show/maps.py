@@ -36,7 +36,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
     """
     scales = ["log" if logarithmic(variable[dim].values) else "linear" for dim in variable.dims]
     words = words_of(variable)
-    ticks = MaxNLocator(integer=True) if fill_of(variable) is not None else None
+    whole = fill_of(variable) is not None
     variable, state, number = _shown(
         axes, ds, variable, state, style_named("paper" if paper else None).dpi
     )
@@ -55,11 +55,11 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
         shown = np.ma.masked_invalid(
             np.where(failed | outside | np.isin(values, list(words)), np.nan, values)
         )
-        colours = colours_of_numbers(shown, variable, asked, ticks is not None)
+        colours = colours_of_numbers(shown, variable, asked, whole)
         drawn = axes.pcolormesh(x, y, shown.T, shading="nearest", rasterized=True, **colours)
         if not shown.mask.all():
             few = isinstance(colours.get("norm"), BoundaryNorm)
-            ticks = np.unique(shown.compressed()) if few else ticks
+            ticks = ticks_of(shown, colours, whole)
             extend = "neither" if few else clipped(shown, *drawn.get_clim())
             axes.figure.colorbar(
                 drawn, ax=axes, label=label_of(variable, WIDE), ticks=ticks, extend=extend
@@ -219,6 +219,13 @@ def colours_of_numbers(shown, variable, asked, integers):
         most = max(-low, high)
         limits = {"vmin": -most, "vmax": most}
     return {"cmap": asked.get("cmap") or (DIVERGING if signed else SEQUENTIAL)} | limits
+
+
+def ticks_of(shown, colours, whole):
+    """The ticks of a colour bar: those of counts are whole numbers, of a few counts these."""
+    if isinstance(colours.get("norm"), BoundaryNorm):
+        return np.unique(shown.compressed())
+    return MaxNLocator(integer=True) if whole else None
 
 
 def clipped(shown, low, high):

@@ -8,6 +8,7 @@ from bokeh import events
 from bokeh.core.property.descriptors import UnsetValueError
 from bokeh.layouts import column, row
 from bokeh.models import (
+    BasicTicker,
     Button,
     Checkbox,
     ColorBar,
@@ -25,6 +26,7 @@ from bokeh.plotting import figure
 from matplotlib.figure import Figure
 
 from survey.errors import BadInput, SurveyError, Untrusted
+from survey.file.labels import fill_of
 from survey.request import trust
 from survey.show import boundaries
 from survey.viewer import finer, raster, widgets
@@ -368,6 +370,8 @@ class Page:
         if not layer.flagged:
             self.bar.color_mapper.update(low=layer.limits[0], high=layer.limits[1])
             self.bar.title = widgets.label(ds[name], tex=False)
+            whole = fill_of(ds[name]) is not None
+            self.bar.ticker = BasicTicker(min_interval=1 if whole else 0)
 
     def _moved(self, event):
         if event.x is not None:

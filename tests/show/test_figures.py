@@ -6,11 +6,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex, to_rgb
 
 import survey
 from survey import status
 from survey.errors import BadInput
+from survey.file.labels import fill_of
 from survey.show import figures, maps, marks, palette
 
 
@@ -72,7 +74,9 @@ def test_a_plane_across_that_of_the_curves_is_drawn_on_its_two_axes():
         xr.DataArray(np.linspace(0.0, 1.0, n), dims=dim)
         for dim, n in zip("kmr", (3, 4, 5), strict=True)
     ]
-    ds = xr.Dataset({"status": sum(of), "edge_count": sum(of[:2])}, attrs={"boundaries": "r"})
+    ds = xr.Dataset(
+        {"status": sum(of), "curve_count": ("curve", [3])}, attrs={"boundary_planes": "k, r"}
+    )
     assert figures._chosen(ds, (None, None)) == ["k", "r"]
     for at in ("r", "k"):  # fixed, it has one value: the map is over the two others
         assert figures._chosen(ds.isel({at: slice(1)}), (None, None)) is None
@@ -289,3 +293,50 @@ def test_labels_of_colour_bars_are_wrapped_evenly_within_the_bar(surveyed, words
 def test_a_single_number_has_no_figure(surveyed):
     with pytest.raises(BadInput, match="at least one axis"):
         figures.draw(survey.open(surveyed).isel(t=0, w0=0), "w")
+
+
+def test_the_legend_of_a_refined_map_says_what_is_drawn_as_undecided(tmp_path):
+    """Areas inside undecided cells are known in part, so they are not what these cells cover."""
+    axes = {
+        "k": {"start": 0.02, "stop": 0.98, "num": 9},
+        "rho": {"start": 0.02, "stop": 4.0, "num": 9},
+    }
+    ds = survey.run(
+        {"scene": "satellite", "axes": axes, "boundaries": {}, "refine": {"width": 0.02}},
+        output=tmp_path / "map.nc",
+    )
+    here = ds.cell_verdict.values == -1
+    sizes = (ds.cell_k_high - ds.cell_k_low) * (ds.cell_rho_high - ds.cell_rho_low)
+    covered = 100.0 * float(sizes[here].sum() / sizes.sum())
+    figure = figures.draw(ds, "verdict")
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert f"undecided cells ({covered:.2g} % of the map)" in labels
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba()).astype(int)
+    box = figure.axes[0].get_window_extent()
+    inside = pixels[::-1][int(box.y0) + 3 : int(box.y1) - 3, int(box.x0) + 3 : int(box.x1) - 3]
+    black = 100.0 * (inside[..., :3].sum(axis=-1) < 120).mean()
+    assert 0.6 * covered < black < 1.4 * covered
+    plt.close(figure)
+
+
+def test_bars_of_counts_have_whole_ticks():
+    rng = np.random.default_rng(1)
+    points = {
+        key: xr.DataArray(rng.uniform(*ends, 60), dims="point")
+        for key, ends in {"phi0": (-3.0, 3.0), "w0": (-3.0, 3.0)}.items()
+    }
+    ds = survey.evaluate("gyrostat", question="fate", d=0.5, s3=0.3, **points)
+    counts = [name for name in ds.data_vars if fill_of(ds[name]) is not None]
+    assert counts
+    for spread in (1, 40):
+        for name in counts[:1]:
+            some = ds.assign(
+                {name: (ds[name] * 0 + np.arange(60) % 3 * spread).assign_attrs(ds[name].attrs)}
+            )
+            figure = figures.draw(some, name)
+            figure.canvas.draw()
+            ticks = figure.axes[1].get_yticks()
+            assert (ticks == np.round(ticks)).all()
+            plt.close(figure)
