@@ -26,6 +26,7 @@ from survey.measures.tasks import in_turn
 from survey.scene import Request
 from survey.sweep.line import OnLine, on_line
 
+ALONE = 1 / 15  # of the time of a map: of one axis, measured
 ROWS = 128  # solved together
 COLUMNS = 9  # searched for curves that meet no row
 RTOL = 1e-13
@@ -129,7 +130,8 @@ def _seconds_of_map(scene, measure, axes, cost):
         return measure.seconds(axes)  # measured
     if hasattr(measure, "searched"):
         # measured: some ten points solved for each point of a curve, and a lattice
-        return getattr(scene, "curves_seconds", 1e5 * cost)
+        seconds = getattr(scene, "curves_seconds", 1e5 * cost)
+        return seconds * (1.0 if len(axes) > 1 else ALONE)
     return 0.1
 
 
