@@ -75,7 +75,8 @@ def _check_closed(measure, scene, name, table, axes, given, options):
     """As `check_boundaries`, of axes {name: values}; raises BadInput where the measure knows no
     curves on these.
     """
-    names, planes = list(axes), _planes(table.plane, axes)
+    names = list(axes)
+    planes = _planes(table.plane, axes)
     refusal = None
     if len(names) == 1 and hasattr(measure, "closed"):
         fixed = {

@@ -103,7 +103,8 @@ def plan(workflow, cost):
 
     `cost` is the scene's estimate for a point, in seconds.
     """
-    measure, sizes = measures.curves(workflow.scene), workflow.grid.sizes
+    measure = measures.curves(workflow.scene)
+    sizes = workflow.grid.sizes
     if hasattr(measure, "refusal"):
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         maps = [pair for pair, _ in _maps(workflow)] or [tuple(sizes)]  # or an axis alone
@@ -144,7 +145,9 @@ def _closed(workflow, measure, each):
     """The variables of curves found without rows, on one map, or on each map of the stacks along
     further axes; and along how many segments of lines across these a curve is missing.
     """
-    names, fixed, maps = list(workflow.grid.sizes), fixed_of(workflow), _maps(workflow)
+    names = list(workflow.grid.sizes)
+    fixed = fixed_of(workflow)
+    maps = _maps(workflow)
     squares = {pair: square_of(workflow, *pair) for pair in workflow.planes}
     task = (
         partial(measure.searched, workflow.scene)
@@ -271,7 +274,7 @@ def _edges(workflow, axis, each=in_turn, once=lambda name, make: make()):
 def _row_solver(workflow, axis, rows):
     """What `edges.find` asks of the scene, for these rows."""
     grid = workflow.grid
-    place = _places(grid, [dim for dim in grid.sizes if dim != axis], rows)
+    at = _indices(grid, [dim for dim in grid.sizes if dim != axis], rows)
     others = {
         name: values[at[dims[0]]] if dims else values
         for name, (dims, values) in grid.parameters.items()
@@ -318,9 +321,11 @@ def _curves(workflow, along, each):
     """The variables of the curves on each map of two axes (its rows are along the second), and of
     their folds; `along`: {axis: the Edges of all rows along it}.
     """
-    grid, axis, maps = workflow.grid, workflow.boundaries, _maps(workflow)
-    places = {
-        name: _places(grid, [dim for dim in grid.sizes if dim != name], edges.row)
+    grid = workflow.grid
+    axis = workflow.boundaries
+    maps = _maps(workflow)
+    indices = {
+        name: _indices(grid, [dim for dim in grid.sizes if dim != name], edges.row)
         for name, edges in along.items()
     }
     squares = {pair: square_of(workflow, *pair) for pair in workflow.planes}
@@ -329,11 +334,12 @@ def _curves(workflow, along, each):
 
     def on_map(one, each=in_turn):
         pair, plane = one
-        edges, place = along[pair[1]], places[pair[1]]
+        edges = along[pair[1]]
+        at = indices[pair[1]]
         own = np.ones(edges.row.size, bool)
         for dim, value in plane.items():
-            own &= np.asarray(grid.parameters[dim][1])[place[dim]] == value
-        of_rows = np.asarray(grid.parameters[pair[0]][1])[place[pair[0]][own]]
+            own &= np.asarray(grid.parameters[dim][1])[at[dim]] == value
+        of_rows = np.asarray(grid.parameters[pair[0]][1])[at[pair[0]][own]]
         seeds = np.stack([of_rows, edges.position[own]], axis=1), edges.kind[own], edges.index[own]
         return own, *_on_plane(workflow, squares[pair], *pair, seeds, plane, each)
 
@@ -359,7 +365,8 @@ def _curves(workflow, along, each):
             for pair, plane, curves, _, _ in found
         ]
     )
-    kind, where = _class(workflow, all_of("kind")), "on the edge of a tongue"
+    kind = _class(workflow, all_of("kind"))
+    where = "on the edge of a tongue"
     variables = _of_curves(
         workflow, names, all_of("count"), kind, on_curves, all_of("error"), where
     )
@@ -374,7 +381,7 @@ def _curves(workflow, along, each):
     return variables | _of_folds(workflow, names, squares, found)
 
 
-def _places(grid, dims, rows):
+def _indices(grid, dims, rows):
     """{name: indices} along these dimensions of the rows with these numbers."""
     shape = [grid.sizes[dim] for dim in dims]
     return dict(zip(dims, np.unravel_index(rows, shape) if dims else (), strict=True))
@@ -433,7 +440,8 @@ def _of_folds(workflow, names, squares, found):
             if name not in pair:
                 bars.append(np.zeros(len(folds.curve)))
                 continue
-            k, square = pair.index(name), squares[pair]
+            k = pair.index(name)
+            square = squares[pair]
             ends = square.parameters(np.stack([folds.x - folds.error, folds.x + folds.error]))[
                 ..., k
             ]
