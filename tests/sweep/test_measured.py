@@ -144,15 +144,8 @@ def test_a_cache_that_cannot_be_written_is_no_error(mapped, monkeypatch, tmp_pat
     assert measured._records() == [] and replace(mapped) == mapped
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "coupled_mathieu",
-        "ion_trap",
-        "kapitza",
-        pytest.param("ground_resonance", marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["coupled_mathieu", "ion_trap", "kapitza", "ground_resonance"])
 def test_what_a_point_of_an_own_system_costs_is_known_before_it_is_solved(name):
     """Two states or twelve, two functions of time or 135: within a factor of 3 of the processor's time."""
     checked = workflow.read(ROOT / f"workflows/{name}.toml", output="never.nc")
@@ -171,3 +164,11 @@ def test_what_a_point_of_an_own_system_costs_is_known_before_it_is_solved(name):
     most, half = (min(spent(number) for _ in range(3)) for number in (many, many // 2))
     taken, expected = (most - half) / (many / 2), scene.cost({}, dict.fromkeys(some, 1))
     assert expected / 3 < taken < 3 * expected, (taken, expected)
+
+
+def test_an_own_system_costs_by_its_states_and_its_functions_of_time():
+    costs = {}
+    for name in ("kapitza", "coupled_mathieu", "ground_resonance"):  # 2, 4 and 12 states
+        checked = workflow.read(ROOT / f"workflows/{name}.toml", output="never.nc")
+        costs[len(checked.scene.states)] = checked.scene.cost({}, {"p": 1})
+    assert 1e-6 < costs[2] < costs[4] < costs[12] < 1e-1
