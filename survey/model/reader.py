@@ -132,7 +132,7 @@ class Model:
         """The outputs of points x, y (arrays of one shape), in a dict of arrays of that shape.
 
         From 100,000 points on, D comes from series on smaller cells, ten times as fast; points that
-        these leave undecided from the factors. A place without an answer (around a singularity) has
+        these leave undecided from the factors. A point without an answer (around a singularity) has
         NaN and the verdict -1.
         """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))

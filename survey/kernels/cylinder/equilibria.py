@@ -130,7 +130,7 @@ def clustered(p, table):
 
 @inline
 def insert(sorted_, size, x):
-    """Put x where it belongs among the first `size`, ascending; returns its place."""
+    """Put x where it belongs among the first `size`, ascending; returns its index."""
     k = size
     while k > 0 and sorted_[k - 1] > x:
         sorted_[k] = sorted_[k - 1]

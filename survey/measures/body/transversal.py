@@ -27,9 +27,9 @@ MOST = 4  # exponents beside a limit: 2 in case B, 3 in case A, 4 about the vert
 
 
 @dataclass(frozen=True)
-class Beside:
-    """Of a limit: exponents or, over a period, multipliers (complex), the largest rate of growth;
-    is that below 0?
+class TransversalStability:
+    """Of deviations beside a limit: exponents or, over a period, multipliers (complex), the largest
+    rate of growth, and whether that is below 0 (`stable`).
     """
 
     values: np.ndarray
@@ -41,7 +41,7 @@ class Beside:
     period_bar: float = np.nan
 
 
-NOTHING = Beside(np.zeros(0, complex), np.zeros(0), np.nan, np.nan, UNDECIDED)
+NOTHING = TransversalStability(np.zeros(0, complex), np.zeros(0), np.nan, np.nan, UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def at_rest(placed, phi, bar):
         0.5 * trace if minors - minors_bar > (0.5 * abs(trace) + trace_bar) ** 2 else roots[0].real
     )
     growth_bar = 0.5 * trace_bar if growth == 0.5 * trace else bars[0]
-    return Beside(roots, bars, float(growth), float(growth_bar), stable)
+    return TransversalStability(roots, bars, float(growth), float(growth_bar), stable)
 
 
 def _minors(matrix):
@@ -183,7 +183,9 @@ def of_matrix(matrix, off):
     high, low = np.max(values.real + bars), np.max(values.real - bars)
     stable = STABLE if high < 0.0 else UNSTABLE if low > 0.0 else UNDECIDED
     middle = values.real.max()
-    return Beside(values, bars, float(middle), float(max(high - middle, middle - low)), stable)
+    return TransversalStability(
+        values, bars, float(middle), float(max(high - middle, middle - low)), stable
+    )
 
 
 def along(placed, start, rotates):
@@ -258,10 +260,10 @@ def _timed(values, bars, stable, lasting):
     sizes = np.abs(values)
     high, low, middle = np.max(sizes + bars), np.max(sizes - bars), np.max(sizes)
     if not (low > 0.0 and math.isfinite(high)):
-        return Beside(values, bars, np.nan, np.nan, stable, **lasting)
+        return TransversalStability(values, bars, np.nan, np.nan, stable, **lasting)
     growth = math.log(middle) / period
     bar = max(math.log(high / middle), math.log(middle / low)) / period
-    return Beside(
+    return TransversalStability(
         values,
         bars,
         growth,

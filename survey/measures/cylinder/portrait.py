@@ -42,7 +42,7 @@ ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
 TINY = 1e-300
 
 
-class Listed(NamedTuple):
+class ListedCycle(NamedTuple):
     """A cycle: number `at` of point `i`, of a kind, its row of `returns`, and its system."""
 
     i: int
@@ -108,7 +108,7 @@ def solve(method, systems, rtol):
         ]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
-        listed += [Listed(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
+        listed += [ListedCycle(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
     for kinds, timed in (
         ((ROTATION_PLUS, ROTATION_MINUS), _rotations),
         ((LIBRATION,), _librations),

@@ -99,7 +99,7 @@ class Family:
             return 0 if abs(self.branch) == 1 else None
         points = np.tile(point, (len(x), 1))
         found = orbit.shown(self.equation, points, x, T, self.method, ENOUGH, relax=False)
-        shown = [orbit.Seen.of(found, i, i) for i in np.flatnonzero(found.good)]
+        shown = [orbit.KnownOrbit.of(found, i, i) for i in np.flatnonzero(found.good)]
         order = orbit.numbered(shown, free=False)
         return order[self.branch - (self.branch > 0)] if abs(self.branch) <= len(order) else None
 

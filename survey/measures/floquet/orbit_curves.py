@@ -58,7 +58,7 @@ def searched(scene, square, axes, fixed):
     return sorted(found, key=lambda one: order[one[0]])
 
 
-class How(NamedTuple):
+class Criticality(NamedTuple):
     """The way in which an orbit has a multiplier on the unit circle: see `critical.Critical`."""
 
     kind: int
@@ -78,12 +78,14 @@ class _Map:
         self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
         self.kinds = [
-            How(kind) for kind in KINDS if kind != NEIMARK_SACKER or equation.n - equation.free > 1
+            Criticality(kind)
+            for kind in KINDS
+            if kind != NEIMARK_SACKER or equation.n - equation.free > 1
         ]
         if self.mirror is not None:
             more = ((PLUS_ONE, False), (PLUS_ONE, True), (NEIMARK_SACKER, False))
             self.kinds = [
-                *(How(kind, self.mirror, branching) for kind, branching in more),
+                *(Criticality(kind, self.mirror, branching) for kind, branching in more),
                 *self.kinds,
             ]
             self.kinds.sort(key=lambda how: how.kind != NEIMARK_SACKER)
@@ -110,7 +112,7 @@ class _Map:
         return self.square.positions(own)
 
     def seeds(self):
-        """{How: [y (size)]} of orbits on the lines."""
+        """{Criticality: [y (size)]} of orbits on the lines."""
         found = {how: [] for how in self.kinds}
         for axis in range(len(self.varied)):
             for how, y in self._of_lines(axis):
@@ -118,7 +120,7 @@ class _Map:
         return found
 
     def _of_lines(self, axis):
-        """(How, y) where orbits along the axis have the multiplier."""
+        """(Criticality, y) where orbits along the axis have the multiplier."""
         index = self.varied[axis]
         low, high = float(self.square.low[axis]), float(self.square.high[axis])
         if self.continued is not None and self.continued.index == index:

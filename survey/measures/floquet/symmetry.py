@@ -78,7 +78,7 @@ class Symmetry:
         return x
 
     def linearised(self, X, M, f, x, guess):
-        """What is to be 0 (N, n + 1), and its derivatives by (x(0), T), of X = x(T/2), M = dX/dx(0)
+        """What must vanish (N, n + 1), and its derivatives by (x(0), T), of X = x(T/2), M = dX/dx(0)
         and f there.
         """
         N, n, m = len(x), self.n, len(self.ends)
