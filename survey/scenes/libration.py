@@ -185,7 +185,7 @@ def why(answer):
             + (f"{named(answer, 'M_ray')} is not 0")
         )
     if verdict == "formally_stable_by_order_4":
-        return f"{named(answer, 'D4')} and {named(answer, 'a02')} have one sign: N is definite where L = 0, r >= 0"
+        return f"{named(answer, 'D4')} and {named(answer, 'a02')} have the same sign: N is definite where L = 0, r >= 0"
     return "an error bar reaches across 0: " + ", ".join(
         named(answer, name) for name in ("D4", "a02")
     )

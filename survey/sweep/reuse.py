@@ -52,7 +52,7 @@ class Earlier:
 
 @lru_cache(1)
 def _dataset(path, version):
-    """Once in each process."""
+    """The file as a dataset, opened once in each process."""
     return reading.load(path)
 
 

@@ -96,7 +96,7 @@ def _rate(placed):
 
 
 def at_rest(placed, phi, bar):
-    """Of the equilibrium at phi, known within its bar."""
+    """The TransversalStability of the equilibrium at phi, known within its bar."""
     beside = linear(placed)
     matrix = beside.at(phi, 0.0)
     off = beside.slip * beside.size(0.0) + bar * sum(
@@ -162,7 +162,8 @@ def of_matrix(matrix, off):
     if not np.isfinite(matrix).all():
         return NOTHING
     values, vectors = np.linalg.eig(matrix)
-    size, n = np.linalg.norm(matrix), len(matrix)
+    size = np.linalg.norm(matrix)
+    n = len(matrix)
     off = n * off + 8.0 * n * EPS * size
     with np.errstate(all="ignore"):
         try:
@@ -189,8 +190,8 @@ def of_matrix(matrix, off):
 
 
 def along(placed, start, rotates):
-    """Of the periodic motion from `start` (phi, w and their bars): multipliers over a period;
-    growth per unit time.
+    """The TransversalStability of the periodic motion from `start` (phi, w and their bars):
+    multipliers over a period, growth per unit of time.
 
     Where the motion does not close within the bars, NOTHING.
     """
@@ -274,7 +275,7 @@ def _timed(values, bars, stable, lasting):
 
 
 def fast(placed):
-    """Of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments,
+    """That of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments,
     else undecided.
 
     To leading order d(w2, w3)/dt = w S^-1 J (S - A11) (w2, w3): the squares of its exponents are
@@ -287,7 +288,7 @@ def fast(placed):
 
 
 def steady(system, w, nu, off=0.0):
-    """Of a fixed point (w, nu) of the whole body at its k and |nu| = 1: four exponents.
+    """That of a fixed point (w, nu) of the whole body at its k and |nu| = 1: four exponents.
 
     `off` is what the state may be off. Where A nu vanishes it cannot: k always moves with w.
     """

@@ -82,7 +82,7 @@ class Basins:
 
 @dataclass(frozen=True)
 class StartRange:
-    """What of a whole survey decides how far curves are followed: the starts of one system, their
+    """What decides in a survey how far curves are followed: the number of starts of a system and their
     largest |w|.
     """
 

@@ -32,7 +32,8 @@ from survey.measures.cylinder.fate import (
 from survey.status import NO_CONVERGENCE, OK
 
 # Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
-CYCLES, EQUILIBRIA = 8, eq.MOST
+CYCLES = 8
+EQUILIBRIA = eq.MOST
 NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
 TOO_MANY, UNKNOWN_CYCLES = 20, 21  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1

@@ -318,7 +318,8 @@ class _Walk:
         """What must vanish for orbits to close, and its derivatives by (x(0), T), of X = x(T) and M
         = dX/dx(0).
         """
-        n, symmetry = self.n, self.equation.symmetry
+        n = self.n
+        symmetry = self.equation.symmetry
         if symmetry is not None:
             guess = self.equation.begin(points)[0]
             return symmetry.linearised(X, M, slopes(self.equation, points, X), x, guess)

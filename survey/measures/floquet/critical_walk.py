@@ -119,7 +119,8 @@ class Walk:
             *chord
         ):
             return False
-        own, n = y + share * (new - y), self.own.n
+        own = y + share * (new - y)
+        n = self.own.n
         if self.own.free:
             alike = (
                 abs(own[self.own.period_at] - seed[self.own.period_at])

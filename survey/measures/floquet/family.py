@@ -149,7 +149,8 @@ class Family:
 
     def _rough(self, points, x, T):
         """(M, E) of orbits from x (N, n), of the periods T; NaN where x is."""
-        n, symmetry = self.equation.n, self.equation.symmetry
+        n = self.equation.n
+        symmetry = self.equation.symmetry
         X, f = np.full((len(x), n, n), np.nan), np.full((len(x), n), np.nan)
         good = np.flatnonzero(np.isfinite(x).all(axis=1))
         for inside, programs in self.equation.traced(points[good], x[good]):

@@ -32,7 +32,7 @@ EVEN = frozenset({"cos", "cosh"})
 
 @dataclass(frozen=True)
 class Images:
-    """What of a piece follows from its beginning: signs of the states in a reversal of time, and in
+    """How a piece follows from its beginning: the signs of the states in a reversal of time, and in
     a repetition, as bytes of -1 and 1, or None where there is none.
     """
 
@@ -41,7 +41,7 @@ class Images:
 
     @property
     def parts(self):
-        """Of equal length, the first of which is integrated."""
+        """The number of parts of equal length, the first of which is integrated."""
         return (1 if self.reversal is None else 2) * (1 if self.repetition is None else 2)
 
     def complete(self, F, error, doubt, first, count):
@@ -53,7 +53,8 @@ class Images:
         """
         tasks = np.repeat(np.arange(len(count)), count)
         index = np.arange(tasks.size) - np.repeat(np.cumsum(count) - count, count)
-        done, here = 1, first[tasks] + index
+        done = 1
+        here = first[tasks] + index
         if self.reversal is not None:
             signs = _signs(self.reversal)
             if self.repetition is not None:  # about the middle of the first half
@@ -63,7 +64,8 @@ class Images:
             F[back] = F[own] * np.outer(signs, signs)
             error[back] = error[own]
             doubt[back] = doubt[own]
-            done, here = 2, np.concatenate([here, back])
+            done = 2
+            here = np.concatenate([here, back])
             tasks = np.concatenate([tasks, tasks])
         if self.repetition is not None:
             signs = _signs(self.repetition)

@@ -193,7 +193,7 @@ class Matrices:
 
     @classmethod
     def plain(cls, M, E):
-        """Those of which no more is known than M and E."""
+        """The Matrices of points of which only M and E are known."""
         found = cls.empty(*M.shape[:2])
         found.M, found.E = M, E
         return found

@@ -191,7 +191,8 @@ class Newton:
 
     def _linearised(self, those, x, T, how):
         """G, the inverse of its derivative, and the sizes of the unknowns."""
-        numbers, n = chosen(self.numbers, those), x.shape[1]
+        numbers = chosen(self.numbers, those)
+        n = x.shape[1]
         X, M, size, _steps = self.programs.flow(numbers, x, self.equation.share * T, **how)
         value, slope = X - x, M - np.eye(n)
         if self.phase is not None:

@@ -167,7 +167,8 @@ def _chunk(equation, points, method, rtol, wanted):
 
 def shown(equation, points, guess, period, method, rtol, relax=True):
     """What is found (N) from guesses of the state (N, n) and of the period (N); see `newton.located`."""
-    N, reach = len(points), _reach(rtol)
+    N = len(points)
+    reach = _reach(rtol)
     found = OrbitResults(equation, N)
     orbits, good = located(equation, points, reach, guess, period, relax)
     _show(found, equation, points, orbits, good, method, reach)
@@ -179,7 +180,8 @@ def shown(equation, points, guess, period, method, rtol, relax=True):
 
 def _show(found, equation, points, orbits, good, method, reach, finer=False):
     """Put the orbits, of the points `good`, that are shown to exist into `found`."""
-    n, symmetry = equation.n, equation.symmetry
+    n = equation.n
+    symmetry = equation.symmetry
     certified = (
         existence.certified if symmetry is None else partial(shooting.certified, symmetry=symmetry)
     )

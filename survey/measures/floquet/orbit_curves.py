@@ -154,7 +154,8 @@ class _Map:
 
     def _of_curve(self, curves, row, y, axis):
         """The same of one curve of orbits."""
-        n, free = self.equation.n, self.equation.free
+        n = self.equation.n
+        free = self.equation.free
 
         def orbits(y):
             points = curves.points(np.full(len(y), row), y[:, -1])
@@ -213,7 +214,8 @@ class _Map:
 
     def _near(self, how, points, x, T):
         """The unknowns y (N, size) of `critical` near orbits."""
-        own, n = self.points(how).critical, self.equation.n
+        own = self.points(how).critical
+        n = self.equation.n
         M, f = self._matrices(points, x, T if how.mirror is None else 0.5 * T)
         M = own.signs[:n, None] * M
         y = np.full((len(x), own.size), np.nan)
@@ -261,7 +263,8 @@ class _Map:
         ]
         if not len(ends):
             return []
-        parameters, n = points.parameters(ends), self.equation.n
+        parameters = points.parameters(ends)
+        n = self.equation.n
         T = ends[:, own.period_at] if own.free else self.equation.periods(parameters)
         start = self._near(how, parameters, ends[:, :n], T)
         return [one for held in (0, 1) for one in self._located(how, start, held)]
@@ -284,7 +287,8 @@ class _Map:
         own = points.critical
         if self.mirror is None or own.mirror is not None or not seeds:
             return seeds
-        y, n = np.array(seeds), own.n
+        y = np.array(seeds)
+        n = own.n
         parameters = points.parameters(y)
         T = y[:, own.period_at] if own.free else self.equation.periods(parameters)
         y[:, :n] = (
@@ -319,7 +323,8 @@ class _Map:
         """[(class, parameters, errors, {name: (values, errors)})] of the parts of a curve that are
         shown to exist.
         """
-        own, N = points.critical, len(y)
+        own = points.critical
+        N = len(y)
         last = own.parameters_at
         if len(self.varied) > 1:
             # the other parameter is held: that along which the curve runs, or the one at the border

@@ -91,7 +91,8 @@ class _Half:
         """Join steps to shots: `cuts`, their first steps, `first`, the orbits' first shots, and
         their propagators.
         """
-        path, n = self.path, self.path.n
+        path = self.path
+        n = self.path.n
         growth = path.h * path.norm
         before = np.cumsum(growth) - growth
         number = np.floor((before - before[path.first[:-1]][path.point]) / SHOT)

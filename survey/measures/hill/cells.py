@@ -76,7 +76,7 @@ class Side:
         return np.where(part == 0, self.low, np.where(part == 1, self.high, inside))
 
     def length(self, start, end):
-        """Of the side between two of its parts; nothing cancels."""
+        """The length of the side between two of its parts; nothing cancels."""
         if not self.log:
             return (self.high - self.low) * (end - start)
         rate = np.log(self.high / self.low)

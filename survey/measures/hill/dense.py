@@ -53,13 +53,13 @@ DEGREES = np.array(
 # A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
 ROWS_PER_NODE = 3
-# Of the asked accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
+# Of the requested accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
 # 4; those of a map are solved as well as can be.
 NODES_SHARE, BEST = 0.1, 1e-14
 # Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what
 # `_enough` looks at by 10^7 or so, on every row that was measured.
 FACTORS_SHARE = 1e-6
-# The share of the nodes known to the asked accuracy from which on a series serves.
+# The share of the nodes known to the requested accuracy from which on a series serves.
 MOST = 0.9
 RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
@@ -67,7 +67,8 @@ ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
 # The parts of the axis across points on their own: rows in each, of D and of factors, where more
 # terms are summed.
-ROWS_PER_PART, MOST_PARTS = (260, 130), 8
+ROWS_PER_PART = (260, 130)
+MOST_PARTS = 8
 # Points of a call that answers from factors: their temporaries stay in the processor's cache.
 CALL_POINTS = 8192
 
@@ -379,7 +380,8 @@ def _between(x, number, kept):
 
 def _discriminants(answers, rows, series, bars, x, nodal):
     """D of the rows from their series at x, in place, within `bars`, or within what is `nodal`."""
-    at_nodes, nodes = np.empty((len(series), 0)), 0
+    at_nodes = np.empty((len(series), 0))
+    nodes = 0
     if nodal is not None:
         bars = nodal.doubts
         at_nodes = _padded(nodal.bars)

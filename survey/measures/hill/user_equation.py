@@ -274,7 +274,8 @@ def unprobed(z, points, edges, slack, size):
 
 
 def measured(z, points, edges, period, slack, probes=PROBES):
-    """Of each piece `size` = max |z| and `rate` (N, P); of each point `scale` = B, NaN if z is not finite, and `rough`.
+    """For each piece `size` = max |z| and `rate` (N, P); for each point `scale` = B, NaN if z is not
+    finite, and `rough`.
 
     With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ.
     `probes` as PROBES.
