@@ -32,7 +32,7 @@ SADDLE, NODE, FOCUS, DEGENERATE = range(4)
 
 
 def equilibria(p, table):
-    """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending.
+    """Fill the rows of `table` (MOST, EQUILIBRIUM_SIZE) with the equilibria in [0, 2 pi), ascending.
 
     Returns their number, and whether the roundings of float64 hide one, or that there is none: g'
     beside it, or g where it comes near 0 without reaching it. Then the rows are those of
