@@ -329,7 +329,7 @@ def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, ope
 
 
 def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points):
-    """Answer the points x of the rows from the series (FACTORS, R, n) of their factors, and `turns`
+    """Answer the points x of the rows from the series (FACTOR_COUNT, R, n) of their factors, and `turns`
     (TURNS, R, nodes).
     """
     padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
