@@ -89,7 +89,8 @@ class Survey:
                 f"ax = {shown(ax)}: give the Axes of a matplotlib figure, or None for a new one"
             )
         if not (var is None or isinstance(var, str)):
-            ds, var = verdicts.combined(ds, var), "combined"
+            ds = verdicts.combined(ds, var)
+            var = "combined"
         colours = {"cmap": cmap, "vmin": vmin, "vmax": vmax, "robust": robust}
         with _settings(style):
             own = ax is None

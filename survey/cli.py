@@ -605,7 +605,7 @@ def scenes(name, as_json):
 @program.command()
 @click.argument("scene", shell_complete=_scene_names)
 @click.option(
-    "--peers", is_flag=True, help="Also measure the best other programs, where installed."
+    "--peers", is_flag=True, help="Also measure the best other programs that are installed."
 )
 @click.option(
     "-o",
@@ -779,7 +779,7 @@ def _end_interrupted(code, path, finished, resume_command):
     )
     state += f"; resume with: {resume_command}"
     if finished:
-        state = f"{path} is complete, its pictures are not; draw them with: survey plot {path}"
+        state = f"{path} is complete, but its pictures are not; draw them with: survey plot {path}"
     complain(f"interrupted; {state}", code)
     sys.stderr.flush()
     os._exit(code)

@@ -45,7 +45,7 @@ def check(module, table, where, elsewhere=lambda name: ""):
     `table` is {name: Value | Function}; `where` is the file in which it stands, or {name: file};
     `elsewhere` says of a name where else it has a meaning.
     """
-    files = where if isinstance(where, str) else " and ".join(dict.fromkeys(where.values()))
+    files = where if isinstance(where, str) else _as_list(list(dict.fromkeys(where.values())))
     for name in public(module.__file__):
         if name not in table:
             near = get_close_matches(name, table, n=1, cutoff=0.6)
@@ -123,6 +123,11 @@ def _check_function(module, name, function, entry, where):
     if entry.arguments is not None and (given[: len(entry.arguments)] != entry.arguments or more):
         words = f"{name}({', '.join(given)}) must be {name}({', '.join(entry.arguments)})"
         refuse(module, words, where)
+
+
+def _as_list(files):
+    """`a`, `a and b`, `a, b and c`."""
+    return " and ".join(part for part in (", ".join(files[:-1]), files[-1]) if part)
 
 
 def _named(kind):

@@ -125,7 +125,7 @@ def test_a_point_is_the_nearest_one_with_its_bars_and_reasons(mathieu):
         ("mathieu", {"a": 0.5, "q": 0.1, "variables": ["verdict"]}, "does not contain"),
         ("satellite", {"k": [0.5, 1.0], "rho": 1.0}, "invalid_parameters"),
         ("libration", {"mu": 0.012}, "M_ray = -148."),
-        ("libration", {"mu": 0.01}, "have one sign"),
+        ("libration", {"mu": 0.01}, "have the same sign"),
         ("libration", {"mu": 0.05}, "mu > mu_R"),
         ("libration_elliptic", {"mu": 0.05, "e": 0.1}, "is not positive (at 0 two pairs meet)"),
         ("libration_elliptic", {"mu": 0.01, "e": 0.1}, "> 0, and so are"),

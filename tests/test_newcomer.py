@@ -52,8 +52,8 @@ SHELL = [
         "init floquet",
         "systems of your own are files, such as 'mine.py', or come from survey.floquet(...) in Python",
     ),
-    ("run satellite", "this is a scene: survey init satellite writes a workflow of it"),
-    ("run own.py", "this is a scene's file: survey init own.py writes a workflow of it"),
+    ("run satellite", "this is a scene: survey init satellite writes a workflow for it"),
+    ("run own.py", "this is a scene's file: survey init own.py writes a workflow for it"),
     ("run twice.toml", "this is not TOML (a key is given twice: "),
     (
         "run good.toml -o map.csv",
@@ -114,7 +114,10 @@ SHELL = [
     ("share map.nc -o folder.html", "is a folder; name a file that ends in .html or .htm, with -o"),
     ("share map.nc --at r=1", "unknown axis 'r'"),
     ("model good.toml -o map.nc", "this file ends in .model; name one, such as 'map.model'"),
-    ("model good.toml --set axes.k=0.5", "1 of the workflow's parameters vary; a model needs two"),
+    (
+        "model good.toml --set axes.k=0.5",
+        "1 of the workflow's parameters vary; a model needs exactly two",
+    ),
     ("model good.toml --proof nothing.nc", "there is no such file"),
     ("bundle map.nc -o map.tar", "a bundle is a .zip file or a folder; name one, such as map.zip"),
     ("bundle map.nc -o b.zip --license MIT", "give the address of the licence"),

@@ -14,7 +14,8 @@ from survey.errors import Damaged
 
 # the largest compression ratio of deflate: a file that declares more holds values that were never
 # written
-RATIO, SPARE = 1032, 2**20
+RATIO = 1032
+SPARE = 2**20
 CHUNK = 2**28  # bytes: tiles of survey are a hundred times smaller
 AXIS = 10**8  # values: more than a workflow allows
 ROUNDED = 1e-9  # of an axis: by how much the end of a cell, or a vertex, may lie beyond it

@@ -83,7 +83,8 @@ def checked(content):
 def fletcher32(content):
     """HDF5's Fletcher-32: sums, modulo 2^16 - 1, of the big-endian words of 16 bits, and of these sums."""
     words = np.frombuffer(content + bytes(len(content) % 2), "<u2").astype(np.uint16, copy=False)
-    count, length = len(words), len(words) // COLUMNS * COLUMNS
+    count = len(words)
+    length = len(words) // COLUMNS * COLUMNS
     table = words[:length].reshape(-1, COLUMNS)
     rest = words[length:]
     # word i occurs count - i times in the sum of sums; i follows from its row and column, so their

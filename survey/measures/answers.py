@@ -1,5 +1,5 @@
-"""The answers of points as their results come in, and the ladder that points climb which miss the
-asked accuracy.
+"""The answers at points as their results come in, and the ladder that a point climbs if it misses
+the requested accuracy.
 
 A rung of a ladder is an amount of work: a number of steps, or for an adaptive method the tolerance
 of one step. A point begins on the rung that its method asks for; where its error bounds miss the
@@ -18,8 +18,8 @@ UNDECIDED = -1
 
 
 class Answers:
-    """Of N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and who has `missed` what
-    was asked.
+    """Answers at N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and which points
+    have `missed` the requested accuracy.
 
     `kept` are the rows of `floats` that hold anything (all of them by default).
     """
@@ -46,7 +46,7 @@ class Ladder:
     """`rungs`, ascending in work; a point of rung i climbs to rung `above[i]` (beyond the last: it
     stays as it is).
 
-    `bounds` are the columns of the results that hold error bounds, None if results tell it by their
+    `bounds` are the columns of the results that hold error bounds, None if results have it as their
     property `bound`; a point climbs at most `most` times.
     """
 

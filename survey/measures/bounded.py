@@ -75,7 +75,7 @@ class Bounded:
 
 
 def of(number):
-    """A Bounded as it is; of a number or an array, which counts as exact."""
+    """The Bounded itself, or that of a number or an array, which counts as exact."""
     return number if isinstance(number, Bounded) else Bounded(np.asarray(number, dtype=float))
 
 

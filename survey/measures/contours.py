@@ -84,9 +84,9 @@ def _closed_in(function, x, grain, number, halvings):
     low = np.floor(step)[rows, along] / (number - 1)
     high = np.minimum(low + 1.0 / (number - 1), 1.0)
 
-    def at(who, t):
-        here = np.repeat(x[who][:, None], t.shape[1], axis=1)
-        here[np.arange(len(t)), :, along[who]] = t
+    def at(which, t):
+        here = np.repeat(x[which][:, None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, along[which]] = t
         value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 

@@ -75,7 +75,7 @@ def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
     parts = []
     left_out = 0
     for kind in map(int, planes[0]):
-        values = _told(
+        values = _with_open_signs(
             np.stack([plane[str(kind)] for plane in planes]).reshape(LINES, LINES, LINES)
         )
         cut, corners = marched(values)
@@ -101,9 +101,9 @@ def _signed(values, bars):
     return np.where(np.isnan(values), np.nan, np.where(abs(values) > bars, values, 0.0))
 
 
-def _told(values):
-    """The values with a sign, or NaN, where it is not certain (0): that of all certain neighbours,
-    or else positive.
+def _with_open_signs(values):
+    """The values, where their sign is not certain (0) with that of all certain neighbours, or else
+    a positive one; NaN where no neighbour's is certain.
 
     So a function that touches 0 without a change of its sign has no surface there, nor on the box's
     border.
@@ -191,9 +191,9 @@ def _sharpened(functions, kind, values, cut, grain):
     start = low + step * _crossing(values, nodes, axis)
     error = np.full(len(cut), np.inf)
 
-    def at(left, who, t):
-        here = np.repeat(x[left[who], None], t.shape[1], axis=1)
-        here[np.arange(len(t)), :, axis[left[who]]] = t
+    def at(left, which, t):
+        here = np.repeat(x[left[which], None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, axis[left[which]]] = t
         value, bar = functions.sharp(here.reshape(-1, 3), kind)
         return value.reshape(t.shape), bar.reshape(t.shape)
 
@@ -211,7 +211,7 @@ def _sharpened(functions, kind, values, cut, grain):
                 a, b = np.where(same, t, a), np.where(same, b, t)
             t, width = 0.5 * (a + b), b - a
         t, width, sure = close_in(
-            lambda who, t, left=left: at(left, who, t),
+            lambda which, t, left=left: at(left, which, t),
             t,
             width,
             np.full(left.size, grain),

@@ -36,7 +36,8 @@ def fundamental(matrices, lengths, periods, scale=1.0, terms=None):
     `matrices` (steps, 9, n, n) holds A at the NODES of each step of one period, `lengths` (steps) how long they are.
     `scale` (n) holds the sizes of Y's components, `terms` (steps, n, n) what the rounding of A is relative to (or |A|).
     """
-    h, n = lengths[:, None, None], matrices.shape[-1]
+    h = lengths[:, None, None]
+    n = matrices.shape[-1]
     if len(lengths) * periods * n * n > MOST:
         most = max(1, int(MOST / (len(lengths) * n * n))) * float(lengths.sum())
         raise BadInput(
@@ -74,7 +75,8 @@ def _chain(steps, local, units, periods):
     """Products of the steps from the first on, period after period, and their error bounds, from
     the `local` ones.
     """
-    number, n = len(steps) * periods, steps.shape[-1]
+    number = len(steps) * periods
+    n = steps.shape[-1]
     y, squares = np.empty((2, number + 1, n, n))
     y[0], squares[0], ellipses = np.eye(n), 0.0, np.zeros((n, n, n))  # an ellipse for each column
     diagonal = np.arange(n)

@@ -145,9 +145,9 @@ def _steps(function, going, ends, grain):
     slope = np.array([end.side for end in going]) * np.sign(left[rows, axis])
     length = np.hypot(*(goals - [end.x[-1] for end in going]).T)
 
-    def at(who, t):
-        here = np.repeat(goals[who][:, None], t.shape[1], axis=1)
-        here[np.arange(len(t)), :, axis[who]] = t
+    def at(which, t):
+        here = np.repeat(goals[which][:, None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, axis[which]] = t
         value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 
@@ -159,7 +159,11 @@ def _steps(function, going, ends, grain):
     some = np.flatnonzero(found)
     if some.size:
         t[some], error[some], certain = close_in(
-            lambda who, x: at(some[who], x), t[some], wide[some], np.full(some.size, grain), LONGEST
+            lambda which, x: at(some[which], x),
+            t[some],
+            wide[some],
+            np.full(some.size, grain),
+            LONGEST,
         )
         beyond, bars = at(some, (t[some] + error[some])[:, None])
         right = (beyond[:, 0] * slope[some] > 0.0) & (abs(beyond[:, 0]) > bars[:, 0])

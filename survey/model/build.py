@@ -28,7 +28,7 @@ from survey.model.reader import FORMAT, SERIES, TABLE
 NODES = 24  # of a panel, along each side
 SMALLEST = 2.0**-10  # of a side of the map: smaller panels are left out, as around a singularity
 BUDGET = 2_000_000  # points that are solved
-MOST = 0.9  # the share of the nodes answered to the asked accuracy from which on a panel serves
+MOST = 0.9  # the share of the nodes answered to the requested accuracy from which on a panel serves
 DROPPED = 0.1  # of a panel's bound: what the terms that are left out may add to it
 UNEVEN = 4.0  # a panel whose bounds at the nodes differ by more may gain from being halved
 EVEN_OUT = 7  # halvings that are spent on that
@@ -89,7 +89,8 @@ def _axes(workflow):
     axes = [used[name] for name, own in values.items() if own.size > 1]
     if len(axes) != 2:
         raise BadInput(
-            f"model: {len(axes)} of the workflow's parameters vary; a model needs two, the others single numbers"
+            f"model: {len(axes)} of the workflow's parameters vary; a model needs exactly two: "
+            "make the others single numbers"
         )
     return axes, {name: float(own.reshape(-1)[0]) for name, own in values.items() if own.size == 1}
 

@@ -128,7 +128,8 @@ def _floquet(workflow, names, fixed):
     from survey.measures.floquet import dense
 
     scene = workflow.scene
-    n, paired = len(scene.states), scene.structure != "none"
+    n = len(scene.states)
+    paired = scene.structure != "none"
     number = n // 2 if paired else n
     if n > dense.LARGEST or (paired and (n % 2 or number > 2)):
         raise BadInput(

@@ -132,7 +132,7 @@ class Model:
         """The outputs of points x, y (arrays of one shape), in a dict of arrays of that shape.
 
         From 100,000 points on, D comes from series on smaller cells, ten times as fast; points that
-        these leave undecided from the factors. A place without an answer (around a singularity) has
+        these leave undecided from the factors. A point without an answer (around a singularity) has
         NaN and the verdict -1.
         """
         x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
@@ -211,7 +211,8 @@ class Model:
                 if not part.size:
                     continue
                 (across, slant), (table, slope) = panel.tables(x[part], 0), panel.tables(y[part], 1)
-                rows, slants = panel.transposed @ across, None
+                rows = panel.transposed @ across
+                slants = None
                 if len(out) > 2 * len(wanted) + 1:
                     slants = (
                         ((panel.transposed @ slant) * table).sum(axis=1),
@@ -442,7 +443,8 @@ class _Cells:
                     for name in ("discriminant", "discriminant_error")
                 )
                 series = matrix @ d @ matrix.T
-                size, tail = abs(series), 0.0
+                size = abs(series)
+                tail = 0.0
                 for axis in (1, 2):
                     ends = size.sum(axis=3 - axis)
                     tail = tail + 2.0 * ends[:, -2:].sum(axis=1)

@@ -207,7 +207,8 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 began, references = time.process_time(), case.references(work)
                 # it treats a dense row as a whole: its error is the one within such a row
                 if method == "auto":
-                    errors, references = {}, [_within(reference, point) for reference in references]
+                    errors = {}
+                    references = [_within(reference, point) for reference in references]
                 if id(references) not in errors:
                     errors[id(references)] = _against(solve, references, case.ERROR, setting)
                 error, wrong = errors[id(references)]
@@ -225,7 +226,7 @@ def measure(scene, case, peers=False, say=lambda line: None):
                 if time.process_time() - began > LONG:
                     slow.add(work)
                     say(
-                        f"{scene}: {method or peer} takes long for {work}: no setting finer than {setting:g}"
+                        f"{scene}: {method or peer} is slow for {work}: nothing finer than {setting:g} is measured"
                     )
         say(f"{scene}: {method or peer} measured")
     return records

@@ -14,7 +14,7 @@ from survey.sweep.fingerprint import fingerprint
 from survey.sweep.reuse import Earlier
 from survey.wording import short, shown
 
-FURTHER = ("boundaries", "refine")  # found anew
+FURTHER = ("boundaries", "refine")  # found again, never taken from a file
 
 
 def find(workflow, path, fresh=False):

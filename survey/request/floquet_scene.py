@@ -81,7 +81,8 @@ class FloquetScene(TracedScene):
 
     def cost(self, options, sizes):
         """Seconds per point, roughly: measured on the examples in `workflows`."""
-        n, alone = len(self.states), self._alone
+        n = len(self.states)
+        alone = self._alone
         longest = sorted(sizes.values())[-2:]
         if np.prod(longest) < 4 * NODES or n > dense.LARGEST:
             return alone

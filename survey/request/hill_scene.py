@@ -427,7 +427,7 @@ class HillScene(FunctionScene):
             self._called(user_equation.measured, self.z, points, edges, None, slack, probes)
             for probes in (user_equation.PROBES, user_equation.CHECKED)
         )
-        for i in np.flatnonzero((one[1] != fine[1]).any(axis=1) | (one[3] != fine[3])):
+        for i in np.flatnonzero((one.rate != fine.rate).any(axis=1) | (one.rough != fine.rough)):
             u = np.linspace(0, edges[i, -1], user_equation.CHECKED)
             position = u[
                 3

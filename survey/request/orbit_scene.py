@@ -271,7 +271,8 @@ class OrbitScene(TracedScene):
         """Refuse what the recorded operations show: other values than the code's, no period,
         another Jacobian.
         """
-        n, here = len(self.states), self._where(point)
+        n = len(self.states)
+        here = self._where(point)
         t = T * TRIED
         numbers = tuple(np.repeat(one, t.size, axis=0) for one in programs.numbers(point[None]))
         states = np.repeat(x[None, :, None], t.size, axis=0)
@@ -299,7 +300,8 @@ class OrbitScene(TracedScene):
                 )
         if self.jacobian is not None:
             sizes = f"STATES names {n} for x, out is {n} x {n}, PARAMETERS {len(self.own)} for p"
-            call, what = "jacobian(t, x, p, out)", f"{n} x {n}"
+            call = "jacobian(t, x, p, out)"
+            what = f"{n} x {n}"
             asked = [
                 (self.jacobian, call, (float(time), x.copy(), point), (n, n), sizes, what)
                 for time in t

@@ -96,7 +96,7 @@ def _of(value, name, function):
 
 
 def _ratio(m1, m2):
-    """mu of two masses, in any unit: that of the lesser over both."""
+    """mu of two masses, in any unit: that of the smaller over their sum."""
     if not bool((m1 > 0).all() and (m2 > 0).all()):
         raise BadInput("m1 and m2: masses must be positive")
     return np.minimum(m1, m2) / (m1 + m2)

@@ -67,7 +67,7 @@ def read(path, overrides=(), output=None, proves=False):
     try:
         if path.suffix == ".py" and os.path.isfile(path):
             raise ValueError(
-                f"this is a scene's file: survey init {short(path, 120)} writes a workflow of it"
+                f"this is a scene's file: survey init {short(path, 120)} writes a workflow for it"
             )
         text = path.read_text(encoding="utf-8")
     except (OSError, ValueError) as error:
@@ -120,7 +120,7 @@ def _why(path, error):
         and not path.suffix
         and path.name in modules.names(scenes)
     ):
-        return f"this is a scene: survey init {path.name} writes a workflow of it"
+        return f"this is a scene: survey init {path.name} writes a workflow for it"
     return reason_of(error)
 
 

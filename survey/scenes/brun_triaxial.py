@@ -165,7 +165,8 @@ def _written(found, codes, status):
     """The outputs, from Bounded and codes: NaN, or what codes have for it, where the status is not ok."""
     lost = (status == OK) & ~np.isfinite(found["H"].value + found["H"].bar)
     status = np.where(lost, OVERFLOW, status)
-    out, good = {"status": status}, status == OK
+    out = {"status": status}
+    good = status == OK
     for name, number in found.items():
         fine = good & np.isfinite(number.bar) & np.isfinite(number.value)
         out[name], out[f"{name}_error"] = (

@@ -280,7 +280,9 @@ def solve(point, request):
     if "separatrix" in request.options:
         return _separatrix(point, request, question)
     measure, start = auto if request.method == "auto" else solution, (*_SYSTEM, "phi0", "w0")
-    measure = separatrix.Aware(measure) if request.method in ("auto", "closed") else measure
+    measure = (
+        separatrix.SeparatrixAware(measure) if request.method in ("auto", "closed") else measure
+    )
     if question == "trajectory":
         return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request.rtol)
     before = request.options.get("branch") == "before"

@@ -175,10 +175,10 @@ OUTPUTS = (
     Output("growth", "rate of growth of deviations from the set, the largest", r"\sigma",
            when=_FATE, applies="at equilibria, cycles and periodic motions"),
     *(Output(f"transversal_{end}", f"{words} part of the exponents beside an equilibrium or a steady rotation",
-             when=_FATE, dims=("transversal",), applies="by falling real part; two in case B, three in A, four about "
-             "the vertical") for end, words in (("re", "real"), ("im", "imaginary"))),
+             when=_FATE, dims=("transversal",), applies="by decreasing real part; two in case B, three in A, four "
+             "about the vertical") for end, words in (("re", "real"), ("im", "imaginary"))),
     *(Output(f"transversal_multiplier_{end}", f"{words} part of the multipliers beside a cycle or a periodic motion",
-             when=_FATE, dims=("transversal",), applies="by falling modulus; two in case B, three in A")
+             when=_FATE, dims=("transversal",), applies="by decreasing modulus; two in case B, three in A")
       for end, words in (("re", "real"), ("im", "imaginary"))),
     Output("verdict", "is the limit stable on the set, and observable?", flags=_OF_LIMIT, when=_FATE),
     Output("rests", "number of positions of rest of the whole body (w = 0), at any k", integer=True, when=_PORTRAIT,
@@ -201,7 +201,7 @@ OUTPUTS = (
     *(_as_reduced(name, applies=f"{_HELD}; {_CYCLES[name].applies}") for name in (
         "cycle_kind", "cycle_w", "cycle_multiplier", "cycle_period")),
     *(Output(f"cycle_transversal_{end}", f"{words} part of the multipliers of a cycle beside the set", when=_PORTRAIT,
-             dims=("cycle", "transversal"), applies="for as many entries as there are cycles, two each, by falling "
+             dims=("cycle", "transversal"), applies="for as many entries as there are cycles, two each, by decreasing "
              "modulus; not where a cycle is too uncertain to be followed")
       for end, words in (("re", "real"), ("im", "imaginary"))),
     Output("cycle_verdict", "is the cycle stable on the set, and observable?", flags=_OF_LIMIT, when=_PORTRAIT,

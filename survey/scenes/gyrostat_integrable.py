@@ -183,7 +183,8 @@ def trajectory(point, answer, options, time=None):
 def _inclined(given, _options):
     """Heads, rows of the reduced flow and what these may be off: g = 0, b = (P, Q) / A11."""
     A11, theta0 = given["A11"], given["theta0"]
-    n, size = given.get("n"), 0.0
+    n = given.get("n")
+    size = 0.0
     if n is None:
         n = given["k"] / np.cos(theta0) - given["lambda1"]
         size = 4.0 * np.abs(n + given["lambda1"]) + np.abs(given["lambda1"])

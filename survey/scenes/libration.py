@@ -73,8 +73,8 @@ REFERENCES = (
 )
 _HIGHER = {"order": ("8", "10")}
 PARAMETERS = (
-    Parameter("mu", "mass of the smaller primary over that of both", r"\mu", minimum=1e-100, maximum=0.5),
-    Parameter("periods", "time for which motions are to stay, in periods of the primaries", r"T/2\pi", default=1e9,
+    Parameter("mu", "mass of the smaller primary over the sum of both", r"\mu", minimum=1e-100, maximum=0.5),
+    Parameter("periods", "time for which motions must stay, in periods of the primaries", r"T/2\pi", default=1e9,
               minimum=1.0, maximum=1e100, when=_HIGHER),
 )  # fmt: skip
 DIMENSIONS = {"monomial": np.array(LABELS), "ray": np.array([1, 2]), "component": np.array(["k1", "k2", "k3"]),
@@ -185,7 +185,7 @@ def why(answer):
             + (f"{named(answer, 'M_ray')} is not 0")
         )
     if verdict == "formally_stable_by_order_4":
-        return f"{named(answer, 'D4')} and {named(answer, 'a02')} have one sign: N is definite where L = 0, r >= 0"
+        return f"{named(answer, 'D4')} and {named(answer, 'a02')} have the same sign: N is definite where L = 0, r >= 0"
     return "an error bar reaches across 0: " + ", ".join(
         named(answer, name) for name in ("D4", "a02")
     )

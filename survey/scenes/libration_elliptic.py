@@ -10,7 +10,7 @@ potential; out of the plane zeta'' + zeta = 0, which is stable.
 Model: the elliptic restricted problem, six-dimensional, linearised about the point, which is at
 rest in these axes; half a period suffices, by symmetry. Not for displacements that are not small.
 
-Parameters, in order: mu (mass ratio of the lesser primary, 0 to 1/2) and e (eccentricity, 0 <= e <
+Parameters, in order: mu (mass ratio of the smaller primary, 0 to 1/2) and e (eccentricity, 0 <= e <
 1), without units.
 
 Outputs: a and b, the coefficients of the monodromy's characteristic polynomial l^4 - a l^3 + b l^2
@@ -57,7 +57,7 @@ REFERENCES = (
     "A. P. Markeev, Libration points in celestial mechanics and cosmodynamics (1978)",
 )
 PARAMETERS = (
-    Parameter("mu", "mass ratio of the lesser primary", r"\mu", minimum=0.0, maximum=0.5),
+    Parameter("mu", "mass ratio of the smaller primary", r"\mu", minimum=0.0, maximum=0.5),
     Parameter(
         "e",
         "eccentricity of the primaries' orbits",

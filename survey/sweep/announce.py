@@ -16,7 +16,7 @@ USUAL = 10
 
 
 def is_watched():
-    """Does someone look at stderr: a terminal, or a notebook?"""
+    """Is someone watching stderr, on a terminal or in a notebook?"""
     return "ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty())
 
 
@@ -28,7 +28,7 @@ def console():
 
 
 def always_compiled(scene):
-    """Is it compiled in each process again: the code of a user's own Hill equation?"""
+    """Is it compiled again in each process, as the code of a user's own Hill equation is?"""
     return hasattr(scene, "HASH") and scene.FAMILY == "hill"
 
 

@@ -44,7 +44,7 @@ def compiling_ahead(scene, request):
 
 
 def _work(ahead, options):
-    """A name of what is compiled: other scenes, other questions and other kinds of options need
+    """A name for what is compiled: other scenes, other questions and other kinds of options need
     other kernels.
     """
     return "-".join(

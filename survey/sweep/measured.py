@@ -1,7 +1,7 @@
-"""What runs on this machine have taken: by it `survey plan` corrects its estimates.
+"""How long runs on this machine have taken, by which `survey plan` corrects its estimates.
 
 It is a list of records, the latest last, in the user's cache. A file that cannot be read or written
-is as good as none.
+counts as none.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def note(workflow, estimated, measured, compiling, unanswered=0.0):
 
 
 def factor(workflow, part, estimated):
-    """By what the estimated seconds of a part are multiplied on this machine; 1 if nothing is
+    """The factor for the estimated seconds of a part on this machine; 1 if nothing is
     known.
 
     The runs most like this one decide: of the same question on the same axes, else of the question,
@@ -97,7 +97,7 @@ def compiling(workflow):
 
 
 def _about(workflow):
-    """What tells runs apart whose times differ for other reasons than the number of points."""
+    """What distinguishes runs whose times differ for reasons other than the number of points."""
     request = workflow.request
     return {
         "scene": getattr(workflow.scene, "HASH", workflow.name),

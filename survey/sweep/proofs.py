@@ -174,7 +174,7 @@ class Prover:
 
     @property
     def numbers(self):
-        """Of the parts."""
+        """The numbers of the parts."""
         return range(math.prod(self.across))
 
     def __call__(self, number):

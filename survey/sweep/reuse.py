@@ -52,7 +52,7 @@ class Earlier:
 
 @lru_cache(1)
 def _dataset(path, version):
-    """Once in each process."""
+    """The file as a dataset, opened once in each process."""
     return reading.load(path)
 
 
@@ -124,7 +124,7 @@ def obstacle(scene, request, grid, earlier, old, points=3):
             if not np.array_equal(
                 values, earlier.values(name, cuts), equal_nan=values.dtype.kind == "f"
             ):
-                return f"{name} has other bits on this map"
+                return f"{name} would have different bits on this map"
     other = sorted(
         name for now, then in seen for name in now.names if dict.get(now, name) != then.get(name)
     )

@@ -14,7 +14,7 @@ from survey.measures.hill import multiprecision
 from survey.request import ranges
 from survey.request.hill_scene import HillScene
 from survey.truth import remembered
-from survey.truth.hill import FACTORS, hill_outputs
+from survey.truth.hill import FACTOR_COLUMNS, hill_outputs
 from survey.truth.hill_flow import COLUMNS, DOUBT, END, STEPS
 
 ORDER = 10
@@ -79,7 +79,7 @@ def _factors(scene, z, p):
         flow, error, more, size = _piece(lambda u: z(u, exact), mp, flow, mp.mpf(low), mp.mpf(high))
         doubt, steps, largest = doubt + error, steps + more, max(largest, size)
     row = np.zeros(COLUMNS)
-    for column, value in zip(FACTORS.values(), flow, strict=True):
+    for column, value in zip(FACTOR_COLUMNS.values(), flow, strict=True):
         row[column] = float(value)
         row[column + 1] = float(value - float(value))
     row[END] = end

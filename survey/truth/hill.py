@@ -26,7 +26,7 @@ from survey.truth.hill_flow import (
     K,
 )
 
-FACTORS = {"y1": Y1, "y2": Y2, "dy1": DY1, "dy2": DY2}  # their columns
+FACTOR_COLUMNS = {"y1": Y1, "y2": Y2, "dy1": DY1, "dy2": DY2}  # their columns
 
 LONG = np.longdouble
 ULP = float(np.finfo(LONG).eps)
@@ -85,7 +85,7 @@ def satellite(way, inertia, direction, oblate, most=3e3):
         with np.errstate(invalid="ignore"):
             # its Runge-Kutta steps add up to an error of about 1e-4, which D feels times the
             # squares of the factors
-            largest = np.abs(out[:, list(FACTORS.values())]).max(axis=1)
+            largest = np.abs(out[:, list(FACTOR_COLUMNS.values())]).max(axis=1)
             known = ok & (largest**2 < LOUD)
             off = np.abs(
                 np.abs(answer["rotation_number"]) - rough_rotation(k, short, rho, body, known)
@@ -129,8 +129,10 @@ def _long(out, column):
 def hill_outputs(out, answer, half):
     """What follows from the factors of `half` a period or of the whole, and which verdicts are wrong."""
     doubt = out[:, DOUBT]
-    y1, y2, d1, d2 = (_long(out, column) for column in FACTORS.values())
-    found = {name: (out[:, column], out[:, column + 1], doubt) for name, column in FACTORS.items()}
+    y1, y2, d1, d2 = (_long(out, column) for column in FACTOR_COLUMNS.values())
+    found = {
+        name: (out[:, column], out[:, column + 1], doubt) for name, column in FACTOR_COLUMNS.items()
+    }
     with np.errstate(all="ignore"):
         if half:
             minus, plus = d1 * y2, y1 * d2  # (D - 2) / 4 and (D + 2) / 4

@@ -8,7 +8,7 @@ import numpy as np
 from mpmath import mp, mpf
 
 from survey.truth import hill_flow, remembered
-from survey.truth.hill import FACTORS, TOLERANCE, hill_outputs
+from survey.truth.hill import FACTOR_COLUMNS, TOLERANCE, hill_outputs
 from survey.truth.hill_flow import BENT, COLUMNS, DOUBT, END, HARMONICS, LORENTZ, STEPS, TWO_PI
 
 
@@ -88,10 +88,10 @@ def _steps(row, even):
             flow = step * flow
         out = np.zeros(COLUMNS)
         factors = flow[0, 0], flow[0, 1], flow[1, 0], flow[1, 1]
-        for column, value in zip(FACTORS.values(), factors, strict=True):
+        for column, value in zip(FACTOR_COLUMNS.values(), factors, strict=True):
             out[column] = float(value)
             out[column + 1] = float(value - float(value))
-    out[DOUBT] = 1e-31 * max(1.0, *abs(out[list(FACTORS.values())]).tolist())
+    out[DOUBT] = 1e-31 * max(1.0, *abs(out[list(FACTOR_COLUMNS.values())]).tolist())
     out[END], out[STEPS] = end, 2.0
     return out
 

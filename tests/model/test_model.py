@@ -467,7 +467,7 @@ def test_the_same_map_has_the_same_bytes(folder):
             {"k": 0.5, "yaw_ratio": 0.1},
             "no series are available",
         ),
-        ("mathieu", {"a": (0.0, 5.0)}, {"q": 1.0}, "a model needs two"),
+        ("mathieu", {"a": (0.0, 5.0)}, {"q": 1.0}, "a model needs exactly two"),
     ],
 )
 def test_what_has_no_series_is_refused_in_a_line(scene, axes, numbers, line):

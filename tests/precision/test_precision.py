@@ -77,7 +77,9 @@ def test_a_method_that_takes_long_at_one_setting_gets_no_finer_ones(quick, monke
     monkeypatch.setattr(precision, "LONG", 0.0)
     records = precision.measure("satellite", quick, say=said.append)
     assert {record.setting for record in records} == {1e-4}
-    assert any("rk4 takes long for row: no setting finer than 0.0001" in line for line in said)
+    assert any(
+        "rk4 is slow for row: nothing finer than 0.0001 is measured" in line for line in said
+    )
 
 
 @pytest.mark.slow

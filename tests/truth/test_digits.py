@@ -6,7 +6,7 @@ from mpmath import mp, mpf
 
 import survey
 from survey.truth import digits, user_equations
-from survey.truth.hill import FACTORS
+from survey.truth.hill import FACTOR_COLUMNS
 from survey.truth.hill_flow import DOUBT
 
 POINTS = {
@@ -37,7 +37,7 @@ def test_it_agrees_with_the_other_truths(name):
         found = digits.own(scene)(dict(zip(parameters, p[:, None], strict=True)), answer)
     (row,) = seen
     with mp.workdps(40):
-        for i in FACTORS.values():
+        for i in FACTOR_COLUMNS.values():
             off = abs(mpf(row[i]) + mpf(row[i + 1]) - mpf(known[i]) - mpf(known[i + 1]))
             assert off <= row[DOUBT] + known[DOUBT] and row[DOUBT] < 1e-18 * (1 + abs(known[i])), (
                 i,

@@ -125,7 +125,7 @@ def test_truth_of_satellites(k, rho, oblate):
         half = 2 * mp.ellipk(a * a) if k < 1 else mp.ellipk(1 / (a * a)) / a
         y = mp.odefun(slope, 0, [0, 1, a, 1, 0, 0, 1], tol=mpf(10) ** -30)(half)
         out = hill.solved(hill.K, k, hill.RHO, rho, 1.0, oblate)[0]
-        columns = (*hill.FACTORS.values(), hill.END)
+        columns = (*hill.FACTOR_COLUMNS.values(), hill.END)
         for column, true in zip(columns, (y[3], y[5], y[4], y[6], half), strict=True):
             assert abs(in_full(out, column) - true) < 1e-28 * (1 + abs(true))
 
@@ -295,7 +295,7 @@ def test_truth_of_own_equations(name):
                               tol=mpf(10) ** -13)(mpf(stop))  # fmt: skip
         out = user_equations.solved(name, p[None])[0]
         for name, true in zip(("y1", "dy1", "y2", "dy2"), x, strict=True):
-            assert abs(in_full(out, hill.FACTORS[name]) - true) < 1e-11 * (1 + abs(true))
+            assert abs(in_full(out, hill.FACTOR_COLUMNS[name]) - true) < 1e-11 * (1 + abs(true))
 
 
 def test_the_command(tmp_path, capsys):

@@ -19,7 +19,7 @@ import survey
 from attack.compare import Batch
 from attack.hill import accuracy
 from survey.truth import hill_flow
-from survey.truth.hill import FACTORS, TOLERANCE
+from survey.truth.hill import FACTOR_COLUMNS, TOLERANCE
 from survey.truth.hill_flow import COLUMNS, HARMONICS, TWO_PI
 
 DIGITS = 45
@@ -245,7 +245,9 @@ def _solutions(a, q, s, period):
     ends = np.full(len(a), np.inf)
     hill_flow.own_points(HARMONICS, p, ends, np.column_stack([p[:, 9], 0 * a]), TOLERANCE, out)
     with mp.workdps(DIGITS):  # the two halves of a double-double
-        flows = [tuple(mpf(row[c]) + mpf(row[c + 1]) for c in FACTORS.values()) for row in out]
+        flows = [
+            tuple(mpf(row[c]) + mpf(row[c + 1]) for c in FACTOR_COLUMNS.values()) for row in out
+        ]
     return flows, out[:, hill_flow.DOUBT]
 
 

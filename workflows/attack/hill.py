@@ -10,7 +10,7 @@ import numpy as np
 import survey
 from attack.compare import Batch
 from survey.truth import user_equations
-from survey.truth.hill import FACTORS, WAYS, mathieu_solved, satellite, solved
+from survey.truth.hill import FACTOR_COLUMNS, WAYS, mathieu_solved, satellite, solved
 from survey.truth.hill import mathieu as true_mathieu
 from survey.truth.hill_flow import DY2, INERTIA, RHO, Y1
 from survey.truth.user_equations import OWN
@@ -95,7 +95,7 @@ def _edge(random, f, low, high, points=14):
 
 
 def _factors(out):
-    return out[:, list(FACTORS.values())]
+    return out[:, list(FACTOR_COLUMNS.values())]
 
 
 def _draw_modulus(random, size):

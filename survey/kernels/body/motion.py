@@ -108,7 +108,7 @@ def state_of(row):
 
 @inline
 def store(row, y):
-    """Write a tuple of six into the first places of a row."""
+    """Write a tuple of six into the first columns of a row."""
     row[0], row[1], row[2], row[3], row[4], row[5] = y
 
 

@@ -40,7 +40,7 @@ _POINT, _SAMPLE = 6, 2
 CURVE_FIRST, CURVE_NEXT = range(2)
 # A link of two gaps: the gap, the one before it in time, the turns by which limits of starts there
 # lie further, the turning points more.
-LATE, EARLY, TURNS, TURNINGS = range(4)
+LATER, EARLIER, TURNS, TURNINGS = range(4)
 LINK = 4
 # Do turns, do turning points depend on how one goes to the root of a region?
 BY_TURNS, BY_TURNINGS = range(2)
@@ -392,7 +392,7 @@ def _join(parent, turns, counts, loops, a, b, turn, count):
 
 @inline
 def _link(link, later, earlier, turns, turnings):
-    link[LATE], link[EARLY], link[TURNS], link[TURNINGS] = later, earlier, turns, turnings
+    link[LATER], link[EARLIER], link[TURNS], link[TURNINGS] = later, earlier, turns, turnings
 
 
 @kernel
@@ -480,7 +480,7 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
     after = np.empty(size, dtype=np.int64)
     queue = np.empty(gaps, dtype=np.int64)
     for k in range(size):
-        later = links[k, LATE]
+        later = links[k, LATER]
         after[k], head[later] = head[later], k
     top = 0
     for k in range(cuts):
@@ -490,14 +490,14 @@ def regions(links, size, seeds, cuts, gaps, parent, turns, counts, loops, open_)
         top -= 1
         k = head[queue[top]]
         while k >= 0:
-            gap = links[k, EARLY]
+            gap = links[k, EARLIER]
             if not open_[gap]:
                 open_[gap], queue[top], top = True, gap, top + 1
             k = after[k]
     for i in range(gaps):
         parent[i] = i
     for k in range(size):
-        later, earlier = links[k, LATE], links[k, EARLY]
+        later, earlier = links[k, LATER], links[k, EARLIER]
         if open_[later] or open_[earlier]:
             continue
         _join(parent, turns, counts, loops, earlier, later, links[k, TURNS], links[k, TURNINGS])

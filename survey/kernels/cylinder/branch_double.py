@@ -28,7 +28,7 @@ from survey.kernels.cylinder.flow import (
     D,
     values,
 )
-from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, SLIP, ahead
+from survey.kernels.cylinder.separatrix import ANGLE, ANGLE_LOW, SLIP, past_saddle
 from survey.kernels.cylinder.steps import EQUILIBRIUM, OK
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.angles_double import centred, sine_cosine
@@ -144,7 +144,7 @@ def enter(p, saddle, phi0, a, branch, out):
 
     At other statuses than OK the branch turns (TURNING) or is lost before it passes phi0.
     """
-    x0 = ahead(saddle, phi0)
+    x0 = past_saddle(saddle, phi0)
     reach = expand(p, saddle, a)
     f0, _g, _dg = values(p, saddle[ANGLE])
     slip, first = saddle[SLIP] + PAIR_SUM_ROUNDOFF, a[_HI, 1]
@@ -226,7 +226,7 @@ def _steepness(a, x):
 @kernel
 def abel(p, saddle, a, branch, phi0, targets, floats, status):
     """As `steps.abel` at the ascending targets, on either side of phi0."""
-    j, x0 = 0, ahead(saddle, phi0)
+    j, x0 = 0, past_saddle(saddle, phi0)
     while j < len(targets):
         x = add(sub((targets[j], 0.0), (phi0, 0.0)), x0)
         if x[0] > branch[_REACH]:

@@ -32,7 +32,7 @@ SADDLE, NODE, FOCUS, DEGENERATE = range(4)
 
 
 def equilibria(p, table):
-    """Fill the rows of `table` (MOST, 10) with the equilibria in [0, 2 pi), ascending.
+    """Fill the rows of `table` (MOST, EQUILIBRIUM_SIZE) with the equilibria in [0, 2 pi), ascending.
 
     Returns their number, and whether the roundings of float64 hide one, or that there is none: g'
     beside it, or g where it comes near 0 without reaching it. Then the rows are those of
@@ -130,7 +130,7 @@ def clustered(p, table):
 
 @inline
 def insert(sorted_, size, x):
-    """Put x where it belongs among the first `size`, ascending; returns its place."""
+    """Put x where it belongs among the first `size`, ascending; returns its index."""
     k = size
     while k > 0 and sorted_[k - 1] > x:
         sorted_[k] = sorted_[k - 1]

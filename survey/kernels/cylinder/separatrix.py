@@ -94,7 +94,7 @@ def saddle(p, index, out):
 
 
 @inline
-def ahead(at_saddle, phi0):
+def past_saddle(at_saddle, phi0):
     """phi0 less the angle of the saddle next to its left, in [0, 2 pi)."""
     x = sub(centred((phi0, 0.0))[0], (at_saddle[ANGLE], at_saddle[ANGLE_LOW]))
     if x[0] < 0.0:
@@ -122,7 +122,7 @@ def enter(p, at_saddle, exact, phi0, data):
     `exact`: the parameters give two saddles of the same energy, or the degenerate one that the
     saddle is taken for.
     """
-    x0 = ahead(at_saddle, phi0)
+    x0 = past_saddle(at_saddle, phi0)
     slip = PAIR_SUM_ROUNDOFF + (at_saddle[SLIP] if at_saddle[MULTIPLICITY] == ONE else 0.0)
     s, c = sine_cosine((at_saddle[ANGLE], at_saddle[ANGLE_LOW]))
     a, b = add(times(c, p[S2]), times(s, -p[S3])), neg(add(times(s, p[S2]), times(c, p[S3])))

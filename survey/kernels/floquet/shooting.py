@@ -17,11 +17,11 @@ MOST_LOST = 1e-2  # of an entry that is about 1, by rounding
 def responses(F, delta, first, back, ends, at_end, states, last, time_bar):
     """Fill bounds of the solutions of x_k+1 = F_k x_k + d_k, |d_k| <= delta_k, with conditions at both ends.
 
-    Point i has the steps k from first[i] to first[i + 1]. At their end the states `ends` (m) of x, plus what `time_bar`
-    unknown times a column adds, are e, |e| <= at_end (N, m); at the beginning x is a combination of unknown columns. As
-    `back` (N, n + 1, m) times what the ends lack is x at the beginning and, in the last row, the late unknown, |x| is
-    `states` (steps, n) at most at the steps' beginnings, `last` (N, n) at the end, and the unknown time
-    `time_bar` (N). Infinite where rounding counts.
+    Point i has the steps k from first[i] to first[i + 1]. At their end the states `ends` (m) of x, plus an unknown
+    shift of time times a column, are e, |e| <= at_end (N, m); at the beginning x is a combination of unknown columns.
+    `back` (N, n + 1, m) times what the ends lack gives x at the beginning and, in its last row, the shift. |x| is
+    `states` (steps, n) at most at the steps' beginnings and `last` (N, n) at the end, and the shift `time_bar` (N).
+    Infinite where rounding counts.
     """
     n, m = F.shape[1], len(ends)
     A, B, suffix = np.empty((n, n)), np.empty((n, n)), np.empty((n, n))

@@ -439,7 +439,7 @@ def add_times(weight, A, out):
 
 @kernel
 def copy(A, out):
-    """Fill the matrix out; out[:] = A compiles the words of an error for 2 s."""
+    """Fill the matrix out; out[:] = A would take 2 s to compile, for the words of an error."""
     for j in range(len(out)):
         for c in range(out.shape[1]):
             out[j, c] = A[j, c]

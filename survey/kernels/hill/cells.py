@@ -26,7 +26,7 @@ DROPPED = 0.02
 CORNERS = 12  # of a square cut by four lines, at most 8
 # A block, or a cell: along each axis how often it is halved, and the number of the part; along axis
 # 0 or 1 these are the columns AXIS * axis + HALVED_X and + INDEX_X.
-HALVED_X, INDEX_X, HALVED_Y, PLACE_Y = range(4)
+HALVED_X, INDEX_X, HALVED_Y, INDEX_Y = range(4)
 AXIS, BLOCK = 2, 4
 # A leaf: its block, its verdict, or UNSOLVED, and which parts of it are stable and unstable at least.
 VERDICT, STABLE_PART, UNSTABLE_PART = range(4, 7)
@@ -184,7 +184,7 @@ def _children(here, block, along_x, along_y, leaves, count):
                 leaves[count, INDEX_X] = 2 * here[INDEX_X] + i
             if full and along_y:
                 leaves[count, HALVED_Y] = here[HALVED_Y] + 1
-                leaves[count, PLACE_Y] = 2 * here[PLACE_Y] + j
+                leaves[count, INDEX_Y] = 2 * here[INDEX_Y] + j
             count += 1
     return count
 

@@ -18,7 +18,7 @@ TERMS = 8  # as many as `_sum` spells out
 ROOT_2 = math.sqrt(2.0)
 ROWS = 8
 # Of a series of factors, in the order of `lanes`: y1, y1', y2, y2'.
-FACTORS = 4
+FACTOR_COUNT = 4
 # At a node: the rotation number, the least and the largest number of zeros of y1, and of y2.
 NEAR, Y1_LEAST, Y1_MOST, Y2_LEAST, Y2_MOST = range(5)
 TURNS = 5
@@ -157,14 +157,18 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
     way between; NaN where they do not tell.
     """
     _, rows, terms = coefficients.shape
-    table, odd, sums = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((FACTORS, TILE))
+    table, odd, sums = (
+        np.empty((terms, TILE)),
+        np.empty((terms, TILE)),
+        np.empty((FACTOR_COUNT, TILE)),
+    )
     for start in range(0, len(x), TILE):
         count = min(TILE, len(x) - start)
         _table(x[start : start + count], even, False, table)
         if even:
             _table(x[start : start + count], even, True, odd)
         for j in range(rows):
-            for f in range(FACTORS):
+            for f in range(FACTOR_COUNT):
                 _sum(coefficients[f, j], odd if even and f == lanes.DY2 else table, sums[f], count)
             y1_bar, dy2_bar = bars[lanes.Y1, j], bars[lanes.DY2, j]
             if even:
@@ -176,7 +180,7 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
                     )
             for i in range(count):
                 own = results[j * len(x) + start + i]
-                for f in range(FACTORS):
+                for f in range(FACTOR_COUNT):
                     own[lanes.Y1 + f] = sums[f, i]
                 own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[lanes.DY1, j]
                 own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[lanes.Y2, j], dy2_bar
@@ -205,14 +209,14 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
     """
     _, terms, across = coefficients.shape
     table, odd, rows = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((across, TILE))
-    sums, part = np.empty((FACTORS, TILE)), np.empty(TILE)
+    sums, part = np.empty((FACTOR_COUNT, TILE)), np.empty(TILE)
     for start in range(0, x.shape[1], TILE):
         count = min(TILE, x.shape[1] - start)
         _table(x[ACROSS, start : start + count], False, False, rows)
         _table(x[ALONG, start : start + count], even, False, table)
         if even:
             _table(x[ALONG, start : start + count], even, True, odd)
-        for f in range(FACTORS):
+        for f in range(FACTOR_COUNT):
             for i in range(count):
                 sums[f, i] = 0.0
             for k in range(terms):

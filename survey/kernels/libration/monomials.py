@@ -35,7 +35,7 @@ class Monomials:
         return int(((self.sign > 0) & (norm(self.harmonic) <= cutoff)).sum())
 
     def find(self, exponents):
-        """Places of `exponents` (n, 6), which are of this degree."""
+        """Indices of `exponents` (n, 6), which are of this degree."""
         return np.searchsorted(self.keys, key(exponents))
 
 

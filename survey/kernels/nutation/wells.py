@@ -200,7 +200,7 @@ def pair(row, column):
 
 
 @kernel
-def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
+def fill(gaps, k, level, at_poles, equatorial, loose, right, left, row):
     """A row from the turning points, each (distance from its pole, from the other pole, bar)."""
     minus, plus = gaps
     v, wh, bar_v = right
@@ -235,10 +235,12 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     q_plus, q_minus = dd.add(at_pole, dd.mul(k, total)), dd.sub(at_pole, dd.mul(k, total))
     from_plus, from_minus = dd.add(v, vl), dd.add(w, wh)
     if from_plus[0] > 0.0:
-        q_plus = dd.div(dd.add(dd.times(ats[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), from_plus)
+        q_plus = dd.div(
+            dd.add(dd.times(at_poles[0], 2.0), dd.mul(dd.mul(v, vl), tilt_plus)), from_plus
+        )
     if from_minus[0] > 0.0:
         q_minus = dd.div(
-            dd.add(dd.times(ats[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), from_minus
+            dd.add(dd.times(at_poles[1], 2.0), dd.mul(dd.mul(w, wh), tilt_minus)), from_minus
         )
     store(
         row,
@@ -257,10 +259,10 @@ def fill(gaps, k, level, ats, equatorial, loose, right, left, row):
     moved = abs(k[0]) * (bar + 16.0 * PAIR_SUM_ROUNDOFF)
     near, far = from_plus[0], from_minus[0]
     plus_side = (
-        8.0 * PAIR_SUM_ROUNDOFF * abs(ats[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar
+        8.0 * PAIR_SUM_ROUNDOFF * abs(at_poles[0][0]) + (abs(row[Q_PLUS]) + 4.0 * abs(k[0])) * bar
     ) / max(near, TINY)
     minus_side = (
-        8.0 * PAIR_SUM_ROUNDOFF * abs(ats[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar
+        8.0 * PAIR_SUM_ROUNDOFF * abs(at_poles[1][0]) + (abs(row[Q_MINUS]) + 4.0 * abs(k[0])) * bar
     ) / max(far, TINY)
     plus_side, minus_side = plus_side + 8.0 * moved * near, minus_side + 8.0 * moved * far
     row[NOISE_HIGH] = (plus_side if uh[0] >= 0.0 else minus_side) / max(row[Q_HIGH], TINY)
@@ -314,20 +316,23 @@ def beside_saddle(equatorial, u, bar, side, row, column, error):
 
 
 @kernel
-def still(gaps, k, level, ats, equatorial, loose, y, hum, chart, plus, row):
+def still(gaps, k, level, at_poles, equatorial, loose, y, bar_height, chart, plus, row):
     """A row of a regular precession at the distance y from the pole +1 (`plus`) or -1.
 
-    hum: the bar of P there, and chart: P about that pole. The well may be as high, and so wide,
+    bar_height: the bar of P there, and chart: P about that pole. The well may be as high, and so wide,
     which changes all else by its square.
     """
     _first, second = slopes(chart, y)
     square = max(-second, TINY)
-    bar, wide = ROUNDOFF * y, 2.0 * sqrt(hum / square) if y > 0.0 else 8.0 * hum / square
+    bar, wide = (
+        ROUNDOFF * y,
+        2.0 * sqrt(bar_height / square) if y > 0.0 else 8.0 * bar_height / square,
+    )
     near, far = ((y, 0.0), dd.two_sum(2.0, -y), bar), (dd.two_sum(2.0, -y), (y, 0.0), bar)
     if plus:
-        fill(gaps, k, level, ats, equatorial, loose, near, far, row)
+        fill(gaps, k, level, at_poles, equatorial, loose, near, far, row)
     else:
-        fill(gaps, k, level, ats, equatorial, loose, far, near, row)
+        fill(gaps, k, level, at_poles, equatorial, loose, far, near, row)
     row[WIDTH] = 0.0
     row[BAR_LOW] += wide
     row[BAR_HIGH] += wide
@@ -429,7 +434,7 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
     `looseness`.
     """
     kinds[0] = kinds[1] = NONE
-    gaps, ats = (dd.two_sum(b, -a), dd.two_sum(b, a)), (at_plus, at_minus)
+    gaps, at_poles = (dd.two_sum(b, -a), dd.two_sum(b, a)), (at_plus, at_minus)
     minus, plus, product, size_k = gaps[0][0], gaps[1][0], a * b, k[0]
     polar = about_pole(dd.mul(gaps[0], gaps[0]), at_plus, level, k)
     antipolar = about_pole(dd.mul(gaps[1], gaps[1]), at_minus, level, k)
@@ -442,44 +447,56 @@ def find(a, b, k, level, at_plus, at_minus, rough, rows, kinds):
         kinds[0] = LOST
         return distance, bar
     v = w = top = bottom = -1.0
-    hum = murmur = 0.0
+    bar_top = bar_bottom = 0.0
     if rise > 0.0 or product >= 0.0:
         v = lowest(minus * minus, product, size_k, 1.0 - max(between, 0.0))
-        v, top, hum = peak(polar, v, at_plus[0])
+        v, top, bar_top = peak(polar, v, at_plus[0])
     if rise > 0.0 or product < 0.0:
         w = lowest(plus * plus, -product, size_k, 1.0 + min(between, 0.0))
-        w, bottom, murmur = peak(antipolar, w, at_minus[0])
+        w, bottom, bar_bottom = peak(antipolar, w, at_minus[0])
     if rise > 0.0 and distance < 0.0:
         n = 0
-        if bottom > murmur:
+        if bottom > bar_bottom:
             left = beyond(plus, at_minus[0], w, 2.0 - w, antipolar, polar, -1.0)
             right = inner(equatorial, loose, w - 1.0, between)
-            fill(gaps, k, level, ats, equatorial, loose, right, left, rows[0])
+            fill(gaps, k, level, at_poles, equatorial, loose, right, left, rows[0])
             kinds[0] = PASSAGE if left[0][0] == 0.0 else NUTATION
             n = 1
-        elif bottom >= -murmur:
-            still(gaps, k, level, ats, equatorial, loose, w, murmur, antipolar, False, rows[0])
+        elif bottom >= -bar_bottom:
+            still(
+                gaps,
+                k,
+                level,
+                at_poles,
+                equatorial,
+                loose,
+                w,
+                bar_bottom,
+                antipolar,
+                False,
+                rows[0],
+            )
             kinds[0], n = PRECESSION, 1
-        if top > hum:
+        if top > bar_top:
             right = beyond(minus, at_plus[0], v, 2.0 - v, polar, antipolar, -1.0)
             from_plus, from_minus, bar_u = inner(equatorial, loose, 1.0 - v, between)
             left = from_minus, from_plus, bar_u
-            fill(gaps, k, level, ats, equatorial, loose, right, left, rows[n])
+            fill(gaps, k, level, at_poles, equatorial, loose, right, left, rows[n])
             kinds[n] = PASSAGE if right[0][0] == 0.0 else NUTATION
-        elif top >= -hum:
-            still(gaps, k, level, ats, equatorial, loose, v, hum, polar, True, rows[n])
+        elif top >= -bar_top:
+            still(gaps, k, level, at_poles, equatorial, loose, v, bar_top, polar, True, rows[n])
             kinds[n] = PRECESSION
-    elif max(top - hum, bottom - murmur) > 0.0:
+    elif max(top - bar_top, bottom - bar_bottom) > 0.0:
         equator = equatorial[0][0]
         v, w = (v if v >= 0.0 else 2.0 - w), (w if w >= 0.0 else 2.0 - v)
         right = beyond(minus, at_plus[0], v, w, polar, antipolar, equator)
         left = beyond(plus, at_minus[0], w, v, antipolar, polar, equator)
-        fill(gaps, k, level, ats, equatorial, loose, right, left, rows[0])
+        fill(gaps, k, level, at_poles, equatorial, loose, right, left, rows[0])
         kinds[0] = PASSAGE if right[0][0] == 0.0 or left[0][0] == 0.0 else NUTATION
-    elif v >= 0.0 and top >= -hum:
-        still(gaps, k, level, ats, equatorial, loose, v, hum, polar, True, rows[0])
+    elif v >= 0.0 and top >= -bar_top:
+        still(gaps, k, level, at_poles, equatorial, loose, v, bar_top, polar, True, rows[0])
         kinds[0] = PRECESSION
-    elif w >= 0.0 and bottom >= -murmur:
-        still(gaps, k, level, ats, equatorial, loose, w, murmur, antipolar, False, rows[0])
+    elif w >= 0.0 and bottom >= -bar_bottom:
+        still(gaps, k, level, at_poles, equatorial, loose, w, bar_bottom, antipolar, False, rows[0])
         kinds[0] = PRECESSION
     return distance, bar

@@ -30,7 +30,7 @@ def integrals(inertia, epsilon, w, nu):
 
 
 def rotation(inertia, epsilon, rate):
-    """Of the rotation by `rate` about the vertical axis of the first moment: {name: Bounded or
+    """For the rotation by `rate` about the vertical axis of the first moment: {name: Bounded or
     codes}, (4)-(7).
     """
     A1, A2, A3 = (bounded.of(A) for A in inertia)
@@ -130,7 +130,7 @@ def _smaller(a, b):
 
 
 def critical(inertia, epsilon, sigma, area, sign):
-    """Of the critical motions with F3 = `area` on which H + sigma F2 / 2 is stationary, (8)-(12)."""
+    """For the critical motions with F3 = `area` on which H + sigma F2 / 2 is stationary, (8)-(12)."""
     inertia = [bounded.of(A) for A in inertia]
     e, s, p = (bounded.of(x) for x in (epsilon, sigma, area))
     factors = [1.0 + s * A for A in inertia]

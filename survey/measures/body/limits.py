@@ -33,10 +33,10 @@ def verdict(reduced, beside):
 
 
 def of_fate(method, placed, rtol):
-    """The fate of the reduced motion of a Placed (not OFF), as in `measures.cylinder.fate`; its
+    """The fate of the reduced motion of a PlacedBody (not OFF), as in `measures.cylinder.fate`; its
     transversal stability.
 
-    (result {name: array (1)}, reduced stability, Beside).
+    (result {name: array (1)}, reduced stability, TransversalStability).
     """
     result = fate.empty(1, OK)
     if placed.case == VERTICAL:
@@ -123,7 +123,7 @@ def of_portrait(method, placed, rtol):
     """({name: array} of `measures.cylinder.portrait` for one system, equilibria and cycles with
     what is beside them).
 
-    Equilibria and cycles are lists of (reduced stability, Beside), in the order of the portrait's;
+    Equilibria and cycles are lists of (reduced stability, TransversalStability), in the order of the portrait's;
     for an equilibrium its reduced exponents and their bars come before.
     """
     result = portrait.solve(method, placed.six[None], rtol)
@@ -152,7 +152,7 @@ def of_portrait(method, placed, rtol):
 
 
 def at_rests(placed):
-    """[(nu, bar, Beside)] of the positions of rest, in the frame of `placed`; None if they cannot
+    """[(nu, bar, TransversalStability)] of the positions of rest, in the frame of `placed`; None if they cannot
     be found.
     """
     found = rests.find(placed.system)

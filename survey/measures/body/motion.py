@@ -1,6 +1,6 @@
 """Motions of a whole body: (w, nu) at given times with error bars, by the steps of a method.
 
-A row that misses the asked accuracy is solved again with smaller steps, and the better answer is
+A row that misses the requested accuracy is solved again with smaller steps, and the better answer is
 kept. Motions into the past are those of the reversed body: (B, lambda, w, t) -> -(B, lambda, w, t).
 """
 
@@ -72,5 +72,5 @@ def _worst(floats):
 
 
 def _missed(floats, rtol):
-    """Where the answer misses the asked accuracy, or there is none."""
+    """Where the answer misses the requested accuracy, or there is none."""
     return ~(floats[..., STATE:] <= rtol * (1.0 + np.abs(floats[..., :STATE]))).all(axis=-1)

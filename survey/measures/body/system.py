@@ -116,7 +116,7 @@ def _positive(matrix):
 
 
 @dataclass(frozen=True)
-class Placed:
+class PlacedBody:
     """A BodySystem turned so that its axis of rotation is axis 1, and what the paper's conditions say
     of it.
 
@@ -156,7 +156,7 @@ class Placed:
 
 
 def nearest(system):
-    """The Placed of a BodySystem: of its possible axes of rotation, the one on which it misses the set
+    """The PlacedBody of a BodySystem: of its possible axes of rotation, the one on which it misses the set
     by least.
     """
     return min(
@@ -256,7 +256,9 @@ def _placed(system, axis):
     six[np.abs(six) <= six_bars] = 0.0
     if case == CASE_A:  # n = k / cos theta - lambda1 decides; g = 0
         six[2:] = 0.0
-    return Placed(b, Q, math.atan2(sin, cos), residuals, bars, case, six, six_bars, phi0, b.w[0])
+    return PlacedBody(
+        b, Q, math.atan2(sin, cos), residuals, bars, case, six, six_bars, phi0, b.w[0]
+    )
 
 
 def _exact(b, case, cos, sin, phi0):

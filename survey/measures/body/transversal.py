@@ -27,9 +27,9 @@ MOST = 4  # exponents beside a limit: 2 in case B, 3 in case A, 4 about the vert
 
 
 @dataclass(frozen=True)
-class Beside:
-    """Of a limit: exponents or, over a period, multipliers (complex), the largest rate of growth;
-    is that below 0?
+class TransversalStability:
+    """Of deviations beside a limit: exponents or, over a period, multipliers (complex), the largest
+    rate of growth, and whether that is below 0 (`stable`).
     """
 
     values: np.ndarray
@@ -41,7 +41,7 @@ class Beside:
     period_bar: float = np.nan
 
 
-NOTHING = Beside(np.zeros(0, complex), np.zeros(0), np.nan, np.nan, UNDECIDED)
+NOTHING = TransversalStability(np.zeros(0, complex), np.zeros(0), np.nan, np.nan, UNDECIDED)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _rate(placed):
 
 
 def at_rest(placed, phi, bar):
-    """Of the equilibrium at phi, known within its bar."""
+    """The TransversalStability of the equilibrium at phi, known within its bar."""
     beside = linear(placed)
     matrix = beside.at(phi, 0.0)
     off = beside.slip * beside.size(0.0) + bar * sum(
@@ -117,7 +117,7 @@ def at_rest(placed, phi, bar):
         0.5 * trace if minors - minors_bar > (0.5 * abs(trace) + trace_bar) ** 2 else roots[0].real
     )
     growth_bar = 0.5 * trace_bar if growth == 0.5 * trace else bars[0]
-    return Beside(roots, bars, float(growth), float(growth_bar), stable)
+    return TransversalStability(roots, bars, float(growth), float(growth_bar), stable)
 
 
 def _minors(matrix):
@@ -162,7 +162,8 @@ def of_matrix(matrix, off):
     if not np.isfinite(matrix).all():
         return NOTHING
     values, vectors = np.linalg.eig(matrix)
-    size, n = np.linalg.norm(matrix), len(matrix)
+    size = np.linalg.norm(matrix)
+    n = len(matrix)
     off = n * off + 8.0 * n * EPS * size
     with np.errstate(all="ignore"):
         try:
@@ -183,12 +184,14 @@ def of_matrix(matrix, off):
     high, low = np.max(values.real + bars), np.max(values.real - bars)
     stable = STABLE if high < 0.0 else UNSTABLE if low > 0.0 else UNDECIDED
     middle = values.real.max()
-    return Beside(values, bars, float(middle), float(max(high - middle, middle - low)), stable)
+    return TransversalStability(
+        values, bars, float(middle), float(max(high - middle, middle - low)), stable
+    )
 
 
 def along(placed, start, rotates):
-    """Of the periodic motion from `start` (phi, w and their bars): multipliers over a period;
-    growth per unit time.
+    """The TransversalStability of the periodic motion from `start` (phi, w and their bars):
+    multipliers over a period, growth per unit of time.
 
     Where the motion does not close within the bars, NOTHING.
     """
@@ -258,10 +261,10 @@ def _timed(values, bars, stable, lasting):
     sizes = np.abs(values)
     high, low, middle = np.max(sizes + bars), np.max(sizes - bars), np.max(sizes)
     if not (low > 0.0 and math.isfinite(high)):
-        return Beside(values, bars, np.nan, np.nan, stable, **lasting)
+        return TransversalStability(values, bars, np.nan, np.nan, stable, **lasting)
     growth = math.log(middle) / period
     bar = max(math.log(high / middle), math.log(middle / low)) / period
-    return Beside(
+    return TransversalStability(
         values,
         bars,
         growth,
@@ -272,7 +275,7 @@ def _timed(values, bars, stable, lasting):
 
 
 def fast(placed):
-    """Of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments,
+    """That of a spin-up, w -> +-inf: unstable where A11 lies between the other two principal moments,
     else undecided.
 
     To leading order d(w2, w3)/dt = w S^-1 J (S - A11) (w2, w3): the squares of its exponents are
@@ -285,7 +288,7 @@ def fast(placed):
 
 
 def steady(system, w, nu, off=0.0):
-    """Of a fixed point (w, nu) of the whole body at its k and |nu| = 1: four exponents.
+    """That of a fixed point (w, nu) of the whole body at its k and |nu| = 1: four exponents.
 
     `off` is what the state may be off. Where A nu vanishes it cannot: k always moves with w.
     """

@@ -82,7 +82,7 @@ class Basins:
 
 @dataclass(frozen=True)
 class StartRange:
-    """What of a whole survey decides how far curves are followed: the starts of one system, their
+    """What decides in a survey how far curves are followed: the number of starts of a system and their
     largest |w|.
     """
 
@@ -144,7 +144,7 @@ def forget():
 
 
 def found(method, s, rtol, map_asked):
-    """The Basins of the skeleton s, or None where its starts are to be followed."""
+    """The Basins of the skeleton s, or None where each start must be followed."""
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
     if s.stratum != fate.G or s.unknown or s.folded or not s.conclusive or not len(s.equilibria):
         return None

@@ -133,7 +133,7 @@ def _smooth(function, x, error):
 
 
 def _passing(same, one, two):
-    """Of two branches on which w keeps its sign: w at the centre between their saddles, or at the
+    """For two branches on which w keeps its sign: w at the centre between their saddles, or at the
     saddle between.
     """
     pair = (one[:, cn.COLUMNS] == 4.0) & (two[:, cn.COLUMNS] == 4.0)
@@ -157,7 +157,7 @@ def _level(row, column):
 
 
 def _turning(first_own, second_own, one, two):
-    """Of two branches that turn before the same saddle (their own, a turn further, if so): their
+    """For two branches that turn before the same saddle (their own, a turn further, if so): their
     turning points.
     """
     count = one[:, cn.COLUMNS]

@@ -76,7 +76,8 @@ class Maps:
             if high is None:
                 return 0, *np.full(4, np.nan)
             taylor.flow_image(rt.LIBRATION, p, eqs, len(eqs), high, coordinate, FINE, node)
-            size, steep = 1.0, p[BOUND_DG] / (abs(values(p, coordinate)[1]) + tracks.TINY)
+            size = 1.0
+            steep = p[BOUND_DG] / (abs(values(p, coordinate)[1]) + tracks.TINY)
         else:
             size = math.exp(coordinate)
             taylor.flow_image(rt.ROTATION, p, eqs, len(eqs), 0.0, size, FINE, node)

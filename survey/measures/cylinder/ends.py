@@ -36,7 +36,8 @@ class Ends:
 
 def of(row):
     """The Ends of the flow `row` of `equation.program`."""
-    number, before = FEWEST, None
+    number = FEWEST
+    before = None
     sizes = np.array([row[pg.BOUND_F], row[pg.BOUND_G]])
     while True:
         found = _integrals(row, number)

@@ -130,7 +130,8 @@ def _handed_over(method, s, start, tolerance, out, fate_of=None):
     on is decided.
     """
     times = HANDED_OVER / (s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG]) + abs(start[rc.START_W]))
-    row, done = np.concatenate([s.p[: rc.SIX], start])[None], 0
+    row = np.concatenate([s.p[: rc.SIX], start])[None]
+    done = 0
     ways = ([fate_of] if fate_of else []) + [
         lambda state: fates(method, s, state[None], tolerance)[0]
     ]
@@ -270,7 +271,7 @@ class Skeleton:
 
     @property
     def conclusive(self):
-        """Are all Cycles?"""
+        """Are the Cycles of all kinds conclusive?"""
         return all(self.cycles(kind).conclusive for kind in KINDS)
 
 
@@ -452,7 +453,8 @@ def _librations(method, p, eqs, folded):
     edges = np.zeros(rt.EDGES)
     fine = max(FINE, method.FLOW_FINEST)
     found = 0
-    share, sure = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56))), True
+    share = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56)))
+    sure = True
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
             if folded and eq.blurred(p, row[eq.ANGLE], row[eq.DG])[1]:

@@ -15,7 +15,8 @@ from survey.measures.cylinder.fate import outline, remembered
 from survey.methods import taylor
 from survey.scene import Trajectory
 
-AROUND, POINTS = np.arange(0, 2 * np.pi, np.pi / 3), 2001
+AROUND = np.arange(0, 2 * np.pi, np.pi / 3)
+POINTS = 2001
 ON_CYLINDER = (("cylinder", "phi", "w"), ("lines", "t", "w"))
 ON_PLANE = (("plane", "phi", "w"), ("lines", "t", "w"))
 LINES = ("unstable_branch", "stable_branch", "unstable_cycle", "stable_cycle")

@@ -32,7 +32,8 @@ from survey.measures.cylinder.fate import (
 from survey.status import NO_CONVERGENCE, OK
 
 # Numbers that are kept: surveys of random points found at most 4 cycles, and g has at most 4 roots.
-CYCLES, EQUILIBRIA = 8, eq.MOST
+CYCLES = 8
+EQUILIBRIA = eq.MOST
 NONE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = range(4)
 TOO_MANY, UNKNOWN_CYCLES = 20, 21  # as in the STATUS of scenes/gyrostat.py
 UNDECIDED, DEGENERATE, STABLE = -1, 0, 1
@@ -42,7 +43,7 @@ ROUNDING = 4e-16  # of K and L, relative to the sizes of their terms
 TINY = 1e-300
 
 
-class Listed(NamedTuple):
+class ListedCycle(NamedTuple):
     """A cycle: number `at` of point `i`, of a kind, its row of `returns`, and its system."""
 
     i: int
@@ -108,7 +109,7 @@ def solve(method, systems, rtol):
         ]
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
-        listed += [Listed(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
+        listed += [ListedCycle(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
     for kinds, timed in (
         ((ROTATION_PLUS, ROTATION_MINUS), _rotations),
         ((LIBRATION,), _librations),

@@ -279,9 +279,9 @@ def exact_starts(rows):
     return found
 
 
-class Aware:
-    """A measure of single solutions, as `solution`, which takes those that start exactly on a
-    separatrix from here.
+class SeparatrixAware:
+    """A measure of single solutions, as `solution` is, but for those that start exactly on a
+    separatrix, which are solved as in this file.
     """
 
     def __init__(self, measure):

@@ -2,7 +2,7 @@
 over phi (57).
 
 Arrays in, arrays out; a row is one solution, its columns are the times or angles asked for. A row
-that misses the asked accuracy is solved again with smaller steps, and the better answer is kept.
+that misses the requested accuracy is solved again with smaller steps, and the better answer is kept.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 
 LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
-SHARE = 1e-3  # of the asked accuracy, for the truncation error of one step
+SHARE = 1e-3  # of the requested accuracy, for the truncation error of one step
 # the same for trajectories: most of what misses the accuracy misses it by little
 ATTEMPTS = (3e-4, 1e-5, 1e-7)
 FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
@@ -212,7 +212,7 @@ def _in_phi(method, rows, targets, rtol, by_row):
 
 
 def _repeated(run, asked, ladder, rtol):
-    """Solve all rows, then again, finer, those that miss the asked accuracy; keep the better of two."""
+    """Solve all rows, then again, finer, those that miss the requested accuracy; keep the better of two."""
     first, *others = ladder
     results = run(slice(None), first)
     for tolerance in others:
@@ -229,7 +229,7 @@ def _repeated(run, asked, ladder, rtol):
 
 
 def missed(results, rtol):
-    """Where the answer misses the asked accuracy, or there is none."""
+    """Where the answer misses the requested accuracy, or there is none."""
     floats, status = results[0], results[-1]
     out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
     points = floats.reshape(-1, floats.shape[-1])

@@ -92,7 +92,8 @@ def _values(out, structure):
 
 def margins(M, E, structure):
     """The functions (N, F) of M (N, n, n) known to within E, and their bounds."""
-    n, one = M.shape[1], np.ones((len(M), M.shape[1]))
+    n = M.shape[1]
+    one = np.ones((len(M), M.shape[1]))
     if structure != "none":
         c, d = dense.coefficients(M, E, one, "reversible")
         return _minors(*_moments(c, d))

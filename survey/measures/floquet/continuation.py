@@ -133,7 +133,7 @@ class ContinuedCurves:
         return points
 
     def _follow(self, share, orbits, good):
-        """Follow the curves through the `good` ones of Located orbits at this share of the range,
+        """Follow the curves through the `good` ones of LocatedOrbits at this share of the range,
         but for those that are known.
         """
         those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
@@ -315,10 +315,11 @@ class _Walk:
         return value, np.concatenate([slope, by_l[:, :, None]], axis=2), size
 
     def _closing(self, those, points, x, X, M):
-        """What is to be 0 for orbits to close, and its derivatives by (x(0), T), of X = x(T) and M
+        """What must vanish for orbits to close, and its derivatives by (x(0), T), of X = x(T) and M
         = dX/dx(0).
         """
-        n, symmetry = self.n, self.equation.symmetry
+        n = self.n
+        symmetry = self.equation.symmetry
         if symmetry is not None:
             guess = self.equation.begin(points)[0]
             return symmetry.linearised(X, M, slopes(self.equation, points, X), x, guess)

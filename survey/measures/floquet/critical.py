@@ -53,7 +53,7 @@ class Critical(Equation):
 
     @classmethod
     def of(cls, equation, varied, kind, mirror=None, branching=False):
-        """That of the orbits of an Equation."""
+        """The Critical equation of the orbits of an Equation."""
         own = equation.f, equation.n, equation.period, equation.start
         return cls(*own, kind=kind, varied=tuple(varied), mirror=mirror, branching=branching)
 

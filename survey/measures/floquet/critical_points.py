@@ -42,7 +42,7 @@ class ShownCritical:
 
 @dataclass(frozen=True)
 class CriticalPoints:
-    """Of one `critical` equation; `given`: all parameters. The varied ones change by `scale`,
+    """The orbits of one `critical` equation; `given`: all parameters. The varied ones change by `scale`,
     relative if `log`.
     """
 
@@ -53,7 +53,7 @@ class CriticalPoints:
 
     @property
     def method(self):
-        """By whose propagators bounds are made."""
+        """The method by whose propagators bounds are made."""
         return monodromy.method_of("auto")
 
     @property
@@ -106,7 +106,8 @@ class CriticalPoints:
 
     def _sizes(self, y, moduli):
         """What lengths are relative to (N, size)."""
-        own, n = self.critical, self.critical.n
+        own = self.critical
+        n = self.critical.n
         size = np.ones_like(y)
         parts = [(0, n), (n, own.moving)]
         for low, high in parts:
@@ -125,7 +126,8 @@ class CriticalPoints:
         """Rows (N, k, size) and values (N, k) of the linear conditions but for those on parameters,
         about y.
         """
-        own, n = self.critical, self.critical.n
+        own = self.critical
+        n = self.critical.n
         v, w = y[:, n : 2 * n], y[:, 2 * n : 3 * n]
         rows = []
         row = np.zeros_like(y)
@@ -205,7 +207,8 @@ class CriticalPoints:
 
     def shown(self, y, rows, values):
         """ShownCritical of the orbits near y under these conditions too."""
-        n, (N, size) = self.critical.n, y.shape
+        n = self.critical.n
+        N, size = y.shape
         out = ShownCritical(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
                     *np.full((2, N, n), np.nan))  # fmt: skip
         own_rows, own_values = self.conditions(y)

@@ -24,7 +24,7 @@ class Walk:
         self.own = points.critical
 
     def curve(self, seed):
-        """(y (m, size), places (m) of the parameter at the map's border, or -1) through the seed."""
+        """(y (m, size), columns (m) of the parameter at the map's border, or -1) through the seed."""
         ahead = self._half(seed, 1.0)
         back = ([], [], True) if ahead[2] else self._half(seed, -1.0)
         y = [*back[0][::-1], seed, *ahead[0]]
@@ -119,7 +119,8 @@ class Walk:
             *chord
         ):
             return False
-        own, n = y + share * (new - y), self.own.n
+        own = y + share * (new - y)
+        n = self.own.n
         if self.own.free:
             alike = (
                 abs(own[self.own.period_at] - seed[self.own.period_at])

@@ -78,7 +78,8 @@ def searched(scene, square, axes, fixed, options):
     if scene.FAMILY == "orbit":
         if scene.symmetry is None:
             return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
-        structure, number = "reversible", LINES_OF_ORBITS
+        structure = "reversible"
+        number = LINES_OF_ORBITS
         orbits = scene.family(square, axes, fixed, number)
         matrices = orbits.matrices
         roughly = orbits.rough
@@ -272,7 +273,8 @@ def _lines(function, grain, values, tried=TRIED):
     """[(positions (m, 2), errors (m))] of the curves function(x) = 0, from its values on the
     lattice (lines, lines).
     """
-    lines, known = len(values), np.isfinite(values)
+    lines = len(values)
+    known = np.isfinite(values)
     ticks, fine = np.linspace(0.0, 1.0, lines), np.linspace(0.0, 1.0, (lines - 1) * FINER + 1)
     spline = RectBivariateSpline(ticks, ticks, contours.filled(values))
     dense = spline(fine, fine)
@@ -340,9 +342,9 @@ def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR):
     """
     x = np.concatenate(parts)
 
-    def at(left, axis, who, t):
-        here = np.repeat(x[left[who], None], t.shape[1], axis=1)
-        here[np.arange(len(t)), :, axis[who]] = t
+    def at(left, axis, which, t):
+        here = np.repeat(x[left[which], None], t.shape[1], axis=1)
+        here[np.arange(len(t)), :, axis[which]] = t
         value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 

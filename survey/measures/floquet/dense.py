@@ -39,7 +39,7 @@ FEWEST = 4096  # points on their own from which on series pay
 BEST = 1e-14  # accuracy of M at the nodes
 MOST_DEEP = 12  # halvings
 LEAST = 0.5  # the share of those that their own bounds answer, below which cutting is of no use
-MOST = 0.9  # the share of the nodes answered to the asked accuracy from which on a panel serves
+MOST = 0.9  # the share of the nodes answered to the requested accuracy from which on a panel serves
 # points that are no nodes
 TRIED = np.array([[0.137, -0.713], [-0.551, 0.318], [0.862, 0.907], [-0.934, -0.269]])
 LARGEST = 12  # states
@@ -145,7 +145,8 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
 
     `points` has the block's axes first; a parameter in `lines` varies along one of them.
     """
-    axes, shape = axes_of(lines), points.shape[:-1]
+    axes = axes_of(lines)
+    shape = points.shape[:-1]
     index = np.arange(np.prod(shape)).reshape(shape)
     along = []
     for axis in axes:

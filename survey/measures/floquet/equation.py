@@ -39,7 +39,7 @@ class Equation:
 
     @property
     def share(self):
-        """Of the period, that is integrated."""
+        """The share of the period that is integrated."""
         return 1.0 if self.symmetry is None else SHARE
 
     @property
@@ -131,7 +131,8 @@ class Equation:
 
     def _called(self, graph, time, x, p):
         """f as symbols (n), called with symbols."""
-        n, out = self.n, np.zeros(self.n, dtype=object)
+        n = self.n
+        out = np.zeros(self.n, dtype=object)
         try:
             value = trace.lifted(self.f)(time, x, p, out)
             out = out if value is None else np.array(value, dtype=object)

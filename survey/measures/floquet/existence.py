@@ -56,7 +56,7 @@ class ShownOrbits:
     others: monodromy.Matrices
 
     def improve(self, other):
-        """Take those over that only `other` shows."""
+        """Take over the orbits that only `other` shows."""
         those = ~self.good & other.good
         for one in fields(self):
             getattr(self, one.name)[those] = getattr(other, one.name)[those]

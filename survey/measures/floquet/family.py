@@ -99,7 +99,7 @@ class Family:
             return 0 if abs(self.branch) == 1 else None
         points = np.tile(point, (len(x), 1))
         found = orbit.shown(self.equation, points, x, T, self.method, ENOUGH, relax=False)
-        shown = [orbit.Seen.of(found, i, i) for i in np.flatnonzero(found.good)]
+        shown = [orbit.KnownOrbit.of(found, i, i) for i in np.flatnonzero(found.good)]
         order = orbit.numbered(shown, free=False)
         return order[self.branch - (self.branch > 0)] if abs(self.branch) <= len(order) else None
 
@@ -149,7 +149,8 @@ class Family:
 
     def _rough(self, points, x, T):
         """(M, E) of orbits from x (N, n), of the periods T; NaN where x is."""
-        n, symmetry = self.equation.n, self.equation.symmetry
+        n = self.equation.n
+        symmetry = self.equation.symmetry
         X, f = np.full((len(x), n, n), np.nan), np.full((len(x), n), np.nan)
         good = np.flatnonzero(np.isfinite(x).all(axis=1))
         for inside, programs in self.equation.traced(points[good], x[good]):

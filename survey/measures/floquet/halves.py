@@ -11,7 +11,7 @@ Neither is tried on samples: both are read off the recorded operations (`trace`)
 or cosine of a line c t + d, keeps or changes its sign where c (a + b) + 2 d, or c (b - a) / 2, is a
 multiple of pi; parity then passes on through sums, products, quotients and functions, and each term
 of an entry says whether two signs are equal. The digits show a multiple of pi to within their
-rounding alone; `late` bounds how far off it may be, which counts as an error of A. What these rules
+rounding alone; `phase_bars` bound how far off it may be, which counts as an error of A. What these rules
 do not see, as waves whose sum alone is even, is integrated as it is.
 
 Source: J. S. W. Lamb, J. A. G. Roberts, Physica D 112 (1998) 1.
@@ -32,7 +32,7 @@ EVEN = frozenset({"cos", "cosh"})
 
 @dataclass(frozen=True)
 class Images:
-    """What of a piece follows from its beginning: signs of the states in a reversal of time, and in
+    """How a piece follows from its beginning: the signs of the states in a reversal of time, and in
     a repetition, as bytes of -1 and 1, or None where there is none.
     """
 
@@ -41,7 +41,7 @@ class Images:
 
     @property
     def parts(self):
-        """Of equal length, the first of which is integrated."""
+        """The number of parts of equal length, the first of which is integrated."""
         return (1 if self.reversal is None else 2) * (1 if self.repetition is None else 2)
 
     def complete(self, F, error, doubt, first, count):
@@ -53,7 +53,8 @@ class Images:
         """
         tasks = np.repeat(np.arange(len(count)), count)
         index = np.arange(tasks.size) - np.repeat(np.cumsum(count) - count, count)
-        done, here = 1, first[tasks] + index
+        done = 1
+        here = first[tasks] + index
         if self.reversal is not None:
             signs = _signs(self.reversal)
             if self.repetition is not None:  # about the middle of the first half
@@ -63,7 +64,8 @@ class Images:
             F[back] = F[own] * np.outer(signs, signs)
             error[back] = error[own]
             doubt[back] = doubt[own]
-            done, here = 2, np.concatenate([here, back])
+            done = 2
+            here = np.concatenate([here, back])
             tasks = np.concatenate([tasks, tasks])
         if self.repetition is not None:
             signs = _signs(self.repetition)
@@ -99,8 +101,8 @@ class Waves:
                 self.cosine.append(operation == "cos")
 
     def found(self, n, numbers, low, high):
-        """[(indices, Images, late)] of points, from values and error bounds of their numbers and
-        the ends (N) of the piece; `late`: see `trace.Program.series`.
+        """[(indices, Images, phase_bars)] of points, from values and error bounds of their numbers and
+        the ends (N) of the piece; `phase_bars`: see `trace.Program.series`.
         """
         (values, errors), terms = numbers, self.program.terms[:, pg.NUMBER]
         given = np.zeros((2, 2, len(self.nodes), len(low)))  # c and d, values and error bounds
@@ -123,9 +125,9 @@ class Waves:
         for row, own in kinds:
             out.setdefault(self._images(n, row), []).append(own)
         some = [(np.sort(np.concatenate(parts)), images) for images, parts in out.items()]
-        return [(own, images, self._late(images, off[:, :, own])) for own, images in some]
+        return [(own, images, self._phase_bars(images, off[:, :, own])) for own, images in some]
 
-    def _late(self, images, off):
+    def _phase_bars(self, images, off):
         total = off[0] * (images.reversal is not None) + off[1] * (images.repetition is not None)
         # most often of all points: then what depends on t alone is still sampled once
         alike = (total == total[:, :1]).all(axis=1)

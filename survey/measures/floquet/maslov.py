@@ -58,7 +58,7 @@ def indices(system, points):
         if left.size:
             factor = np.full(left.size, max(1.0, finer * m * method.floquet_reach(RTOL) / TURN))
             monodromy.solve(own, method, RTOL, factor, left, follow)
-            found[:, left] = _whole(turned)
+            found[:, left] = _integers(turned)
             left = left[rough]
     found[:, left] = UNKNOWN
     return found
@@ -98,7 +98,7 @@ def _rotation(X):
 
 
 def _index(X, turn, goal):
-    """The index (N) relative to `goal`, NaN where it is not sure, of X (N, n, n) after theta has
+    """The index (N) relative to `goal`, NaN where it is not certain, of X (N, n, n) after theta has
     turned by `turn`.
     """
     n = X.shape[1]
@@ -110,7 +110,7 @@ def _index(X, turn, goal):
 
 def _angles(X, goal):
     """Angles (N, n) in [0, 2 pi) of the eigenvalues of W relative to the graph of `goal`, and
-    whether they are sure.
+    whether they are certain.
     """
     N, n = X.shape[:2]
     angles = np.full((N, n), np.nan)
@@ -141,8 +141,8 @@ def _frame(X):
     return Z
 
 
-def _whole(found):
-    """Integers, UNKNOWN where these are none."""
+def _integers(found):
+    """The numbers as integers, UNKNOWN where they are not."""
     with np.errstate(invalid="ignore"):
         near = np.rint(found)
         return np.where(abs(found - near) < WHOLE, near, UNKNOWN).astype(np.int32)

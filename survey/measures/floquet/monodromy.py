@@ -75,7 +75,7 @@ class SystemPoints:
 
     def _alike(self, own, programs):
         """[(those of the points `own` with the same symmetries, of each piece (values and error
-        bounds of its numbers, Images, late: see `halves.Waves`))]."""
+        bounds of its numbers, Images, phase_bars: see `halves.Waves`))]."""
         found = [(own, [])]
         for k, program in enumerate(programs):
             before, found = found, []
@@ -193,7 +193,7 @@ class Matrices:
 
     @classmethod
     def plain(cls, M, E):
-        """Those of which no more is known than M and E."""
+        """The Matrices of points of which only M and E are known."""
         found = cls.empty(*M.shape[:2])
         found.M, found.E = M, E
         return found
@@ -216,7 +216,7 @@ def solve(points, method, rtol, factor, those, sharp):
     """The Matrices of some of the SystemPoints, in `factor` (K) times the steps asked for; `sharp`: see
     Matrices.
 
-    A function `sharp` takes, for some of `those` (their places there), the Matrices in the balanced
+    A function `sharp` takes, for some of `those` (their indices there), the Matrices in the balanced
     units of the states, these units (N, n), and the steps: F, their error bounds, `doubt` and
     `first` of `steps.products`.
     """

@@ -18,7 +18,8 @@ def solve(system, states, point, answer, time):
     eigenvector.
     """
     points = monodromy.SystemPoints(system, point)
-    period, n = float(points.period[0]), system.n
+    period = float(points.period[0])
+    n = system.n
     rate = abs(np.log(max(float(answer["spectral_radius"]), 1e-300)))
     periods = (
         ceil(time / period)

@@ -186,7 +186,8 @@ def symplectic_form(n):
 
 def not_symplectic(M, E):
     """Where (N) M^T J M, M known within E, is certainly not J."""
-    n, size = M.shape[1], abs(M) + E
+    n = M.shape[1]
+    size = abs(M) + E
     J = symplectic_form(n)
     with np.errstate(all="ignore"):
         off = abs(np.swapaxes(M, 1, 2) @ J @ M - J)
@@ -250,7 +251,8 @@ def krein(own):
     J = (0 1; -1 0) in blocks: the first half of the states are coordinates, the second their
     momenta.
     """
-    V, n = own.V, own.V.shape[1]
+    V = own.V
+    n = own.V.shape[1]
     m = n // 2
     with np.errstate(all="ignore"):
         JV = np.concatenate([V[:, m:], -V[:, :m]], axis=1)

@@ -28,7 +28,7 @@ def chosen(numbers, those):
 
 
 @dataclass
-class Located:
+class LocatedOrbits:
     """Orbits by Newton's method: states and periods, the points and normals of their planes
     (normals only where T is unknown), the largest moduli of the states, and numbers of steps.
     """
@@ -42,13 +42,15 @@ class Located:
 
 
 def located(equation, points, reach, x, T, relax=True):
-    """Located orbits at the points (N, parameters), and the numbers of those that are found,
+    """The LocatedOrbits at the points (N, parameters), and the numbers of those that are found,
     beginning at x (N, n), T.
 
     With `relax`, those that are not found are looked for again from the state after a long time,
     unless these orbits are symmetric, as those of conservative systems, which attract nothing.
     """
-    found = Located(*(np.full(np.shape(a), np.nan) for a in (x, T, x, x, x)), np.zeros(len(x), int))
+    found = LocatedOrbits(
+        *(np.full(np.shape(a), np.nan) for a in (x, T, x, x, x)), np.zeros(len(x), int)
+    )
     good = [np.zeros(0, int)]
     usable = np.flatnonzero(
         np.isfinite(points).all(axis=1) & np.isfinite(x).all(axis=1) & (T > 0) & np.isfinite(T)
@@ -189,7 +191,8 @@ class Newton:
 
     def _linearised(self, those, x, T, how):
         """G, the inverse of its derivative, and the sizes of the unknowns."""
-        numbers, n = chosen(self.numbers, those), x.shape[1]
+        numbers = chosen(self.numbers, those)
+        n = x.shape[1]
         X, M, size, _steps = self.programs.flow(numbers, x, self.equation.share * T, **how)
         value, slope = X - x, M - np.eye(n)
         if self.phase is not None:

@@ -72,12 +72,14 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
                 equation, different[own], x[i : i + CHUNK], period, method, rtol, relax=False
             )
             for k in np.flatnonzero(found.good):
-                of_point[own[k]].append(Seen.of(found, k, count + k))
+                of_point[own[k]].append(KnownOrbit.of(found, k, count + k))
             full = np.ones(len(own), bool)
             parts.append(found.outputs(full, rtol, wanted, callable(equation.period)))
             count += len(own)
     order = [numbered(orbits, equation.free and equation.symmetry is None) for orbits in of_point]
-    empty = Found(equation, 1).outputs(np.ones(1, bool), rtol, wanted, callable(equation.period))
+    empty = OrbitResults(equation, 1).outputs(
+        np.ones(1, bool), rtol, wanted, callable(equation.period)
+    )
     out = {name: np.concatenate([*(part[name] for part in parts), empty[name]]) for name in empty}
     pick = np.full(len(points), count)
     for i, k, number in zip(np.flatnonzero(known), row_of, branch[known].astype(int), strict=True):
@@ -115,7 +117,7 @@ def followed(equation, continued, points, reach):
         yield where, equation.pinned(points[where], x), T  # curves are cubics between their points
 
 
-class Seen(NamedTuple):
+class KnownOrbit(NamedTuple):
     """An orbit that was found at a point: the mean square of its states, x0, T, and its number."""
 
     square: float
@@ -125,12 +127,12 @@ class Seen(NamedTuple):
 
     @classmethod
     def of(cls, found, i, number):
-        """Orbit i of a Found."""
+        """Orbit i of OrbitResults."""
         return cls(found.square[i], tuple(found.x[i]), found.T[i], number)
 
 
 def numbered(orbits, free):
-    """The numbers of different orbits that were Seen, by the mean squares of their states, then x0."""
+    """The numbers of the different ones among KnownOrbits, by the mean squares of their states, then x0."""
     kept = []
     for one in sorted(orbits):
         size = SAME * one.square**0.5
@@ -164,9 +166,10 @@ def _chunk(equation, points, method, rtol, wanted):
 
 
 def shown(equation, points, guess, period, method, rtol, relax=True):
-    """What is Found (N) from guesses of the state (N, n) and of the period (N); see `newton.located`."""
-    N, reach = len(points), _reach(rtol)
-    found = Found(equation, N)
+    """What is found (N) from guesses of the state (N, n) and of the period (N); see `newton.located`."""
+    N = len(points)
+    reach = _reach(rtol)
+    found = OrbitResults(equation, N)
     orbits, good = located(equation, points, reach, guess, period, relax)
     _show(found, equation, points, orbits, good, method, reach)
     left = good[~found.good[good]]
@@ -177,7 +180,8 @@ def shown(equation, points, guess, period, method, rtol, relax=True):
 
 def _show(found, equation, points, orbits, good, method, reach, finer=False):
     """Put the orbits, of the points `good`, that are shown to exist into `found`."""
-    n, symmetry = equation.n, equation.symmetry
+    n = equation.n
+    symmetry = equation.symmetry
     certified = (
         existence.certified if symmetry is None else partial(shooting.certified, symmetry=symmetry)
     )
@@ -213,7 +217,7 @@ def _reach(rtol):
     return monodromy.method_of("auto").floquet_reach(rtol)
 
 
-class Found:
+class OrbitResults:
     """The results of N points as they come in."""
 
     def __init__(self, equation, N):

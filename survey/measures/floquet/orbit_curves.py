@@ -58,7 +58,7 @@ def searched(scene, square, axes, fixed):
     return sorted(found, key=lambda one: order[one[0]])
 
 
-class How(NamedTuple):
+class Criticality(NamedTuple):
     """The way in which an orbit has a multiplier on the unit circle: see `critical.Critical`."""
 
     kind: int
@@ -78,12 +78,14 @@ class _Map:
         self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
         self.kinds = [
-            How(kind) for kind in KINDS if kind != NEIMARK_SACKER or equation.n - equation.free > 1
+            Criticality(kind)
+            for kind in KINDS
+            if kind != NEIMARK_SACKER or equation.n - equation.free > 1
         ]
         if self.mirror is not None:
             more = ((PLUS_ONE, False), (PLUS_ONE, True), (NEIMARK_SACKER, False))
             self.kinds = [
-                *(How(kind, self.mirror, branching) for kind, branching in more),
+                *(Criticality(kind, self.mirror, branching) for kind, branching in more),
                 *self.kinds,
             ]
             self.kinds.sort(key=lambda how: how.kind != NEIMARK_SACKER)
@@ -110,7 +112,7 @@ class _Map:
         return self.square.positions(own)
 
     def seeds(self):
-        """{How: [y (size)]} of orbits on the lines."""
+        """{Criticality: [y (size)]} of orbits on the lines."""
         found = {how: [] for how in self.kinds}
         for axis in range(len(self.varied)):
             for how, y in self._of_lines(axis):
@@ -118,7 +120,7 @@ class _Map:
         return found
 
     def _of_lines(self, axis):
-        """(How, y) where orbits along the axis have the multiplier."""
+        """(Criticality, y) where orbits along the axis have the multiplier."""
         index = self.varied[axis]
         low, high = float(self.square.low[axis]), float(self.square.high[axis])
         if self.continued is not None and self.continued.index == index:
@@ -152,7 +154,8 @@ class _Map:
 
     def _of_curve(self, curves, row, y, axis):
         """The same of one curve of orbits."""
-        n, free = self.equation.n, self.equation.free
+        n = self.equation.n
+        free = self.equation.free
 
         def orbits(y):
             points = curves.points(np.full(len(y), row), y[:, -1])
@@ -211,7 +214,8 @@ class _Map:
 
     def _near(self, how, points, x, T):
         """The unknowns y (N, size) of `critical` near orbits."""
-        own, n = self.points(how).critical, self.equation.n
+        own = self.points(how).critical
+        n = self.equation.n
         M, f = self._matrices(points, x, T if how.mirror is None else 0.5 * T)
         M = own.signs[:n, None] * M
         y = np.full((len(x), own.size), np.nan)
@@ -259,7 +263,8 @@ class _Map:
         ]
         if not len(ends):
             return []
-        parameters, n = points.parameters(ends), self.equation.n
+        parameters = points.parameters(ends)
+        n = self.equation.n
         T = ends[:, own.period_at] if own.free else self.equation.periods(parameters)
         start = self._near(how, parameters, ends[:, :n], T)
         return [one for held in (0, 1) for one in self._located(how, start, held)]
@@ -282,7 +287,8 @@ class _Map:
         own = points.critical
         if self.mirror is None or own.mirror is not None or not seeds:
             return seeds
-        y, n = np.array(seeds), own.n
+        y = np.array(seeds)
+        n = own.n
         parameters = points.parameters(y)
         T = y[:, own.period_at] if own.free else self.equation.periods(parameters)
         y[:, :n] = (
@@ -317,7 +323,8 @@ class _Map:
         """[(class, parameters, errors, {name: (values, errors)})] of the parts of a curve that are
         shown to exist.
         """
-        own, N = points.critical, len(y)
+        own = points.critical
+        N = len(y)
         last = own.parameters_at
         if len(self.varied) > 1:
             # the other parameter is held: that along which the curve runs, or the one at the border

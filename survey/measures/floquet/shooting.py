@@ -91,7 +91,8 @@ class _Half:
         """Join steps to shots: `cuts`, their first steps, `first`, the orbits' first shots, and
         their propagators.
         """
-        path, n = self.path, self.path.n
+        path = self.path
+        n = self.path.n
         growth = path.h * path.norm
         before = np.cumsum(growth) - growth
         number = np.floor((before - before[path.first[:-1]][path.point]) / SHOT)
@@ -151,18 +152,18 @@ class _Half:
             shift * a_end * WIDER * (last.max(axis=1) + shift * self.fastest)
             + shift * 4 * EPS * self.fastest
         )
-        states_2, last_2, late_2 = self._responses(
+        states_2, last_2, time_bar_2 = self._responses(
             self.delta + second, at_end + moved[:, None], begins[self.cuts[:-1]]
         )
         inside = (states_2 <= states).all(axis=1)
         good = (
             np.logical_and.reduceat(inside, path.first[:-1])
             & (last_2 <= last).all(axis=1)
-            & (late_2 <= time_bar)
+            & (time_bar_2 <= time_bar)
         )
         good &= ~symmetry.couples(path.largest)
         return self._shown(
-            good, states_2[path.first[:-1]], self.dT + late_2 * self.unit, error, doubt, a_end
+            good, states_2[path.first[:-1]], self.dT + time_bar_2 * self.unit, error, doubt, a_end
         )
 
     def _shown(self, good, start, dT, error, doubt, a_end):

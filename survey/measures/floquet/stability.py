@@ -125,7 +125,7 @@ def exponents(answer, period):
 
 
 def wide_exponents(answer, period, rtol):
-    """Where (N) the exponent, if there is one, is not known to the asked accuracy."""
+    """Where (N) the exponent, if there is one, is not known to the requested accuracy."""
     found, off = exponents(answer, period)
     with np.errstate(invalid="ignore"):
         return off > rtol * (1 + abs(found))

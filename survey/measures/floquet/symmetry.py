@@ -43,7 +43,7 @@ class Symmetry:
 
     @cached_property
     def signs(self):
-        """Of the states, in the mirror (n)."""
+        """The signs of the states in the mirror (n)."""
         return np.where(np.isin(np.arange(self.n), self.odd), -1.0, 1.0)
 
     @cached_property
@@ -78,7 +78,7 @@ class Symmetry:
         return x
 
     def linearised(self, X, M, f, x, guess):
-        """What is to be 0 (N, n + 1), and its derivatives by (x(0), T), of X = x(T/2), M = dX/dx(0)
+        """What must vanish (N, n + 1), and its derivatives by (x(0), T), of X = x(T/2), M = dX/dx(0)
         and f there.
         """
         N, n, m = len(x), self.n, len(self.ends)
@@ -98,7 +98,7 @@ class Symmetry:
         ).any(axis=(1, 2))
 
     def block(self, matrices):
-        """Of matrices (N, n, n), the rows and columns of the states in which motions are judged."""
+        """The rows and columns of matrices (N, n, n) that belong to the states whose motions are judged."""
         own = np.array(self.transverse or range(self.n))
         return np.ascontiguousarray(matrices[:, own[:, None], own])
 

@@ -583,7 +583,8 @@ class Program:
             elif operation in ("product", "quotient"):
                 a, b = operands
             elif operation == "state":
-                a, first = operands[0], len(inside)
+                a = operands[0]
+                first = len(inside)
                 inside += [
                     pair
                     for pair in graph.flow[k].terms.items()
@@ -626,7 +627,7 @@ class Program:
         )
 
     def _order(self):
-        """Places of the basis functions that the entries need, each after those that it is made of.
+        """Nodes of the basis functions that the entries need, each after those that it is made of.
 
         States need lower orders alone, and so do functions of their derivatives, which come last: a
         derivative may be made of what is being visited, as that of y = sqrt x is of 1 / y.
@@ -751,7 +752,7 @@ class Program:
         return {k: found[k] for k in nodes}
 
     def needed(self, nodes):
-        """Places of what these basis functions are made of, in order."""
+        """Nodes of what these basis functions are made of, in order."""
         found = []
         begun = set()
 

@@ -102,7 +102,7 @@ def _exactly(problem, answers, points, asked, most):
 
 
 def closed_form(z, span):
-    """Results (..., 10), as of a chain, of y'' + z y = 0 over `span` with constant z: circular or
+    """Results (..., RESULTS), as of a chain, of y'' + z y = 0 over `span` with constant z: circular or
     hyperbolic.
     """
     rate = np.sqrt(abs(z))

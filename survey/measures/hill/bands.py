@@ -28,7 +28,7 @@ STEEP = {"exp": math.exp, "sinh": math.cosh, "cosh": math.cosh}
 
 
 class Bound(StandIn):
-    """Of an analytic function of u: its `size` and that of its imaginary part on the ellipse; on
+    """Bounds of an analytic function of u: its `size` and that of its imaginary part on the ellipse; on
     the interval itself its size, `real`, and its rounding, `off`.
     """
 

@@ -24,7 +24,7 @@ from survey.kernels.hill.cells import (
     HALVED_X,
     HALVED_Y,
     INDEX_X,
-    PLACE_Y,
+    INDEX_Y,
     STABLE_PART,
     UNSOLVED,
     UNSTABLE_PART,
@@ -76,7 +76,7 @@ class Side:
         return np.where(part == 0, self.low, np.where(part == 1, self.high, inside))
 
     def length(self, start, end):
-        """Of the side between two of its parts; nothing cancels."""
+        """The length of the side between two of its parts; nothing cancels."""
         if not self.log:
             return (self.high - self.low) * (end - start)
         rate = np.log(self.high / self.low)
@@ -171,7 +171,7 @@ def _first(depth):
     )
     blocks = np.empty((i.size, BLOCK), np.int64)
     blocks[:, HALVED_X], blocks[:, INDEX_X] = level[0], i
-    blocks[:, HALVED_Y], blocks[:, PLACE_Y] = level[1], j
+    blocks[:, HALVED_Y], blocks[:, INDEX_Y] = level[1], j
     return blocks
 
 
@@ -180,7 +180,7 @@ def _series(solve, x, y, blocks, of):
     the rest (B, 4, 3).
     """
     middle_x, radius_x = _spans(x, blocks[:, HALVED_X], blocks[:, INDEX_X])
-    middle_y, radius_y = _spans(y, blocks[:, HALVED_Y], blocks[:, PLACE_Y])
+    middle_y, radius_y = _spans(y, blocks[:, HALVED_Y], blocks[:, INDEX_Y])
     out = solve(
         (middle_x[:, None] + radius_x[:, None] * POINTS)[:, :, None],
         (middle_y[:, None] + radius_y[:, None] * POINTS)[:, None, :],
@@ -207,7 +207,7 @@ def _series(solve, x, y, blocks, of):
 
 
 def _spans(side, halved, index):
-    """Middle and half width of blocks, so often halved and at these places, along one side."""
+    """Middle and half width, along one side, of blocks halved `halved` times and numbered `index`."""
     part = 0.5**halved
     low, high = side.at(index * part), side.at((index + 1) * part)
     return 0.5 * (low + high), 0.5 * (high - low)

@@ -243,9 +243,9 @@ def _returns(x, new, t, home, heading, length, gone):
 
 def _joined(trail, ended, closed):
     """The paths: backwards to the seed and forwards from it, or once round."""
-    who, *values = (np.concatenate(parts) for parts in zip(*trail, strict=True))
-    order, n = np.argsort(who, kind="stable"), ended.size // 2
-    tips = np.split(order, np.cumsum(np.bincount(who, minlength=2 * n))[:-1])
+    which, *values = (np.concatenate(parts) for parts in zip(*trail, strict=True))
+    order, n = np.argsort(which, kind="stable"), ended.size // 2
+    tips = np.split(order, np.cumsum(np.bincount(which, minlength=2 * n))[:-1])
     paths = []
     for tip in range(n):
         forth, back = tips[tip], tips[tip + n][::-1]
@@ -294,14 +294,14 @@ def _close_all_in(solve, square, paths, starts, seeds, of_seed, each):
     sure = np.zeros(len(x), bool)
 
     def task(own):
-        def at(who, t, wanted):
-            here = square.parameters(x[own[who], None] + t[..., None] * line[own[who], None])
+        def at(which, t, wanted):
+            here = square.parameters(x[own[which], None] + t[..., None] * line[own[which], None])
             out = solve(here[..., 0].reshape(-1, 1), here[..., 1].reshape(-1, 1), wanted)
             return {name: values.reshape(t.shape) for name, values in out.items()}
 
         mine = kind[whose[own]]
         t, width, good = close_in(
-            lambda who, t: of_kind(at(who, t, FACTORS), mine[who]),
+            lambda which, t: of_kind(at(which, t, FACTORS), mine[which]),
             np.zeros(own.size), np.full(own.size, WIDE), np.full(own.size, square.grain),
         )  # fmt: skip
         sides = t[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])

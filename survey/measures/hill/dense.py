@@ -53,13 +53,13 @@ DEGREES = np.array(
 # A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
 ROWS_PER_NODE = 3
-# Of the asked accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
+# Of the requested accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
 # 4; those of a map are solved as well as can be.
 NODES_SHARE, BEST = 0.1, 1e-14
 # Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what
 # `_enough` looks at by 10^7 or so, on every row that was measured.
 FACTORS_SHARE = 1e-6
-# The share of the nodes known to the asked accuracy from which on a series serves.
+# The share of the nodes known to the requested accuracy from which on a series serves.
 MOST = 0.9
 RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
@@ -67,13 +67,14 @@ ANSWERS = frozenset({"discriminant", "exponent"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
 # The parts of the axis across points on their own: rows in each, of D and of factors, where more
 # terms are summed.
-ROWS_PER_PART, MOST_PARTS = (260, 130), 8
+ROWS_PER_PART = (260, 130)
+MOST_PARTS = 8
 # Points of a call that answers from factors: their temporaries stay in the processor's cache.
 CALL_POINTS = 8192
 
 
 @dataclass(frozen=True)
-class Sought:
+class ExpandedFunctions:
     """The functions that are expanded, as rows of `floats`: D, or the factors; and are rotation
     numbers wanted?
     """
@@ -101,8 +102,8 @@ def serves(problem, asked):
 def _sought(asked, factors_only=False):
     named = {name for name, wanted in zip(kernels.FLOATS, asked.wanted, strict=True) if wanted}
     if named <= ANSWERS and not factors_only:
-        return Sought((kernels.DISCRIMINANT,))
-    return Sought(tuple(kernels.FACTOR_ROWS.tolist()), "rotation_number" in named)
+        return ExpandedFunctions((kernels.DISCRIMINANT,))
+    return ExpandedFunctions(tuple(kernels.FACTOR_ROWS.tolist()), "rotation_number" in named)
 
 
 def compile_ahead(sample, no_rows, variables):
@@ -328,7 +329,7 @@ def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, ope
 
 
 def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points):
-    """Answer the points x of the rows from the series (FACTORS, R, n) of their factors, and `turns`
+    """Answer the points x of the rows from the series (FACTOR_COUNT, R, n) of their factors, and `turns`
     (TURNS, R, nodes).
     """
     padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
@@ -379,7 +380,8 @@ def _between(x, number, kept):
 
 def _discriminants(answers, rows, series, bars, x, nodal):
     """D of the rows from their series at x, in place, within `bars`, or within what is `nodal`."""
-    at_nodes, nodes = np.empty((len(series), 0)), 0
+    at_nodes = np.empty((len(series), 0))
+    nodes = 0
     if nodal is not None:
         bars = nodal.doubts
         at_nodes = _padded(nodal.bars)
@@ -396,7 +398,7 @@ def _padded(series):
 
 
 @dataclass(frozen=True)
-class Nodal:
+class NodalBounds:
     """How far D from series of R rows may be off: `doubts` (R), and `bars` (R, n) times Lagrange
     polynomials.
     """
@@ -405,7 +407,7 @@ class Nodal:
     bars: np.ndarray
 
     def of(self, rows):
-        return Nodal(self.doubts[rows], self.bars[rows])
+        return NodalBounds(self.doubts[rows], self.bars[rows])
 
     def between(self):
         """Bounds (R, n) half way from each node to the next."""
@@ -420,7 +422,7 @@ class Nodal:
         doubts, bars = (
             chebyshev.combined(values, weights) for values in (self.doubts[None], self.bars.T)
         )
-        return Nodal(doubt + doubts[0], bars.T)
+        return NodalBounds(doubt + doubts[0], bars.T)
 
 
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
@@ -491,7 +493,7 @@ def _across(turns, x):
 @lru_cache(maxsize=64)
 def panels(row_axis, method, rtol, axis, sought):
     """[(low, high, series (F, n, m), bounds (F), `turns` at nodes, (tails (F), bounds at nodes (F,
-    n)), `Nodal`)] of the panels of rows on which what is sought converges, the same for all blocks.
+    n)), `NodalBounds`)] of the panels of rows on which what is sought converges, the same for all blocks.
 
     The axis of rows is halved until it has converged to `rtol`, as long as all that is solved for
     it pays.
@@ -516,7 +518,7 @@ def panels(row_axis, method, rtol, axis, sought):
 
 def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     """((coefficients (F) of T_j in s by T_k in p, bounds (F), `turns` at nodes, tails and bounds
-    there, `Nodal`), or None where `rtol` is not met; rows solved, in `budget`).
+    there, `NodalBounds`), or None where `rtol` is not met; rows solved, in `budget`).
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
@@ -584,7 +586,7 @@ def _enough(kind, rtol):
 
 def _series(problem, method, rtol, rows, n, axis, sought):
     """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows),
-    and, of factors, the `turns` (TURNS, rows, n) there, NEAR to Y2_MOST; of D what is `Nodal`.
+    and, of factors, the `turns` (TURNS, rows, n) there, NEAR to Y2_MOST; of D the `NodalBounds`.
 
     If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 +
     y2') / 2, y1', y2 and, of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as
@@ -619,7 +621,7 @@ def _series(problem, method, rtol, rows, n, axis, sought):
         series, doubts = chebyshev.expand(values[DY2], chebyshev.odd_columns(x.size), ulps)
         expanded.append((series, 4 * doubts))
     series, doubts = (np.stack(of) for of in zip(*expanded, strict=True))
-    nodal = None if sought.factors else Nodal(doubts[0], at_nodes[0])
+    nodal = None if sought.factors else NodalBounds(doubts[0], at_nodes[0])
     return values, series, doubts + chebyshev.lebesgue(n if odd else x.size) * bars, turns, nodal
 
 

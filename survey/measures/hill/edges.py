@@ -52,7 +52,7 @@ def has_factors(scene):
 @dataclass
 class Edges:
     """Edges by row, ascending: `row`, `position`, its `error`, `kind` (of CLASSES), `index`; and
-    who is `complete`.
+    which rows are `complete`.
     """
 
     row: np.ndarray
@@ -171,8 +171,8 @@ def _zeros(series):
 def _close_in(solve, row, kind, x, radius, low, high):
     """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
 
-    def function(who, x):
-        return of_kind(on_rows(solve, row[who], x, FACTORS), kind[who])
+    def function(which, x):
+        return of_kind(on_rows(solve, row[which], x, FACTORS), kind[which])
 
     scale = max(abs(low), abs(high))
     x, width, sure = close_in(
@@ -224,7 +224,7 @@ def close_in(function, x, width, grain, widest=np.inf):
     """Sharpen simple zeros near x (n) on lines: (x, half width, certain), with opposite, certain
     signs at its ends.
 
-    `function(who, x)` gives the functions `who` (m indices into the lines) and their error bounds
+    `function(which, x)` gives the functions `which` (m indices into the lines) and their error bounds
     at x (m, 3); `grain` (n) is the rounding of x; zeros that are not certain between signs `widest`
     away are given up.
     """

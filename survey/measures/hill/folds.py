@@ -51,17 +51,17 @@ def find(solve, square, curves):
     radius = np.clip(np.hypot(*(curves.x[at + 1] - curves.x[at]).T), 1e-4 * LONGEST, LONGEST)
     kind = curves.kind[whose[at]]
 
-    def stationary(who, q, start, wider=1):
+    def stationary(which, q, start, wider=1):
         """(p, value, its bound, bound of p) where F(q, .) is stationary near p = start (m), on each
         panel; q (m, n).
         """
-        half = np.minimum(wider * radius[who], 0.5)
+        half = np.minimum(wider * radius[which], 0.5)
         middle = np.clip(start, half, 1 - half)
         p = (middle[:, None] + half[:, None] * X)[:, None]
         here = square.parameters(np.stack(np.broadcast_arrays(q[..., None], p), axis=-1))
         out = solve(here[..., 0, 0].reshape(-1, 1), here[..., 1].reshape(-1, NODES), FACTORS)
         f, bar = of_kind(
-            {name: values.reshape(*q.shape, NODES) for name, values in out.items()}, kind[who]
+            {name: values.reshape(*q.shape, NODES) for name, values in out.items()}, kind[which]
         )
         x, value, bar, off = _stationary(f, bar, ((start - middle) / half)[:, None])
         return (
@@ -72,7 +72,7 @@ def find(solve, square, curves):
         )
 
     q, width, sure = close_in(
-        lambda who, q: stationary(who, q, guess[who, 1])[1:3],
+        lambda which, q: stationary(which, q, guess[which, 1])[1:3],
         guess[:, 0],
         1e-3 * radius,
         np.full(at.size, square.grain),

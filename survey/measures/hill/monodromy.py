@@ -30,7 +30,8 @@ DECIDED = frozenset({"verdict", "exponent", "rotation_number", "discriminant"})
 # Points on their own from which on series pay.
 FEWEST = 4096
 # Seconds per point: points one by one, rows by series of their own, and maps by series.
-SECONDS, DENSE = (1.5e-6, 6e-7, 2e-7), 100
+SECONDS = (1.5e-6, 6e-7, 2e-7)
+DENSE = 100
 VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE, "marginal": MARGINAL}
 OUTPUTS = (
     Output("discriminant", "trace of the monodromy matrix over one period T", "D"),

@@ -248,7 +248,8 @@ def _polynomial(values):
     """The power series of the polynomial through the values, and the sizes; in integers, so exactly."""
     from mpmath.libmp import to_fixed
 
-    mp, nodes = context(), len(values)
+    mp = context()
+    nodes = len(values)
     power, last = _transforms(nodes)
     size = max(abs(value) for value in values)
     shift = PRECISION - (int(mp.mag(size)) if size else 0)

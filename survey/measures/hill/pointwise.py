@@ -192,7 +192,8 @@ def _calls(rows, starts, ends, steps, nodes):
         starts = np.repeat(starts, pieces) + most * number
         ends = np.minimum(ends, starts + most)
     total = np.cumsum(ends - starts)
-    most_rows, first = max(1, CALL_SAMPLES // (steps * nodes)), 0
+    most_rows = max(1, CALL_SAMPLES // (steps * nodes))
+    first = 0
     while first < rows.size:
         done = total[first - 1] if first else 0
         last = max(

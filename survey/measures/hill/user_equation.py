@@ -18,6 +18,7 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 from functools import cache, lru_cache
 from math import inf, isfinite, log, sqrt
 from types import SimpleNamespace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -273,8 +274,18 @@ def unprobed(z, points, edges, slack, size):
     return known
 
 
+class Measured(NamedTuple):
+    """What the steps of N points need of z on their P pieces: see `measured`."""
+
+    size: np.ndarray
+    rate: np.ndarray
+    scale: np.ndarray
+    rough: np.ndarray
+
+
 def measured(z, points, edges, period, slack, probes=PROBES):
-    """Of each piece `size` = max |z| and `rate` (N, P); of each point `scale` = B, NaN if z is not finite, and `rough`.
+    """The Measured of points: for each piece `size` = max |z| and `rate` (N, P); for each point
+    `scale` = B, NaN if z is not finite, and `rough`.
 
     With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ.
     `probes` as PROBES.
@@ -349,11 +360,11 @@ def measured(z, points, edges, period, slack, probes=PROBES):
     size, rate, noise, last, off = (a.reshape(shape) for a in (size, rate, noise, last, off))
     scale, off = size.max(axis=1), off.max(axis=1)
     known = np.maximum(scale, np.maximum(noise.max(axis=1), off) / ROUNDING)
-    return (
-        size,
-        rate,
-        np.where(off <= MIRRORED * scale, known, np.nan),
-        (last > ROUGH * size).any(axis=1),
+    return Measured(
+        size=size,
+        rate=rate,
+        scale=np.where(off <= MIRRORED * scale, known, np.nan),
+        rough=(last > ROUGH * size).any(axis=1),
     )
 
 

@@ -22,7 +22,7 @@ class Answers(answers.Answers):
         traces.measure(results, rtol, status.OVERFLOW, *self.all)
 
     def inaccurate(self, rtol):
-        """Whose error bounds exceed rtol (1 + |value|), or who has no answer (N)."""
+        """Which points have error bounds above rtol (1 + |value|), or no answer (N)."""
         a, a_bar, b, b_bar = self.floats[[SUM, SUM_BAR, PAIRS, PAIRS_BAR]]
         return ~((a_bar <= rtol * (1 + abs(a))) & (b_bar <= rtol * (1 + abs(b)))) | (
             self.status != status.OK

@@ -54,7 +54,8 @@ TOLERANCES = Ladder(
 FINEST = 1e-14
 # The least number of points in a row for which a series pays, and of points on their own: a panel
 # costs 30,000 of them.
-DENSE, MANY = 3 * NODES, 30_000
+DENSE = 3 * NODES
+MANY = 30_000
 # Keep a kernel call below about a second: steps, or points of an adaptive method.
 CALL_WORK, WALKS = 3_000_000, 500
 

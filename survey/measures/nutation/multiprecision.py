@@ -43,7 +43,7 @@ class NoMotion(Exception):
 
 
 def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
-    """Of an initial state: does it pass a pole, the number of wells, [{name: value, name_error:
+    """For an initial state: does it pass a pole, the number of wells, [{name: value, name_error:
     bound}] of its own.
 
     None where it stays open.
@@ -61,7 +61,8 @@ def of_integrals(level, a, b, ratio, sign):
 
 
 def _settled(solve):
-    before, digits = None, FIRST
+    before = None
+    digits = FIRST
     while digits <= MOST:
         with localcontext(Context(prec=digits, Emax=MAX_EMAX, Emin=MIN_EMIN)):
             try:
@@ -175,7 +176,7 @@ def _snapped(roots, a, b):
 
 
 def _real_roots(k, level, a, b):
-    """Of P (S2): u^4 + p u^2 + q u + r, k times; the real ones of those that matter."""
+    """The real roots that matter of P (S2): u^4 + p u^2 + q u + r, k times."""
     c1, c0 = TWO * a * b, level - a * a - b * b
     if k == 0:
         return _of_quadratic(HALF * c1 / -level, c0 / -level) if level else []
@@ -337,7 +338,7 @@ def pi():
 
 @cache
 def _pi(digits):
-    """Machin's formula, in whole numbers."""
+    """Machin's formula, in integers."""
     one = 10 ** (digits + 10)
 
     def arctan(n):

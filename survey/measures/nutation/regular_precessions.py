@@ -159,7 +159,7 @@ def _energy_ranges(l, s):  # noqa: E741
         return [("lesser", 0.0, min(equal, _pole(l - 3.0)) if l > 5.0 else equal)]
     if l < -1.0:
         return []
-    square = _less_thrice(l)
+    square = _one_minus_thrice(l)
     pole, rest = _pole(l + 3.0), np.sqrt(abs(square))
     if square > 0.0:
         inner = [("lesser", 0.0, l / (1.0 + rest))] if l >= 0.0 else []
@@ -169,7 +169,7 @@ def _energy_ranges(l, s):  # noqa: E741
     return [("lesser", 0.0, pole)]
 
 
-def _less_thrice(x):
+def _one_minus_thrice(x):
     """1 - 3 x, exact where terms cancel."""
     return (0.5 - x) + (0.5 - 2.0 * x)
 
@@ -184,7 +184,7 @@ def _partner(l, s):  # noqa: E741
 
     def at(x):
         with np.errstate(all="ignore"):
-            other = np.sqrt(np.maximum((l - x * x) / _less_thrice(s * x * x), 0.0))
+            other = np.sqrt(np.maximum((l - x * x) / _one_minus_thrice(s * x * x), 0.0))
         return np.where(np.isfinite(other), other, 0.0)
 
     return at

@@ -74,5 +74,6 @@ def _slope(state, parameters, _sin, _cos):
 
 def outcome(ends):
     """The discriminant and, as a user of an integrator would have it, the verdict by |D| > 2."""
-    discriminant = 2.0 * (2.0 * ends[:, 2] * ends[:, 5] - 1.0)
+    _cosine, _sine, y1, _dy1, _y2, dy2 = ends.T
+    discriminant = 2.0 * (2.0 * y1 * dy2 - 1.0)
     return {ERROR: discriminant, "verdict": (abs(discriminant) < 2.0).astype(int)}

@@ -85,7 +85,8 @@ def _slope(state, parameters, _sin, _cos):
 
 def outcome(ends):
     """The discriminant and, as a user of an integrator would have it, the verdict by |D| > 2."""
-    discriminant = 2 * (2 * ends[:, 2] * ends[:, 5] - 1)
+    _x, _slope_x, y1, _dy1, _y2, dy2 = ends.T
+    discriminant = 2 * (2 * y1 * dy2 - 1)
     return {
         ERROR: discriminant,
         "verdict": np.where(abs(discriminant) > 2, monodromy.UNSTABLE, monodromy.STABLE),
