@@ -325,7 +325,7 @@ def tongues(tmp_path_factory):
     return path
 
 
-def test_the_boundary_in_a_file_is_told_by_class_and_index(tongues):
+def test_the_boundary_in_a_file_is_chosen_by_class_and_index(tongues):
     ds = survey.open(tongues)
     edge = ds.survey.boundary(kind="even_periodic", index=2)
     off = abs(edge.a.values - special.mathieu_a(2, edge.q.values))

@@ -188,7 +188,7 @@ def test_verify_says_what_it_checks_without_a_digest(program, ran):
     ) and "small.nc: sound; 1 point solved again by" in found.stdout
 
 
-def test_a_single_point_and_block_are_told_as_one(program, small):
+def test_a_single_point_and_block_are_reported_as_one(program, small):
     words = [word for key in ("w0=0.5", "t=1.0") for word in ("--set", f"axes.{key}")]
     done = program("run", "small.toml", *words, "--set", "output.figures=[]")
     assert "gyrostat: 1 point in 1 block, 0 already done" in done.stderr, done.stderr

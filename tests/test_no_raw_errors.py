@@ -98,7 +98,7 @@ def test_every_question_is_answered_or_refused_in_a_line(name, ask, request):
             getattr(made.survey, ask)(*([made] if ask == "compare" else []))
 
 
-def test_what_is_no_survey_is_told(grid):
+def test_what_is_no_survey_is_reported(grid):
     with pytest.raises(BadInput, match=r"stacked along z: restore its axes with \.unstack"):
         grid.stack(z=("a", "q")).survey.map()
     with pytest.raises(BadInput, match="this is a dataset, not a workflow"):

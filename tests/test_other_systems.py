@@ -168,7 +168,7 @@ time.sleep(60)
 
 
 @pytest.mark.slow
-def test_a_second_run_is_told_whose_the_lock_is_and_a_killed_one_frees_it(start, tmp_path):
+def test_a_second_run_learns_whose_the_lock_is_and_a_killed_one_frees_it(start, tmp_path):
     holder = start("-c", HOLDER)
     assert holder.stdout.readline() == "held\n"
     said = start("-m", "survey", "run", "map.toml").communicate(timeout=120)[0]

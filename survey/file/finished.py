@@ -17,7 +17,7 @@ from survey.grid import coordinates
 
 # keys of a workflow that change no value of the file
 OF_PICTURES = ("output.path", "output.figures", "output.style")
-AGAIN = ("worker_died", "pending")  # points for which a run is repeated
+REPEATED = ("worker_died", "pending")  # points for which a run is repeated
 
 
 def attributes(path):
@@ -52,7 +52,7 @@ def _is_intact(path):
 
 def lost(found):
     """Does a file of these attributes have points for which the run should be repeated?"""
-    return any(counts_in(found).get("status", {}).get(name) for name in AGAIN)
+    return any(counts_in(found).get("status", {}).get(name) for name in REPEATED)
 
 
 def changes(found, workflow):

@@ -31,7 +31,7 @@ CHUNK, PART = 16384, 4096
 # terms of a cell's series, cells of a panel; points from which on cells pay
 CELLS, PIECES, FEW = 16, 4, 100_000
 SHORTER = 0.1  # of a cell's bound: what the degrees that are left out may add to it
-LOT = 2**20  # points that are sorted together
+BATCH = 2**20  # points that are sorted together
 MOST_CELLS = 2**16  # what their numbers (uint16) tell apart
 FINE = 2**14  # positions along a side, each in one cell
 # at most: of a member, of a series along a side, of all series
@@ -240,8 +240,8 @@ class Model:
 
     def _by_cells(self, x, y, out):
         left = [
-            self._cells.solve(x, y, out, slice(first, min(first + LOT, x.size)))
-            for first in range(0, x.size, LOT)
+            self._cells.solve(x, y, out, slice(first, min(first + BATCH, x.size)))
+            for first in range(0, x.size, BATCH)
         ]
         left = np.concatenate(left)
         if left.size:

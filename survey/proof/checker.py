@@ -276,7 +276,7 @@ class Panel:
         self.sides = [(exact((low + high) / 2), exact((high - low) / 2)) for low, high in sides]
         self.counts = [integer(n, 2, 40, "a number of nodes") for n in data["nodes"]]
         self.ellipses, self.rates = ([exact(rational(x)) for x in data[key]] for key in ("ellipses", "rates"))
-        need(all(r > 1 for r in self.ellipses) and all(w > 0 for w in self.rates), "an r <= 1, or a w <= 0")
+        need(all(r > 1 for r in self.ellipses) and all(w > 0 for w in self.rates), "each r must exceed 1, and each w 0")
         self.order = integer(data["order"], 2, 400, "an order")
         self.halves = [halving(n) for n in self.counts]
 
@@ -366,13 +366,13 @@ def walk(letters, parts, split):
     """(letter, part) of all parts that are not SPLIT into others; raises Failed unless there is a letter for each."""
     waiting = parts[::-1]
     for letter in letters:
-        need(waiting, "there are more cells or panels than cover the whole")
+        need(waiting, "there are more cells or panels than cover the rectangle")
         part = waiting.pop()
         if letter == SPLIT:
             waiting += split(part)
         else:
             yield letter, part
-    need(not waiting, "the cells or panels do not cover the whole")
+    need(not waiting, "the cells or panels do not cover the rectangle")
 
 
 def halved(region):

@@ -257,7 +257,7 @@ def test_the_homoclinic_curve_of_an_own_abel_equation():
     )
 
 
-def test_what_has_no_boundaries_is_told():
+def test_what_has_no_boundaries_is_reported():
     for match, keywords in (
         ("unknown parameter 'kk'", {"along": "kk", "rho": 1.0}),
         (r"a value of rho, or a range as rho=\(low, high\)", {"along": "rho", "k": 0.5}),

@@ -42,7 +42,7 @@ def test_a_flipped_bit_of_the_digest_is_found_and_mended(copy, small, place):
     assert reading.check(copy) == []
 
 
-def test_a_file_of_another_kind_is_told_from_a_damaged_one(copy, tmp_path):
+def test_a_file_of_another_kind_is_distinguished_from_a_damaged_one(copy, tmp_path):
     (tmp_path / "picture.nc").write_bytes(b"\x89PNG\r\n")
     with pytest.raises(BadInput, match=r"picture\.nc: this is not a netCDF file of survey"):
         survey.open(tmp_path / "picture.nc")
@@ -157,7 +157,7 @@ def _hold(path, ready, leave):
         leave.wait(30)
 
 
-def test_a_second_writer_is_told_who_holds_the_output_and_a_killed_holder_frees_it(tmp_path):
+def test_a_second_writer_learns_who_holds_the_output_and_a_killed_holder_frees_it(tmp_path):
     context = multiprocessing.get_context("spawn")
     ready, leave = context.Event(), context.Event()
     holder = context.Process(target=_hold, args=(tmp_path / "o.nc", ready, leave))
@@ -221,7 +221,7 @@ def test_a_block_under_another_number_or_of_another_survey_is_not_taken(tmp_path
         assert kept.intact() == {0}
 
 
-def test_a_clean_up_that_fails_is_told_and_done_by_the_next_run(small, tmp_path, monkeypatch):
+def test_a_clean_up_that_fails_is_reported_and_done_by_the_next_run(small, tmp_path, monkeypatch):
     path, rmdir = tmp_path / "o.nc", os.rmdir
 
     def refuse(folder, **_):

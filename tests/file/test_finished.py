@@ -86,7 +86,7 @@ def test_a_run_that_was_to_replace_it_is_resumed_without_asking_again(ran, small
     )
 
 
-def test_other_code_is_told(ran, small, monkeypatch):
+def test_other_code_is_reported(ran, small, monkeypatch):
     monkeypatch.chdir(ran.parent)
     _change(ran, fingerprint="old", version_numba="0.1")
     with pytest.raises(

@@ -111,7 +111,7 @@ def test_files_are_read_as_those_of_netcdf_itself(tmp_path):
 
 
 @pytest.mark.parametrize("at", [*range(0, 40, 3), 60, 160])
-def test_the_first_error_is_told_and_hdf5_hears_of_none(tmp_path, monkeypatch, at):
+def test_the_first_error_is_reported_and_hdf5_hears_of_none(tmp_path, monkeypatch, at):
     """From the at-th call on, the disk is full."""
     calls, write = 0, os.write
 

@@ -42,7 +42,7 @@ def refusal(small, *overrides):
     return str(refused.value)
 
 
-def test_what_is_left_is_told(left, small):
+def test_what_is_left_is_reported(left, small):
     answer = unfinished.summary("small.nc")
     assert (answer["blocks_done"], answer["blocks"], answer["points_done"], answer["points"]) == (
         3,
@@ -68,7 +68,7 @@ def test_what_is_left_is_told(left, small):
     )
 
 
-def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, monkeypatch):
+def test_the_command_that_began_is_reported_with_its_folder(left, small, tmp_path, monkeypatch):
     holder = json.loads((left / "holder.json").read_text())
     (left / "holder.json").write_text(
         json.dumps(holder | {"resume_command": "survey run small.toml --workers 2"})
@@ -81,7 +81,7 @@ def test_the_command_that_began_is_told_with_its_folder(left, small, tmp_path, m
     )
 
 
-def test_a_run_at_work_is_told_and_not_disturbed(left, small):
+def test_a_run_at_work_is_reported_and_not_disturbed(left, small):
     checked = workflow.read(small)
     with blocks.Blocks(checked.path, fingerprint.fingerprint(checked)) as kept:
         answer = unfinished.summary("small.nc")
@@ -104,7 +104,7 @@ def test_drift_names_the_keys_and_the_ways_on(left, small):
     assert survey.open("small.nc").attrs["blocks_reused"] == 0
 
 
-def test_other_code_is_told_plainly(left, small):
+def test_other_code_is_reported_plainly(left, small):
     manifest = json.loads((left / "manifest.json").read_text())
     manifest["code"]["survey"], manifest["kernels"] = "0.0.9", "old"
     (left / "manifest.json").write_text(json.dumps(manifest))
@@ -143,7 +143,7 @@ def test_without_a_manifest_blocks_of_another_survey_are_not_taken(left, small):
     assert not (left.parent / "small.nc.lock").exists()
 
 
-def test_blocks_of_an_older_format_are_kept_and_told(left, small):
+def test_blocks_of_an_older_format_are_kept_and_reported(left, small):
     """Format 2: the first line is a table of the arrays alone."""
     manifest = json.loads((left / "manifest.json").read_text())
     (left / "manifest.json").write_text(json.dumps(manifest | {"format": 2}))

@@ -86,7 +86,7 @@ def bars_hold(method):
     """With q = 5, over four periods: on every rung, each true error lies within its bar."""
     held = []
     frequency = np.sqrt(np.max(PROBLEM.bound[0, 0] + PROBLEM.p))
-    for steps in pointwise.STEPS.rungs[4:33]:
+    for steps in pointwise.STEP_COUNTS.rungs[4:33]:
         if frequency * PROBLEM.span[0] / steps > pointwise.LONGEST:
             continue
         out = fixed(method, int(steps))

@@ -88,7 +88,7 @@ def test_what_is_opened_is_one_file(tmp_path):
         survey.Model(3)
 
 
-def test_functions_are_told_of_keywords_and_files_of_their_names(tmp_path):
+def test_messages_name_keywords_of_functions_and_names_of_files(tmp_path):
     made = {"period": 6.0, "parameters": "a"}
     assert "even = 'yes': it must be True or False" in message(
         survey.hill, lambda u, p: p[0], even="yes", **made

@@ -56,7 +56,7 @@ def test_trajectory_fills_the_block():
     )
 
 
-def test_turning_points_beyond_what_an_int32_holds_are_not_told():
+def test_turning_points_beyond_what_an_int32_holds_are_not_counted():
     ds = survey.evaluate(
         "gyrostat",
         question="trajectory",

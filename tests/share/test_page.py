@@ -177,7 +177,7 @@ def test_hover_values_of_other_scenes_agree_with_evaluate_at_1000_places(name, t
 
 
 @browsed
-def test_the_pointer_is_told_what_is_there_with_its_bar(folder, driver):
+def test_the_pointer_shows_what_is_there_with_its_bar(folder, driver):
     from selenium.webdriver.common.actions.action_builder import ActionBuilder
 
     shown(driver, folder / "map.html")

@@ -220,7 +220,7 @@ def test_rows_through_the_separatrix(tmp_path, name, axis):
             np.testing.assert_array_equal(inside % 2 == 1, np.diff(verdicts) != 0)
 
 
-def test_what_is_left_out_across_the_rows_is_told(tmp_path):
+def test_what_is_left_out_across_the_rows_is_reported(tmp_path):
     axes = {
         "k": {"start": 0.8, "stop": 1.2, "num": 6},
         "rho": {"start": 1.0, "stop": 1.2, "num": 9},
@@ -248,7 +248,7 @@ def test_a_value_that_rounds_to_the_one_left_out(tmp_path):
 
 
 @pytest.mark.slow
-def test_lost_curves_are_told(tmp_path, capsys):
+def test_lost_curves_are_reported(tmp_path, capsys):
     """Edges of an oblate body near the separatrix lie closer together than float64 can follow."""
     (tmp_path / "lost.toml").write_text(
         'scene = "satellite"\noptions.body = "oblate"\naxes.rho = {start = 0.1, stop = 3.0, num = 5}\n'
@@ -338,7 +338,7 @@ def test_rows_whose_edges_are_known_are_kept_by_a_run_that_stops(path, tmp_path,
     xr.testing.assert_equal(again.drop_attrs(), xr.load_dataset(path).drop_attrs())
 
 
-def test_progress_of_several_maps_is_told_by_the_map():
+def test_progress_of_several_maps_is_reported_by_the_map():
     """And the curves, found on threads, are those of one map after another."""
     scene = survey.hill(
         lambda u, p: p[0] - 2.0 * p[1] * np.cos(2.0 * u) - p[2],

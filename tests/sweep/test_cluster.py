@@ -106,7 +106,7 @@ def test_a_cluster_gives_the_same_file(cluster, small, surveyed):
 
 
 @pytest.mark.slow
-def test_a_lost_scheduler_is_told_and_the_run_can_go_on(cluster, small):
+def test_a_lost_scheduler_is_reported_and_the_run_can_go_on(cluster, small):
     many = ("--set", "axes.w0.num=1000", "--set", "solver.method='dop853'")
     running = start(small.parent, cluster[0], *many)
     blocks = small.parent / "small.nc.blocks"
@@ -258,7 +258,7 @@ def test_a_cluster_with_tls(small, tmp_path, surveyed):
 
 
 @pytest.mark.slow
-def test_an_expired_certificate_is_told_in_one_line(small, tmp_path):
+def test_an_expired_certificate_is_reported_in_one_line(small, tmp_path):
     if not shutil.which("openssl"):
         pytest.skip("needs openssl")
     expired = certificate(tmp_path, "old", days=-1)

@@ -378,7 +378,7 @@ def test_workers_that_never_have_memory_stop_the_run(in_time, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_cluster_without_workers_is_told_and_waited_for(in_time, monkeypatch, caplog):
+def test_a_cluster_without_workers_is_reported_and_waited_for(in_time, monkeypatch, caplog):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(clusters, "WORKERLESS_SECONDS", 0.2)
     heard = Heard()
@@ -420,7 +420,7 @@ def slow(number):
     return number
 
 
-def test_no_scheduler_is_told_in_one_line(monkeypatch):
+def test_no_scheduler_is_reported_in_one_line(monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr(clusters, "SCHEDULER_SECONDS", 1)
     with pytest.raises(Stopped, match=r"no dask scheduler answers at 'tcp://127\.0\.0\.1:9'"):
@@ -429,7 +429,7 @@ def test_no_scheduler_is_told_in_one_line(monkeypatch):
         clusters.client_of("nonsense://x")
 
 
-def test_a_scheduler_file_that_is_none_is_told_in_one_line(tmp_path):
+def test_a_scheduler_file_that_is_none_is_reported_in_one_line(tmp_path):
     pytest.importorskip("distributed")
     with pytest.raises(BadInput, match=r"absent\.json: there is no such scheduler file"):
         clusters.client_of(str(tmp_path / "absent.json"))

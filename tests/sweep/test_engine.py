@@ -101,7 +101,7 @@ def test_a_large_file_is_opened_lazily_and_checked_piece_by_piece(small, tmp_pat
     xr.testing.assert_equal(ds.drop_attrs(), again.drop_attrs())
 
 
-def test_what_compiling_kernels_and_file_took_is_told_apart(surveyed, small, tmp_path):
+def test_what_compiling_kernels_and_file_took_is_reported_apart(surveyed, small, tmp_path):
     finished = engine.run(workflow.read(small, output=tmp_path / "o.nc"))
     assert (
         min(finished.compiling, finished.computing, finished.edges_and_cells, finished.writing) >= 0

@@ -76,7 +76,7 @@ def test_a_plan_says_what_it_knows_the_time_from(mapped):
     assert plan.plan(mapped)["time_from"] == plan.LEARNT
 
 
-def test_compiling_is_told_apart(mapped, monkeypatch):
+def test_compiling_is_reported_apart(mapped, monkeypatch):
     monkeypatch.setattr(plan, "cpus", lambda: 1)  # which compiles one kernel after another
     alone = plan.plan(mapped)["compiling"]
     assert alone == f"about {2 * announce.SECONDS['hill']} s besides, once on this machine"

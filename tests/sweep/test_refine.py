@@ -71,7 +71,7 @@ def test_no_cell_reaches_across_the_separatrix(path):
     assert touching.sum() > 60 and (ds.cell_verdict[touching] == -1).all()
 
 
-def test_the_areas_are_told_with_their_bounds(path):
+def test_the_areas_are_reported_with_their_bounds(path):
     ds = survey.open(path)
     total = 0.6 * 1.4
     assert float(ds.area.sum()) == pytest.approx(total) and float(

@@ -81,7 +81,7 @@ def test_what_is_held_is_not_solved_and_the_bits_are_the_same(
         ("axes.alpha=0.3", "no value of alpha that is needed here"),
     ],
 )
-def test_it_is_told_why_nothing_is_taken(brun, override, why):
+def test_the_reason_is_given_where_nothing_is_taken(brun, override, why):
     held, told = earlier.find(workflow.read(brun, [override], "new.nc"), "old.nc")
     assert held is None and re.search(why, told)
     over_it = workflow.read(brun, [override], "old.nc")

@@ -183,7 +183,7 @@ def test_what_is_not_read_yet_is_not_drawn_and_what_is_drawn_is_true(name, monke
     )
 
 
-def test_no_answer_by_nature_is_grey_and_told_by_its_status(tmp_path):
+def test_what_is_undefined_is_grey_and_named_by_its_status(tmp_path):
     """A map of Brun's problem: below the least effective potential there is no motion."""
     ds = survey.evaluate(
         "brun", l=np.linspace(-1, 1, 12), beta=np.linspace(-1, 1, 10), alpha=0.1, sign="1"
@@ -413,7 +413,7 @@ TEXTS = "return [...Bokeh.documents[0]._all_models.values()].filter(m => m.text 
 
 @served
 @browsed
-def test_in_a_browser_a_point_is_told_and_clicked_and_its_link_shows_the_same(tmp_path):
+def test_in_a_browser_a_point_is_described_and_clicked_and_its_link_shows_the_same(tmp_path):
     with picture.served(MAP) as (address, _), picture.browser() as driver:
         driver.get(address)
         picture.wait(driver)
@@ -526,7 +526,7 @@ def test_a_window_that_takes_too_long_is_refused(monkeypatch):
         finer.of_window(shown, view)
 
 
-def test_any_point_of_a_window_is_solved_and_told_in_python():
+def test_any_point_of_a_window_is_solved_and_given_in_python():
     shown = ShownMap(MAP)
     view = shown.read("var=exponent&" + FINE + "&point=0.8031,0.711")
     assert shown.coords(view) is None  # the map has no such point

@@ -469,7 +469,7 @@ def test_the_explanation_of_a_scene_is_what_a_page_needs(path):
 @pytest.mark.parametrize(
     "page", [ROOT / "README.md", DOCS / "overnight.md"], ids=lambda path: path.stem
 )
-def test_the_statuses_that_count_as_failed_are_told(page):
+def test_the_statuses_that_count_as_failed_are_reported(page):
     (listed,) = re.findall(r"Failed.*? are points with the status\s([^.]*)\.", page.read_text())
     failures = {
         name for name, code in status.CODES.items() if code in status.FAILURES and name != "pending"

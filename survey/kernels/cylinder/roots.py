@@ -32,6 +32,7 @@ _MARGIN = 1.0 + 1e-6
 _COSH = 1.6  # sin and cos on a circle about a real centre: cosh(2 r), r <= 0.5
 _MOST = 20_000  # pieces; some hundred are usual
 _NOISY = 4.0  # a disc of so many times the radius that rounding alone gives is not cut further
+_X, _X_LOW, _HALF = range(3)  # columns of the pieces that wait: the middle, half the width
 
 
 @kernel
@@ -46,7 +47,7 @@ def discs(p, found):
         return 0
     for top in range(_PIECES):
         half = 0.5 * TWO_PI / _PIECES
-        stack[top, 0], stack[top, 1], stack[top, 2] = (
+        stack[top, _X], stack[top, _X_LOW], stack[top, _HALF] = (
             _START + (2 * top + 1) * half,
             0.0,
             half * _WIDER,
@@ -54,7 +55,7 @@ def discs(p, found):
     top, work = _PIECES, 0
     while top > 0:
         top -= 1
-        middle, half = (stack[top, 0], stack[top, 1]), stack[top, 2]
+        middle, half = (stack[top, _X], stack[top, _X_LOW]), stack[top, _HALF]
         work += 1
         if held(found, count, middle, half, True) > 0.0:
             continue
@@ -90,7 +91,7 @@ def discs(p, found):
         radius *= 0.5
         for side in (1.0, -1.0):
             x = shifted(centre, side * radius)
-            stack[top, 0], stack[top, 1], stack[top, 2] = x[0], x[1], radius * _WIDER
+            stack[top, _X], stack[top, _X_LOW], stack[top, _HALF] = x[0], x[1], radius * _WIDER
             top += 1
     return count
 

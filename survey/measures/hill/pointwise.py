@@ -18,7 +18,9 @@ BOUNDS = slice(Y1_BAR, DY2_BAR + 1)
 # Numbers of steps: even, so that a half period's middle falls between steps; four to the octave
 # from 8 on. A point climbs to 1.4 times as many at least.
 _NUMBERS = np.array([4, 6, *((4 + i % 4) << (i // 4 + 1) for i in range(57))])
-STEPS = Ladder(_NUMBERS, np.searchsorted(_NUMBERS, 1.4 * _NUMBERS), BOUNDS, most=len(_NUMBERS))
+STEP_COUNTS = Ladder(
+    _NUMBERS, np.searchsorted(_NUMBERS, 1.4 * _NUMBERS), BOUNDS, most=len(_NUMBERS)
+)
 # Of adaptive methods: tolerances of a step, 10^(-3 - i / 2).
 TOLERANCES = Ladder(10.0 ** (-3 - 0.5 * np.arange(25)), np.arange(25) + 2, BOUNDS, most=25)
 # Keep a kernel call below about a second and its samples in the processor's cache.
@@ -54,7 +56,7 @@ def solve(problem, method, asked, answers, where=None):
 def _solve(problem, method, asked, answers, chosen):
     """The answers of the `chosen` points of the flat problem."""
     adaptive = methods.adaptive(method)
-    run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
+    run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEP_COUNTS)
     first = (
         _first_tolerance(problem, asked.rtol) if adaptive else _first_steps(problem, method, asked)
     )
@@ -103,7 +105,9 @@ def _first_steps(problem, method, asked):
     )
     steps = np.maximum(phase * frequency * problem.span, distance * problem.rate * problem.span)
     return np.where(
-        known & np.isfinite(steps)[:, None], np.searchsorted(STEPS.rungs, steps)[:, None], UNTRIED
+        known & np.isfinite(steps)[:, None],
+        np.searchsorted(STEP_COUNTS.rungs, steps)[:, None],
+        UNTRIED,
     )
 
 
@@ -121,7 +125,14 @@ def _first_tolerance(problem, rtol):
 def _first_rungs(problem, phase, distance):
     rung = np.empty(problem.p.shape, np.int64)
     first_rungs(
-        problem.p, problem.bound, problem.span, problem.rate, phase, distance, STEPS.rungs, rung
+        problem.p,
+        problem.bound,
+        problem.span,
+        problem.rate,
+        phase,
+        distance,
+        STEP_COUNTS.rungs,
+        rung,
     )
     return rung
 
@@ -154,7 +165,7 @@ def _chain(problem, method, rung, out):
     if jit.other_compiler:
         compose(np.empty((0, 0, 2, nodes.size)), np.empty((0, 0)), starts[:0], ends[:0])
     for at in np.flatnonzero(np.bincount(on_rung)):
-        steps, own = int(STEPS.rungs[at]), on_rung == at
+        steps, own = int(STEP_COUNTS.rungs[at]), on_rung == at
         segment = rows[own], starts[own], ends[own]
         for used, first, last in _calls(
             *(_by_point(*segment) if scattered else segment), steps, nodes.size
@@ -166,12 +177,12 @@ def _segments(rung):
     """(points by row and rung; row, rung, start and end of each segment), as `segments`."""
     size = rung.shape[1]
     if size and (rung == rung[:, :1]).all():  # nothing to sort within a row
-        rows = np.flatnonzero((rung[:, 0] >= 0) & (rung[:, 0] <= STEPS.top))
+        rows = np.flatnonzero((rung[:, 0] >= 0) & (rung[:, 0] <= STEP_COUNTS.top))
         return np.arange(rung.size), rows, rung[rows, 0], rows * size, (rows + 1) * size
-    most = rung.shape[0] * min(size, len(STEPS.rungs)) + 1
+    most = rung.shape[0] * min(size, len(STEP_COUNTS.rungs)) + 1
     order = np.empty(rung.size, np.int64)
     rows, on_rung, starts = (np.empty(most, np.int64) for _ in range(3))
-    count = segments(rung, STEPS.top, order, rows, on_rung, starts)
+    count = segments(rung, STEP_COUNTS.top, order, rows, on_rung, starts)
     return order, rows[:count], on_rung[:count], starts[:count], starts[1 : count + 1]
 
 

@@ -47,7 +47,7 @@ OUTPUTS = (
 )  # fmt: skip
 # Numbers of steps; a point climbs to 1.7 times as many. Of adaptive methods: tolerances of a step.
 _NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in range(49))])
-STEPS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
+STEP_COUNTS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
 TOLERANCES = Ladder(
     10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5
 )
@@ -128,7 +128,7 @@ def _point_by_point(e, d1, d2, method, rtol, results=None):
     """
     results = np.empty((e.size, RESULTS)) if results is None else results
     adaptive = methods.adaptive(method)
-    run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEPS)
+    run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEP_COUNTS)
     asked = max(rtol, FINEST)
     if adaptive:
         rung = np.full(e.size, np.searchsorted(-ladder.rungs, -0.01 * asked))

@@ -184,7 +184,7 @@ def test_no_resonance_is_missed():
     ]
 
 
-def test_nothing_is_told_outside_the_interval():
+def test_nothing_is_reported_outside_the_interval():
     mu = np.array([np.nan, 0.0, closed_forms.MU_R[0], 0.3])
     assert np.isnan(solved(closed_forms.closed_forms, mu)[0]).all()
     omega, nearest, distance = linear(mu)

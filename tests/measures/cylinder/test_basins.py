@@ -46,7 +46,7 @@ def compared(six, starts):
 @pytest.mark.parametrize(
     "systems, starts, seed", [(4, 150, 11), (400, 300, 12)], ids=["few", "many"]
 )
-def test_no_start_is_told_otherwise_than_it_ends(systems, starts, seed):
+def test_no_start_is_classified_otherwise_than_it_ends(systems, starts, seed):
     """Verdict, limit, turning points and turns, of starts over two turns and at rest; 120,000 of
     them where slow.
     """
@@ -117,7 +117,7 @@ def _torque(phi, p):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("point", [(0.5, -0.4), (0.3, 0.5)])
-def test_own_flows_are_told_alike(point):
+def test_own_flows_are_described_alike(point):
     """A user's f and g on the cylinder: the same door, the same fates as those followed."""
     (row,) = equation.flows(_damping, _torque, np.array([point]), True)
     random = np.random.default_rng(7)

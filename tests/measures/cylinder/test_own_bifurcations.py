@@ -168,7 +168,7 @@ def test_on_a_line_there_are_none():
 
 
 @pytest.mark.parametrize(("f1", "kind"), [(-1.0, "supercritical_hopf"), (1.0, "subcritical_hopf")])
-def test_hopf_points_are_told_apart_by_the_cycle_beside_them(f1, kind, monkeypatch):
+def test_hopf_points_are_classified_by_the_cycle_beside_them(f1, kind, monkeypatch):
     """phi'' = (a + f1 sin^2 phi) phi' - sin phi: with f1 < 0 an attracting libration is born where a > 0."""
     monkeypatch.setattr(connections, "found", lambda plane: [])
     monkeypatch.setattr(cycle_folds, "found", lambda plane: [])

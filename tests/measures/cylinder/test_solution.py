@@ -339,7 +339,7 @@ def test_turnings_of_a_pendulum():
 
 
 @pytest.mark.parametrize("six", [SIX, (0.4, 0.3, -0.9, 0.7, 1.1, 0.6)])
-def test_turnings_far_into_a_focus_are_told(six):
+def test_turnings_far_into_a_focus_are_reported(six):
     """Where w is far below rounding, down to e^-400, they are counted about the focus in polar
     coordinates.
     """

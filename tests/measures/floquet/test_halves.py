@@ -99,7 +99,7 @@ def test_what_a_phase_lacks_to_a_multiple_of_pi_counts_as_an_error_of_A():
     assert (abs(part.M - whole.M) <= part.E + whole.E).all()
 
 
-def test_points_without_damping_are_told_from_those_with_it():
+def test_points_without_damping_are_distinguished_from_those_with_it():
     A = oscillators(lambda t, p: math.cos(t), 1.0)
     p = np.array([[0.3, 0.1], [0.3, 0.0], [0.2, 0.2], [0.4, 0.0]])
     points = points_of(A, T, p)

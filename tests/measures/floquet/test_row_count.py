@@ -74,7 +74,7 @@ def test_segments_by_hand():
     assert row_count.unexplained(counts, [])[0] == 9
 
 
-def test_the_number_outside_is_certain_or_not_told():
+def test_the_number_outside_is_certain_or_left_open():
     M = np.array(
         [
             np.diag([2.0, 0.5]),

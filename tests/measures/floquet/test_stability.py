@@ -356,7 +356,7 @@ def test_multipliers_that_meet_with_one_krein_sign_are_stable(off):
     assert (other.krein.values[(other.verdict == -1).values] == 0).all()
 
 
-def test_the_reason_of_a_cluster_is_told():
+def test_the_reason_of_a_cluster_is_reported():
     ds = survey.evaluate(two_oscillators(1), a=[2.0], q=[0.1], off=0.0)
     assert "Krein signs are the same" in str(ds.survey.point(a=2.0, q=0.1))
 
