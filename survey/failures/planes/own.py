@@ -27,9 +27,9 @@ def _spikes(name, share):
     d = 10.0 ** width[None]
     c = 0.37
     d = np.minimum(d, 0.24 * min(c, 1 - c)) if "named" in name else d
-    words = "whose place is\na break" if "named" in name else "that is not\nnamed"
+    words = "whose position is\na break" if "named" in name else "that is not\nnamed"
     return Plane(
-        f"a spike {words}", logarithmic("half width of the spike, of $T$", width), plain("$a$", a), _scene(name),
+        f"a spike {words}", logarithmic("half width of the spike, over $T$", width), plain("$a$", a), _scene(name),
         {"a": a[:, None], "b": 2.0 / d, "c": c, "d": d}, user_equations.true(name),
         "z = a + 2 / (d + (u - 0.37)^2 / d). Truth: Taylor series of order 30 in double-double.", slow=("rk4",),
     )  # fmt: skip
@@ -38,7 +38,7 @@ def _spikes(name, share):
 def _breaks(share):
     gap, b = np.linspace(-15.0, -0.31, few(share, 20)), np.linspace(-200.0, 1000.0, few(share, 16))
     return Plane(
-        "a break beside\nthe start", logarithmic("place of the break, of $T$", gap), plain("$b$ behind it", b),
+        "a break beside\nthe start", logarithmic("position of the break, over $T$", gap), plain("$b$ behind it", b),
         _scene("meissner"), {"a": 3e4, "b": b[:, None], "c": 10.0 ** gap[None]}, user_equations.true("meissner"),
         "z = 3e4 before the break and b behind it. Truth: the closed form, 50 digits.",
     )  # fmt: skip
