@@ -71,12 +71,10 @@ def _shrunk(count, value, known, unknown):
     return known
 
 
-def kind(M, structure):
-    """How the multipliers nearest to the unit circle pass it."""
+def kinds(M, structure):
+    """How the multipliers nearest to the unit circle, of matrices (N, n, n), pass it (N)."""
     multipliers = np.linalg.eigvals(M)
-    angle = abs(np.angle(multipliers[abs(abs(multipliers) - 1.0).argmin()]))
-    if angle < REAL:
-        return PLUS_ONE
-    if angle > np.pi - REAL:
-        return MINUS_ONE
-    return NEIMARK_SACKER if structure == "none" else COLLISION
+    nearest = abs(abs(multipliers) - 1.0).argmin(axis=1)
+    angle = abs(np.angle(multipliers[np.arange(len(M)), nearest]))
+    pair = NEIMARK_SACKER if structure == "none" else COLLISION
+    return np.where(angle < REAL, PLUS_ONE, np.where(angle > np.pi - REAL, MINUS_ONE, pair))

@@ -96,3 +96,22 @@ def test_both_edges_of_a_tongue_between_two_points_of_the_lattice_are_found():
         for Omega in ([0.5 * (first + second)], [first - 1e-5, second + 1e-5])
     )
     assert inside == [0] and outside == [1, 1]
+
+
+def test_other_multipliers_outside_are_not_those_that_pass_too():
+    """Beside a curve that two pairs pass together both are outside the circle, or on it: how many
+    others are outside where they pass is not known, and was said to be 2.
+    """
+
+    def K(t, p, out):
+        out[0, 0] = out[1, 1] = p[0] - 0.2 * p[1]
+
+    scene = survey.floquet(
+        K=K, period=1.0, parameters=("a", "b"), states=("x", "y"), structure="symplectic"
+    )
+    axes = {"a": {"start": -0.5, "stop": 0.7, "num": 3}, "b": {"start": 0.0, "stop": 1.0, "num": 3}}
+    ds = boundaries.find(check({"scene": scene, "axes": axes, "boundaries": {}}))
+    assert ds.curve_point.size > 100
+    off = abs(ds.curve_a - 0.2 * ds.curve_b)
+    assert (off <= 1.4 * ds.curve_position_error + 1e-15).all()
+    assert np.isnan(ds.curve_outside).all()
