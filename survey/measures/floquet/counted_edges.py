@@ -27,6 +27,7 @@ def edges(count, kind_of, values, ticks, found, grain):
     the kind of an edge; no position is known better than to within `grain`.
     """
     missing = []
+    passed = []
     for first, last in _lost(values, ticks, found):
         parts = [(ticks[first], values[first], ticks[last], values[last])]
         while parts:
@@ -39,7 +40,8 @@ def edges(count, kind_of, values, ticks, found, grain):
             low, high = _shrunk(count, below, low, at), _shrunk(count, above, high, at)
             middle = 0.5 * (low + high)
             missing.append((kind_of(middle), middle, 0.5 * (high - low) + grain))
-    everything = found + [(kind, x) for kind, x, _error in missing for _ in range(2)]
+            passed += [missing[-1][:2]] * max(abs(above - below), 2)  # perhaps together
+    everything = found + passed
     return missing, len(_lost(values, ticks, everything))
 
 
