@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.measures.floquet import row_count
+from survey.measures.floquet.multipliers import UNDECIDED
 from survey.measures.segments import UNKNOWN, segments
 
 SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
@@ -80,7 +81,8 @@ def counted(outside, kinds_of, counts, drawn):
 
     `outside(positions (N, 2))` is the number of multipliers outside the unit circle, `counts`
     (n, n) its values on the lattice, both UNKNOWN where it is not certain, and `kinds_of(positions)`
-    the kinds (N) of curves there. A curve that several multipliers pass together is found once.
+    the kinds (N) of curves there, or UNDECIDED, where there are none. A curve that several
+    multipliers pass together is found once.
     """
     weights = row_count.WEIGHTS
     found = _missing(outside, None, counts, list(drawn), weights, kinds_of, together=True)
@@ -112,6 +114,7 @@ def _missing(index, passes, passed, own, weights, kinds_of, together=False):
         if not segments.line.size:
             continue
         kinds = kinds_of(_positions(segments, axis, ticks))
+        segments, kinds = segments[kinds != UNDECIDED], kinds[kinds != UNDECIDED]
         for x, error, kind, number in _linked(segments, kinds, axis, ticks, together):
             found.append((x, error, kind, number))
             own += [(kind, x)] * number

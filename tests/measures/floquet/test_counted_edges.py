@@ -158,3 +158,17 @@ def test_five_that_pass_together_are_one_edge_and_no_more_is_missing():
     found = survey.edge(five, along="a", a=(-1.0, 1.0))
     assert found.edge.size == 1 and abs(found.edge[0] - 0.1) <= found.edge_error[0]
     assert "complete" not in found.attrs
+
+
+def test_past_a_pole_two_multipliers_jump_and_do_not_pass():
+    """Both are e^(c / a), inside for a < 0 and outside for a > 0: no edge, and one is said to be missing."""
+
+    def A(t, p, out):
+        out[0, 0], out[1, 1] = 1e-3 / p[0] + cos(t), 1e-3 / p[0] + cos(2 * t)
+
+    found = survey.edge(
+        survey.floquet(A, period=2 * pi, parameters="a", states=("x", "y")),
+        along="a",
+        a=(-1.0, 1.5),
+    )
+    assert found.edge.size == 0 and found.attrs["complete"] == 0
