@@ -11,7 +11,13 @@ what is left.
 import numpy as np
 
 from survey.measures.floquet import row_count
-from survey.measures.floquet.multipliers import COLLISION, MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
+from survey.measures.floquet.multipliers import (
+    COLLISION,
+    MINUS_ONE,
+    NEIMARK_SACKER,
+    PLUS_ONE,
+    UNDECIDED,
+)
 from survey.measures.segments import UNKNOWN, along
 
 SHARES = (0.5, 0.31, 0.69)  # of a part: where it is cut, the first at which the number is known
@@ -24,9 +30,10 @@ def edges(count, kind_of, values, ticks, found, grain):
     position)], and along how many parts of the axis the number is still unexplained.
 
     `count(position)` is the number, or UNKNOWN, `values` that at the `ticks`, `kind_of(position)`
-    the kind of an edge; no position is known better than to within `grain`.
+    the kind of an edge, or UNDECIDED, where there is none; no position is known better than to within `grain`.
     """
     missing = []
+    passed = []
     for first, last in _lost(values, ticks, found):
         parts = [(ticks[first], values[first], ticks[last], values[last])]
         while parts:
@@ -38,8 +45,11 @@ def edges(count, kind_of, values, ticks, found, grain):
                 continue
             low, high = _shrunk(count, below, low, at), _shrunk(count, above, high, at)
             middle = 0.5 * (low + high)
-            missing.append((kind_of(middle), middle, 0.5 * (high - low) + grain))
-    everything = found + [(kind, x) for kind, x, _error in missing for _ in range(2)]
+            if (kind := kind_of(middle)) == UNDECIDED:
+                continue
+            missing.append((kind, middle, 0.5 * (high - low) + grain))
+            passed += [missing[-1][:2]] * max(abs(above - below), 2)  # perhaps together
+    everything = found + passed
     return missing, len(_lost(values, ticks, everything))
 
 
@@ -71,12 +81,17 @@ def _shrunk(count, value, known, unknown):
     return known
 
 
-def kind(M, structure):
-    """How the multipliers nearest to the unit circle pass it."""
-    multipliers = np.linalg.eigvals(M)
-    angle = abs(np.angle(multipliers[abs(abs(multipliers) - 1.0).argmin()]))
-    if angle < REAL:
-        return PLUS_ONE
-    if angle > np.pi - REAL:
-        return MINUS_ONE
-    return NEIMARK_SACKER if structure == "none" else COLLISION
+def kinds(M, structure):
+    """How the multipliers nearest to the unit circle, of matrices (N, n, n), pass it (N); UNDECIDED
+    where a matrix is not finite, as at a pole, past which they jump.
+    """
+    found = np.full(len(M), UNDECIDED)
+    finite = np.flatnonzero(np.isfinite(M).all(axis=(1, 2)))
+    multipliers = np.linalg.eigvals(M[finite])
+    nearest = abs(abs(multipliers) - 1.0).argmin(axis=1)
+    angle = abs(np.angle(multipliers[np.arange(finite.size), nearest]))
+    pair = NEIMARK_SACKER if structure == "none" else COLLISION
+    found[finite] = np.where(
+        angle < REAL, PLUS_ONE, np.where(angle > np.pi - REAL, MINUS_ONE, pair)
+    )
+    return found

@@ -46,6 +46,7 @@ BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))
 TRIED_OF_ORBITS = TRIED[::2]  # which take long
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
+BEST = 1e-12  # the position error above which M may differ along it by more than its bounds
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
 
 
@@ -103,7 +104,13 @@ def searched(scene, square, axes, fixed, options):
         return function(*roughly(x))
 
     def draw(kind, x, error, counted=False):
-        sure, angle, bar, outside = bifurcations.passing(*matrices(x, RTOL)[:2], kind, structure)
+        M, E = matrices(x, RTOL)[:2]
+        sure, angle, bar, outside = bifurcations.passing(M, E, kind, structure)
+        if (rough := np.flatnonzero(error > BEST)).size:
+            about = _about(matrices, x[rough], error[rough], M[rough], E[rough])
+            there, _angle, wide, others = bifurcations.passing(*about, kind, structure)
+            bar[rough] = np.where(there, np.maximum(bar[rough], wide), bar[rough])
+            outside[rough] = np.where(others == outside[rough], others, np.nan)
         if counted:  # it is a curve, though several multipliers that pass together may be uncertain
             angle, bar, outside = (np.where(sure, one, np.nan) for one in (angle, bar, outside))
             sure = np.ones_like(sure)
@@ -162,12 +169,13 @@ def searched(scene, square, axes, fixed, options):
         def beyond(x):
             return row_count.known(row_count.outside(*matrices(x, RTOL)[:2], structure))
 
-        def kind_of(x):
-            return counted_edges.kind(matrices(x[None], RTOL)[0][0], structure)
+        def kinds_of(x):
+            return counted_edges.kinds(matrices(x, RTOL)[0], structure)
 
-        for kind, x, error in narrow.counted(beyond, kind_of, row_count.known(counts), drawn):
+        known = row_count.known(counts)
+        for kind, x, error, number in narrow.counted(beyond, kinds_of, known, drawn):
             draw(kind, x, error + square.grain, counted=True)
-            drawn += [(kind, x)] * 2  # perhaps of two that pass together: see `segments`
+            drawn += [(kind, x)] * max(number, 2)  # perhaps of those that pass together
     curves = joined(found, [output.name for output in ALONG])
     curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
     return curves
@@ -187,7 +195,7 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
         return row_count.known(row_count.outside(*matrices(on_line(x), RTOL)[:2], structure))[0]
 
     def kind_of(x):
-        return counted_edges.kind(matrices(on_line(x), RTOL)[0][0], structure)
+        return counted_edges.kinds(matrices(on_line(x), RTOL)[0], structure)[0]
 
     own = [
         (kind, x)
@@ -255,6 +263,19 @@ def matrices_of(scene, square, axes, fixed, options, method="auto"):
         )
 
     return matrices
+
+
+def _about(matrices, x, error, M, E):
+    """M and bounds that contain, besides E, how M differs within the `error` (N) of positions x (N,
+    2), along either axis.
+    """
+    for axis in range(x.shape[1]):
+        for side in (-1.0, 1.0):
+            there = x.copy()
+            there[:, axis] = np.clip(there[:, axis] + side * error, 0.0, 1.0)
+            other, bar = matrices(there, RTOL)[:2]
+            E = np.maximum(E, abs(other - M) + bar)
+    return M, E
 
 
 def _solved(scene, square, axes, fixed, options, method, variables):

@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.measures.floquet import row_count
+from survey.measures.floquet.multipliers import UNDECIDED
 from survey.measures.segments import UNKNOWN, segments
 
 SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
@@ -70,25 +71,28 @@ def curves(index, function, passed, kind, drawn):
         return abs(function(x)[0]) <= ZERO
 
     own = [one for one in drawn if one[0] == kind]
-    return [piece[:2] for piece in _missing(index, passes, passed, own, {}, lambda x: kind)]
+    pieces = _missing(index, passes, passed, own, {}, lambda x: np.full(len(x), kind))
+    return [piece[:2] for piece in pieces]
 
 
-def counted(outside, kind_of, counts, drawn):
-    """[(kind, positions (m, 2), errors (m))] of all curves that are missing among those `drawn`
-    [(kind, positions)].
+def counted(outside, kinds_of, counts, drawn):
+    """[(kind, positions (m, 2), errors (m), how many may pass together)] of all curves that are
+    missing among those `drawn` [(kind, positions)].
 
     `outside(positions (N, 2))` is the number of multipliers outside the unit circle, `counts`
-    (n, n) its values on the lattice, both UNKNOWN where it is not certain, and `kind_of(position)`
-    the kind of a curve there. A curve that several multipliers pass together is found once.
+    (n, n) its values on the lattice, both UNKNOWN where it is not certain, and `kinds_of(positions)`
+    the kinds (N) of curves there, or UNDECIDED, where there are none. A curve that several
+    multipliers pass together is found once.
     """
-    found = _missing(outside, None, counts, list(drawn), row_count.WEIGHTS, kind_of)
-    once = {x.tobytes(): (kind, x, error) for x, error, kind in found}
-    return list(once.values())
+    weights = row_count.WEIGHTS
+    found = _missing(outside, None, counts, list(drawn), weights, kinds_of, together=True)
+    return [(kind, x, error, number) for x, error, kind, number in found]
 
 
-def _missing(index, passes, passed, own, weights, kind_of):
-    """[(positions (m, 2), errors (m), kind)] of curves that are missing among its `own` [(kind,
-    positions)], to which they are added.
+def _missing(index, passes, passed, own, weights, kinds_of, together=False):
+    """[(positions (m, 2), errors (m), kind, number)] of curves that are missing among its `own`
+    [(kind, positions)], to which they are added `number` times, once for each step of the index if
+    all are one curve, `together`.
     """
     found = []
     ticks = np.linspace(0.0, 1.0, len(passed))
@@ -106,9 +110,14 @@ def _missing(index, passes, passed, own, weights, kind_of):
             continue
         if passes:
             segments = segments[passes(_positions(segments, axis, ticks))]
-        for x, error in _linked(segments, axis, ticks):
-            found.append((x, error, kind_of(x[len(x) // 2])))
-            own.append((found[-1][2], x))
+        segments = segments[np.diff(segments.ends)[:, 0] <= 2 * SURE]
+        if not segments.line.size:
+            continue
+        kinds = kinds_of(_positions(segments, axis, ticks))
+        segments, kinds = segments[kinds != UNDECIDED], kinds[kinds != UNDECIDED]
+        for x, error, kind, number in _linked(segments, kinds, axis, ticks, together):
+            found.append((x, error, kind, number))
+            own += [(kind, x)] * number
     return found
 
 
@@ -153,22 +162,26 @@ def _positions(segments, axis, ticks):
     return x if axis == 0 else x[:, ::-1]
 
 
-def _linked(segments, axis, ticks):
-    """[(positions (m, 2), errors (m))] of points on neighbouring lines at which the index takes the
-    same step.
+def _linked(segments, kinds, axis, ticks, together):
+    """[(positions (m, 2), errors (m), kind, number)] of points of one of the `kinds` (S) on
+    neighbouring lines at which the index takes the same step, or all its steps `together`.
     """
     middle = segments.ends.mean(axis=1)
     error = 0.5 * np.diff(segments.ends)[:, 0]
     low = segments.index.min(axis=1)
     number = abs(np.diff(segments.index))[:, 0]
-    number[error > SURE] = 0
-    k = np.repeat(np.arange(len(number)), number)
-    step = low[k] + np.arange(k.size) - np.repeat(np.cumsum(number) - number, number)
-    line, middle, error = segments.line[k], middle[k], error[k]
+    if together:
+        line, step = segments.line, np.zeros_like(number)
+    else:
+        k = np.repeat(np.arange(len(number)), number)
+        step = low[k] + np.arange(k.size) - np.repeat(np.cumsum(number) - number, number)
+        line, middle, error, kinds = segments.line[k], middle[k], error[k], kinds[k]
+        number = np.ones_like(k)
     pieces = []
     for i in np.lexsort((middle, line)):
-        near = [piece for piece in pieces if line[piece[-1]] == line[i] - 1 and step[piece[-1]] == step[i]
-                and abs(middle[piece[-1]] - middle[i]) <= ASIDE * ticks[1]]  # fmt: skip
+        lasts = [(piece, piece[-1]) for piece in pieces]
+        near = [piece for piece, last in lasts if line[last] == line[i] - 1 and step[last] == step[i]
+                and kinds[last] == kinds[i] and abs(middle[last] - middle[i]) <= ASIDE * ticks[1]]  # fmt: skip
         if near:
             min(near, key=lambda piece: abs(middle[piece[-1]] - middle[i])).append(i)
         else:
@@ -176,6 +189,11 @@ def _linked(segments, axis, ticks):
     pieces = [piece for piece in pieces if len(piece) > 1]
     points_of = [np.stack([middle[piece], ticks[line[piece]]], axis=1) for piece in pieces]
     return [
-        (x if axis == 0 else x[:, ::-1].copy(), error[piece])
+        (
+            x if axis == 0 else x[:, ::-1].copy(),
+            error[piece],
+            int(kinds[piece[0]]),
+            int(number[piece].max()),
+        )
         for x, piece in zip(points_of, pieces, strict=True)
     ]

@@ -11,7 +11,7 @@ way.
 
 import numpy as np
 
-from survey.measures.floquet import monodromy
+from survey.measures.floquet import monodromy, multipliers
 from survey.measures.floquet.multipliers import COLLISION, NEIMARK_SACKER, Discs
 from survey.measures.segments import UNKNOWN, segments
 
@@ -30,6 +30,9 @@ def outside(M, E, structure):
         if structure != "none":
             within |= discs.on_circle
         certain = (beyond | within).all(axis=1)
+        if structure == "symplectic":  # of one Krein sign, and so on the circle
+            within |= multipliers.clusters(discs, np.flatnonzero(~certain)) != 0
+            certain = (beyond | within).all(axis=1)
         found[i : i + CHUNK] = np.where(certain, beyond.sum(axis=1), -1)
     return found
 

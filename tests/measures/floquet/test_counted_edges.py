@@ -96,3 +96,79 @@ def test_both_edges_of_a_tongue_between_two_points_of_the_lattice_are_found():
         for Omega in ([0.5 * (first + second)], [first - 1e-5, second + 1e-5])
     )
     assert inside == [0] and outside == [1, 1]
+
+
+def test_other_multipliers_outside_are_not_those_that_pass_too():
+    """Beside a curve that two pairs pass together both are outside the circle, or on it: how many
+    others are outside where they pass is not known, and was said to be 2.
+    """
+
+    def K(t, p, out):
+        out[0, 0] = out[1, 1] = p[0] - 0.2 * p[1]
+
+    scene = survey.floquet(
+        K=K, period=1.0, parameters=("a", "b"), states=("x", "y"), structure="symplectic"
+    )
+    axes = {"a": {"start": -0.5, "stop": 0.7, "num": 3}, "b": {"start": 0.0, "stop": 1.0, "num": 3}}
+    ds = boundaries.find(check({"scene": scene, "axes": axes, "boundaries": {}}))
+    assert ds.curve_point.size > 100
+    off = abs(ds.curve_a - 0.2 * ds.curve_b)
+    assert (off <= 1.4 * ds.curve_position_error + 1e-15).all()
+    assert np.isnan(ds.curve_outside).all()
+
+
+def gyroscopes():
+    """q'' + g (q2', -q1') = k q, twice, in canonical coordinates: stable where g^2 > 4 k, on whose
+    edge two pairs of multipliers collide in either.
+    """
+
+    def A(t, p, out):
+        half = 0.5 * p[0]
+        for i in (0, 2):
+            for at in (i, i + 4):
+                out[at, at + 1], out[at + 1, at] = -half, half
+            for at in (i, i + 1):
+                out[at, at + 4] = 1.0
+                out[at + 4, at] = p[1] - half * half
+
+    return survey.floquet(
+        A, period=0.5, parameters=("g", "k"), states=list("abcdABCD"), structure="symplectic"
+    )
+
+
+def test_two_equal_collisions():
+    """Of one Krein sign, equal multipliers are known to be on the circle where they do not collide."""
+    edge = survey.edge(gyroscopes(), along="g", g=(0.5, 4.0), k=1.0)
+    assert edge.edge_class.values.tolist() == [4]  # collision
+    assert abs(edge.edge[0] - 2.0) <= edge.edge_error[0] < 1e-6
+    axes = {"g": {"start": 0.5, "stop": 4.0, "num": 3}, "k": {"start": 0.2, "stop": 2.0, "num": 3}}
+    ds = boundaries.find(check({"scene": gyroscopes(), "axes": axes, "boundaries": {}}))
+    assert ds.curve_class.values.tolist() == [4] and ds.curve_point.size > 90
+    off = abs(ds.curve_g - 2.0 * np.sqrt(ds.curve_k))
+    assert (off <= (3.5 + 1.8 / 0.4) * ds.curve_position_error).all()
+    assert "curves_unexplained" not in ds.attrs
+
+
+def test_five_that_pass_together_are_one_edge_and_no_more_is_missing():
+    def A(t, p, out):
+        for i in range(5):
+            out[i, i] = p[0] - 0.1 + cos((i + 1) * t)
+
+    five = survey.floquet(A, period=2 * pi, parameters="a", states=list("vwxyz"))
+    found = survey.edge(five, along="a", a=(-1.0, 1.0))
+    assert found.edge.size == 1 and abs(found.edge[0] - 0.1) <= found.edge_error[0]
+    assert "complete" not in found.attrs
+
+
+def test_past_a_pole_two_multipliers_jump_and_do_not_pass():
+    """Both are e^(c / a), inside for a < 0 and outside for a > 0: no edge, and one is said to be missing."""
+
+    def A(t, p, out):
+        out[0, 0], out[1, 1] = 1e-3 / p[0] + cos(t), 1e-3 / p[0] + cos(2 * t)
+
+    found = survey.edge(
+        survey.floquet(A, period=2 * pi, parameters="a", states=("x", "y")),
+        along="a",
+        a=(-1.0, 1.5),
+    )
+    assert found.edge.size == 0 and found.attrs["complete"] == 0
