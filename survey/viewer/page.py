@@ -432,8 +432,8 @@ class Page:
         coords, survey = self.map.coords(self.view), self.map.ds.survey
         try:
             if coords is None:
-                coords = {}
                 survey = finer.of_point(self.map, self.view).survey
+                coords = {}  # which stays None where that is refused
             drawn = Figure(figsize=(6.8, 3.6), layout="constrained")
             survey.trajectory(figure=drawn, **coords)
             self.motion.text = widgets.picture(drawn)

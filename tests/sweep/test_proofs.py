@@ -169,7 +169,7 @@ def test_satellites_agree_with_the_map(body):
     sides = [[Fraction(end) for end in side] for side in made.rectangle]
     found = []
     for place, panel in zip(
-        checker.places(sides, {"across": [1, 1], "layout": layout}), panels, strict=True
+        checker.regions(sides, {"across": [1, 1], "layout": layout}), panels, strict=True
     ):
         cells = checker.walk(panel["cells"], [place], checker.halved)
         found += [

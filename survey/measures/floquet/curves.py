@@ -76,9 +76,10 @@ def refusal(axes, scene, options=None):
 
 def searched(scene, square, axes, fixed, options):
     """The Curves on the map of `axes`, the unit square `square`; `fixed` holds the other parameters."""
+    names = [output.name for output in ALONG]
     if scene.FAMILY == "orbit":
         if scene.symmetry is None:
-            return joined(scene.curves(square, axes, fixed), [output.name for output in ALONG])
+            return joined(scene.curves(square, axes, fixed), names)
         structure = "reversible"
         number = LINES_OF_ORBITS
         orbits = scene.family(square, axes, fixed, number)
@@ -89,103 +90,128 @@ def searched(scene, square, axes, fixed, options):
         structure, number, roughly = scene.structure, LINES, None
         matrices = matrices_of(scene, square, axes, fixed, options)
         on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
-    found = []
     n = on_lattice[0].shape[1]
-    functions = (
+    functions = list(  # several of one kind, where a scene has one for each edge
         scene.functions(n)
         if hasattr(scene, "functions")
         else bifurcations.functions(n, structure).items()
     )
-
-    def on_map(function, x):
-        return function(*matrices(x, RTOL))
-
-    def nearly(function, x):
-        return function(*roughly(x))
-
-    def draw(kind, x, error, counted=False):
-        M, E = matrices(x, RTOL)[:2]
-        sure, angle, bar, outside = bifurcations.passing(M, E, kind, structure)
-        if (rough := np.flatnonzero(error > BEST)).size:
-            about = _about(matrices, x[rough], error[rough], M[rough], E[rough])
-            there, _angle, wide, others = bifurcations.passing(*about, kind, structure)
-            bar[rough] = np.where(there, np.maximum(bar[rough], wide), bar[rough])
-            outside[rough] = np.where(others == outside[rough], others, np.nan)
-        if counted:  # it is a curve, though several multipliers that pass together may be uncertain
-            angle, bar, outside = (np.where(sure, one, np.nan) for one in (angle, bar, outside))
-            sure = np.ones_like(sure)
-        for part in contours.runs(sure):
-            known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
-            found.append((kind, square.parameters(x[part]), error[part], known))
-
+    drawing = _Drawing(square, matrices, structure)
     for kind, function in functions:
-        values, bars = function(*on_lattice)
-        # where no sign is certain all around, as where the function is 0 throughout, there is only
-        # noise
-        open_ = ~(abs(values) > bars).reshape(number, -1)
-        around = np.ones((3, 3 if square.across is None else 1))
-        values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
-        lines = _lines if square.across is None else partial(_crossings, across=square.across)
-        sharp, values = partial(on_map, function), values.reshape(open_.shape)
-        if roughly is None:
-            pieces = lines(sharp, square.grain, values)
-        else:
-            pieces = lines(partial(nearly, function), square.grain, values, TRIED_OF_ORBITS)
-            pieces = _sharpened(sharp, pieces, square.grain)
-        for x, error in pieces:
-            draw(kind, x, error)
+        for x, error in _zeros(drawing, function, roughly, on_lattice, number):
+            drawing.add(kind, x, error)
     if square.across is not None and scene.FAMILY == "orbit":  # whose family may end in between
-        return joined(found, [output.name for output in ALONG])
+        return joined(drawing.found, names)
+    indices = _indices(scene, square, axes) if structure == "symplectic" else {}
+    solved = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *indices.values()])
     if square.across is not None:
-        names = _indices(scene, square, axes) if structure == "symplectic" else {}
-        of_axis = _solved(
-            scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()]
-        )
-        indices = partial(of_axis, rtol=ROUGH), names
-        return _on_border(square, matrices, indices, structure, on_lattice, found)
-    drawn = [(kind, square.positions(parameters)) for kind, parameters, _error, _known in found]
-    passed = {}
-    names = _indices(scene, square, axes) if structure == "symplectic" else {}
-    indices = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *names.values()])
-    on_lines = indices(contours.lattice(number), ROUGH) if names else {}
-    for kind, name in names.items():
-
-        def index(x, name=name):
-            return indices(x, ROUGH)[name]
-
-        passed[kind] = on_lines[name].reshape(number, number)
-        for x, error in narrow.curves(
-            index, partial(on_map, dict(functions)[kind]), passed[kind], kind, drawn
-        ):
-            draw(kind, x, error + square.grain)
-            drawn.append((kind, x))
+        return _on_border(drawing, on_lattice, partial(solved, rtol=ROUGH), indices)
+    passed = _add_by_indices(drawing, dict(functions), partial(solved, rtol=ROUGH), indices, number)
     if len(on_lattice) > 2:
         passed = {
             kind: one.reshape(number, number) for kind, one in scene.passed(*on_lattice[2:]).items()
         }
     counts = row_count.outside(*on_lattice[:2], structure).reshape(number, number)
     if scene.FAMILY != "orbit":
-
-        def beyond(x):
-            return row_count.known(row_count.outside(*matrices(x, RTOL)[:2], structure))
-
-        def kinds_of(x):
-            return counted_edges.kinds(matrices(x, RTOL)[0], structure)
-
-        known = row_count.known(counts)
-        for kind, x, error, number in narrow.counted(beyond, kinds_of, known, drawn):
-            draw(kind, x, error + square.grain, counted=True)
-            drawn += [(kind, x)] * max(number, 2)  # perhaps of those that pass together
-    curves = joined(found, [output.name for output in ALONG])
-    curves.unexplained = row_count.unexplained(counts, drawn, passed)[0]
+        _add_by_number(drawing, row_count.known(counts))
+    curves = joined(drawing.found, names)
+    curves.unexplained = row_count.unexplained(counts, drawing.drawn, passed)[0]
     return curves
 
 
-def _on_border(square, matrices, indices, structure, on_lattice, found):
-    """The Curves at the border that alone is asked for, with the edges that the number of
-    multipliers outside the unit circle and the `indices`, {name: values} of positions and {kind:
-    name}, show besides.
+class _Drawing:
+    """The curves `found` on a map so far, as `joined` takes them, and `drawn`: [(kind, positions)],
+    as often as they may explain a count.
     """
+
+    def __init__(self, square, matrices, structure):
+        self.square, self.matrices, self.structure = square, matrices, structure
+        self.found = []
+        self.drawn = []
+
+    def add(self, kind, x, error, copies=1, counted=False):
+        """Add what is certain of a curve of positions x (N, 2) within `error` (N), or all of it if
+        it is `counted`, though several multipliers that pass together may be uncertain.
+        """
+        M, E = self.matrices(x, RTOL)[:2]
+        sure, angle, bar, outside = bifurcations.passing(M, E, kind, self.structure)
+        if (rough := np.flatnonzero(error > BEST)).size:
+            about = _about(self.matrices, x[rough], error[rough], M[rough], E[rough])
+            there, _angle, wide, others = bifurcations.passing(*about, kind, self.structure)
+            bar[rough] = np.where(there, np.maximum(bar[rough], wide), bar[rough])
+            outside[rough] = np.where(others == outside[rough], others, np.nan)
+        if counted:
+            angle, bar, outside = (np.where(sure, one, np.nan) for one in (angle, bar, outside))
+            sure = np.ones_like(sure)
+        for part in contours.runs(sure):
+            known = {"angle": (angle[part], bar[part]), "outside": (outside[part], 0.0 * bar[part])}
+            self.found.append((kind, self.square.parameters(x[part]), error[part], known))
+            self.drawn += [(kind, x[part])] * copies
+
+
+def _zeros(drawing, function, roughly, on_lattice, number):
+    """[(positions (m, 2), errors (m))] of the curves on which a function of M is 0."""
+    values, bars = function(*on_lattice)
+    square = drawing.square
+    # where no sign is certain all around, as where the function is 0 throughout, there is only noise
+    open_ = ~(abs(values) > bars).reshape(number, -1)
+    around = np.ones((3, 3 if square.across is None else 1))
+    values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
+    values = values.reshape(open_.shape)
+    lines = _lines if square.across is None else partial(_crossings, across=square.across)
+
+    def sharp(x):
+        return function(*drawing.matrices(x, RTOL))
+
+    def nearly(x):
+        return function(*roughly(x))
+
+    if roughly is None:
+        return lines(sharp, square.grain, values)
+    return _sharpened(sharp, lines(nearly, square.grain, values, TRIED_OF_ORBITS), square.grain)
+
+
+def _add_by_indices(drawing, functions, solved, indices, number):
+    """Add the curves that the Maslov `indices`, {kind: name}, show besides; returns {kind: the index
+    on the lattice}.
+    """
+    on_lattice = solved(contours.lattice(number)) if indices else {}
+    passed = {kind: on_lattice[name].reshape(number, number) for kind, name in indices.items()}
+    for kind, name in indices.items():
+
+        def index(x, name=name):
+            return solved(x)[name]
+
+        def function(x, kind=kind):
+            return functions[kind](*drawing.matrices(x, RTOL))
+
+        missing = narrow.curves(index, function, passed[kind], kind, drawing.drawn)
+        for x, error in missing:
+            drawing.add(kind, x, error + drawing.square.grain)
+    return passed
+
+
+def _add_by_number(drawing, counts):
+    """Add the curves that the number of multipliers outside the unit circle shows besides, `counts`
+    (n, n) on the lattice.
+    """
+
+    def outside(x):
+        return row_count.known(row_count.outside(*drawing.matrices(x, RTOL)[:2], drawing.structure))
+
+    def kinds_of(x):
+        return counted_edges.kinds(drawing.matrices(x, RTOL)[0], drawing.structure)
+
+    for kind, x, error, copies in narrow.counted(outside, kinds_of, counts, drawing.drawn):
+        # two at least: perhaps they pass together
+        drawing.add(kind, x, error + drawing.square.grain, max(copies, 2), counted=True)
+
+
+def _on_border(drawing, on_lattice, solved, indices):
+    """The Curves at the border that alone is asked for, with the edges that the number of
+    multipliers outside the unit circle and the Maslov `indices`, {kind: name}, show besides.
+    """
+    square, matrices, structure = drawing.square, drawing.matrices, drawing.structure
 
     def on_line(x):
         x = np.atleast_1d(x)
@@ -197,6 +223,7 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
     def kind_of(x):
         return counted_edges.kinds(matrices(on_line(x), RTOL)[0], structure)[0]
 
+    found = drawing.found
     own = [
         (kind, x)
         for kind, parameters, _error, _known in found
@@ -205,9 +232,8 @@ def _on_border(square, matrices, indices, structure, on_lattice, found):
     number = row_count.known(row_count.outside(*on_lattice[:2], structure))
     ticks = np.linspace(0.0, 1.0, number.size)
     counted = [(outside, kind_of, number, CLASSES.values())]
-    solved, names = indices
-    on_ticks = solved(on_line(ticks)) if names else {}
-    for kind, name in names.items():
+    on_ticks = solved(on_line(ticks)) if indices else {}
+    for kind, name in indices.items():
 
         def index(x, name=name):
             return solved(on_line(x))[name][0]

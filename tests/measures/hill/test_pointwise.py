@@ -5,7 +5,7 @@ import numpy as np
 from survey.kernels.hill.answers import UNTRIED, first_rungs, segments
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Asked
-from survey.measures.hill.pointwise import LONGEST, STEPS
+from survey.measures.hill.pointwise import LONGEST, STEP_COUNTS
 from survey.methods import taylor16
 
 RNG = np.random.default_rng(3)
@@ -30,7 +30,7 @@ def test_rows_that_come_together_take_the_steps_of_their_fastest_point():
         rows["rate"],
         max(phase, 1 / LONGEST),
         distance,
-        STEPS.rungs,
+        STEP_COUNTS.rungs,
         single,
     )
     wanted = np.where(single == UNTRIED, UNTRIED, single.max(axis=1, keepdims=True))
@@ -41,15 +41,15 @@ def test_rows_that_come_together_take_the_steps_of_their_fastest_point():
     np.testing.assert_array_equal(together, wanted)
     assert (
         (wanted == UNTRIED).any()
-        and (wanted == len(STEPS.rungs)).any()
+        and (wanted == len(STEP_COUNTS.rungs)).any()
         and len(np.unique(wanted)) > 20
     )
 
 
 def test_rows_with_the_same_steps_are_not_sorted_and_come_out_the_same():
-    rung = np.repeat(RNG.integers(-1, len(STEPS.rungs) + 1, (200, 1)), 5, axis=1)
+    rung = np.repeat(RNG.integers(-1, len(STEP_COUNTS.rungs) + 1, (200, 1)), 5, axis=1)
     order, *parts = (np.empty(rung.size, np.int64) for _ in range(4))
-    count = segments(rung, len(STEPS.rungs) - 1, order, *parts)
+    count = segments(rung, len(STEP_COUNTS.rungs) - 1, order, *parts)
     rows, on_rung, starts = (part[:count] for part in parts)
     found = pointwise._segments(rung)
     points = [found[0][first:last].tolist() for first, last in zip(*found[3:], strict=True)]

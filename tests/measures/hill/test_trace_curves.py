@@ -97,10 +97,15 @@ def test_narrow_tongues_and_bands_are_drawn_whole():
         assert (off <= ds.curve_position_error.values + 1e-13)[kind == code].all()
 
 
-def test_a_missing_curve_is_noticed(monkeypatch):
-    """By the number of edges that verdict and rotation number count."""
+def test_a_missing_curve_is_found_by_counting_or_noticed(monkeypatch):
+    """By the number outside the circle; by the number of edges that verdict and rotation number count."""
+    whole = curves(SHIFTED)
     lines = trace_curves.curves._lines
     monkeypatch.setattr(trace_curves.curves, "_lines", lambda *args: lines(*args)[1:])
+    found = curves(SHIFTED)
+    assert "curves_unexplained" not in found.attrs
+    assert sorted(found.curve_class.values) == sorted(whole.curve_class.values)
+    monkeypatch.setattr(trace_curves.curves.narrow, "counted", lambda *args: [])
     assert curves(SHIFTED).attrs["curves_unexplained"] > 0
 
 
