@@ -25,32 +25,27 @@ HALVINGS = 60
 REAL = 1e-3  # rad: arguments of multipliers that count as real
 
 
-def edges(count, kind_of, values, ticks, found, grain):
+def edges(count, kinds_of, values, ticks, found, grain):
     """[(kind, position, its error)] of edges that are missing among those `found` [(kind,
     position)], and along how many parts of the axis the number is still unexplained.
 
-    `count(position)` is the number, or UNKNOWN, `values` that at the `ticks`, `kind_of(position)`
-    the kind of an edge, or UNDECIDED, where there is none; no position is known better than to within `grain`.
+    `count(positions (N))` is the number (N), or UNKNOWN, `values` that at the `ticks`,
+    `kinds_of(positions)` the kind of edges, or UNDECIDED, where there is none; no position is known
+    better than to within `grain`.
     """
-    missing = []
-    passed = []
-    for first, last in _lost(values, ticks, found):
-        parts = [(ticks[first], values[first], ticks[last], values[last])]
-        while parts:
-            low, below, high, above = parts.pop()
-            at, value = _cut(count, low, high) if high - low > grain else (low, UNKNOWN)
-            if value != UNKNOWN:
-                parts += [(low, below, at, value)] if value != below else []
-                parts += [(at, value, high, above)] if value != above else []
-                continue
-            low, high = _shrunk(count, below, low, at), _shrunk(count, above, high, at)
-            middle = 0.5 * (low + high)
-            if (kind := kind_of(middle)) == UNDECIDED:
-                continue
-            missing.append((kind, middle, 0.5 * (high - low) + grain))
-            passed += [missing[-1][:2]] * max(abs(above - below), 2)  # perhaps together
-    everything = found + passed
-    return missing, len(_lost(values, ticks, everything))
+    lost = np.array(_lost(values, ticks, found), int).reshape(-1, 2)
+    ends, numbers, between = _halved(count, ticks[lost], values[lost], grain)
+    order = np.argsort(between)
+    ends, numbers, between = ends[order], numbers[order], between[order]
+    sides = [_shrunk(count, numbers[:, side], ends[:, side], between) for side in (0, 1)]
+    middle, half = 0.5 * (sides[0] + sides[1]), 0.5 * (sides[1] - sides[0])
+    kinds = kinds_of(middle) if middle.size else np.zeros(0, int)
+    # two at least: perhaps they pass together
+    copies = np.maximum(abs(np.diff(numbers)[:, 0]), 2)
+    known = np.flatnonzero(kinds != UNDECIDED)
+    missing = [(int(kinds[i]), float(middle[i]), float(half[i] + grain)) for i in known]
+    passed = [missing[k][:2] for k, i in enumerate(known) for _ in range(copies[i])]
+    return missing, len(_lost(values, ticks, found + passed))
 
 
 def _lost(values, ticks, found):
@@ -59,25 +54,54 @@ def _lost(values, ticks, found):
     return [segment for segment, good in explained.items() if not good]
 
 
-def _cut(count, low, high):
-    """(a position between, the number there), known at one of SHARES if possible."""
-    for share in SHARES:
-        at = low + share * (high - low)
-        if (value := count(at)) != UNKNOWN:
-            return at, value
-    return low + SHARES[0] * (high - low), UNKNOWN
+def _halved(count, ends, numbers, grain):
+    """(ends (m, 2), the numbers there (m, 2), a position in between (m)) of parts in which the number
+    is nowhere known, halved from parts along which it changes.
+    """
+    done = []
+    while len(ends):
+        between = ends @ [1.0 - SHARES[0], SHARES[0]]
+        number = np.full(len(ends), UNKNOWN)
+        for share in SHARES:
+            some = np.flatnonzero((number == UNKNOWN) & (np.diff(ends)[:, 0] > grain))
+            if some.size:
+                at = ends[some] @ [1.0 - share, share]
+                number[some] = count(at)
+                known = some[number[some] != UNKNOWN]
+                between[known] = at[number[some] != UNKNOWN]
+        known = number != UNKNOWN
+        done.append((ends[~known], numbers[~known], between[~known]))
+        ends, numbers = (
+            np.concatenate([_with(own, side, new) for side in (0, 1)])
+            for own, new in ((ends[known], between[known]), (numbers[known], number[known]))
+        )
+        changes = numbers[:, 0] != numbers[:, 1]
+        ends, numbers = ends[changes], numbers[changes]
+    if not done:
+        return np.zeros((0, 2)), np.zeros((0, 2), int), np.zeros(0)
+    return tuple(np.concatenate(list(part)) for part in zip(*done, strict=True))
 
 
-def _shrunk(count, value, known, unknown):
-    """The position nearest to `unknown`, from `known` on, up to which the number has this value."""
+def _with(pairs, side, new):
+    """The pairs (m, 2) with `new` (m) at one side."""
+    pairs = pairs.copy()
+    pairs[:, side] = new
+    return pairs
+
+
+def _shrunk(count, numbers, known, unknown):
+    """The positions nearest to `unknown` (m), from `known` (m) on, up to which the number is that of
+    `numbers` (m).
+    """
+    known, unknown = known.copy(), unknown.copy()
     for _ in range(HALVINGS):
         middle = 0.5 * (known + unknown)
-        if middle in (known, unknown):
+        some = np.flatnonzero((middle != known) & (middle != unknown))
+        if not some.size:
             break
-        if count(middle) == value:
-            known = middle
-        else:
-            unknown = middle
+        same = count(middle[some]) == numbers[some]
+        known[some[same]] = middle[some[same]]
+        unknown[some[~same]] = middle[some[~same]]
     return known
 
 

@@ -214,14 +214,13 @@ def _on_border(drawing, on_lattice, solved, indices):
     square, matrices, structure = drawing.square, drawing.matrices, drawing.structure
 
     def on_line(x):
-        x = np.atleast_1d(x)
         return np.stack([x, np.full(x.size, square.across)], axis=1)
 
     def outside(x):
-        return row_count.known(row_count.outside(*matrices(on_line(x), RTOL)[:2], structure))[0]
+        return row_count.known(row_count.outside(*matrices(on_line(x), RTOL)[:2], structure))
 
-    def kind_of(x):
-        return counted_edges.kinds(matrices(on_line(x), RTOL)[0], structure)[0]
+    def kinds_of(x):
+        return counted_edges.kinds(matrices(on_line(x), RTOL)[0], structure)
 
     found = drawing.found
     own = [
@@ -231,23 +230,28 @@ def _on_border(drawing, on_lattice, solved, indices):
     ]
     number = row_count.known(row_count.outside(*on_lattice[:2], structure))
     ticks = np.linspace(0.0, 1.0, number.size)
-    counted = [(outside, kind_of, number, CLASSES.values())]
+    counted = [(outside, kinds_of, number, CLASSES.values())]
     on_ticks = solved(on_line(ticks)) if indices else {}
     for kind, name in indices.items():
 
         def index(x, name=name):
-            return solved(on_line(x))[name][0]
+            return solved(on_line(x))[name]
 
-        counted.append((index, lambda x, kind=kind: kind, on_ticks[name], (kind,)))
+        def own_kind(x, kind=kind):
+            return np.full(x.size, kind)
+
+        counted.append((index, own_kind, on_ticks[name], (kind,)))
     unknown = {output.name: (np.array([np.nan]), np.array([np.nan])) for output in ALONG}
     lost = 0
-    for count, kind, values, kinds in counted:
+    for count, kinds_at, values, kinds in counted:
         some = [one for one in own if one[0] in kinds]
-        missing, left = counted_edges.edges(count, kind, values, ticks, some, square.grain)
+        missing, left = counted_edges.edges(count, kinds_at, values, ticks, some, square.grain)
         lost += left
         for name, x, error in missing:
             own.append((name, x))
-            found.append((name, square.parameters(on_line(x)), np.array([error]), unknown))
+            found.append(
+                (name, square.parameters(on_line(np.array([x]))), np.array([error]), unknown)
+            )
     curves = joined(found, [output.name for output in ALONG])
     curves.complete = False if lost else None
     return curves
