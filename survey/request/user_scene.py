@@ -92,7 +92,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
-from itertools import product
+from itertools import product, zip_longest
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -619,15 +619,15 @@ def _function(
     what: str,
     refuse: Callable[[str], NoReturn],
 ) -> None:
-    """Refuse a value that is not a function of these arguments, or has one of these names in
-    another position.
+    """Refuse a value that cannot be called with these arguments, or has one of these names in
+    another position; further arguments have defaults.
     """
     call = f"{letter}({', '.join(arguments)})"
     count = {2: "two", 3: "three", 4: "four"}[len(arguments)]
-    if not callable(function) or _arguments(function) != len(arguments):
+    if not callable(function) or not _takes(function, len(arguments)):
         refuse(f"{letter} must be a function of {count} arguments, {call}{what}")
     own = list(inspect.signature(getattr(function, "py_func", function)).parameters)
-    if any(mine in arguments and mine != right for mine, right in zip(own, arguments, strict=True)):
+    if any(mine in arguments and mine != right for mine, right in zip_longest(own, arguments)):
         refuse(f"{letter}({', '.join(own)}): its arguments come in the order {call}; change it")
 
 
@@ -1031,10 +1031,21 @@ def _symbol(name: str) -> str:
 
 
 def _arguments(z: Any) -> int:
+    """The number of arguments without defaults; 0 if it cannot be known."""
     try:
-        return len(inspect.signature(getattr(z, "py_func", z)).parameters)
+        given = inspect.signature(getattr(z, "py_func", z)).parameters.values()
     except (TypeError, ValueError):
         return 0
+    return sum(one.default is one.empty for one in given)
+
+
+def _takes(function: Any, number: int) -> bool:
+    """Can it be called with so many arguments?"""
+    try:
+        inspect.signature(getattr(function, "py_func", function)).bind(*[None] * number)
+    except (TypeError, ValueError):
+        return False
+    return True
 
 
 def _names(code: CodeType) -> list[str]:

@@ -268,3 +268,18 @@ def test_a_file_or_function_that_says_nothing_gives_its_name_to_the_title(tmp_pa
     assert survey.hill(pendulum, **made).TITLE == "pendulum: y'' + z(u, p) y = 0"
     assert survey.hill(lambda u, p: p[0] + p[1], **made).TITLE == "y'' + z(u, p) y = 0"
     assert survey.hill(pendulum, title="Own", **made).TITLE == "Own"
+
+
+def test_further_arguments_have_defaults():
+    """As those of functions made in a loop: each keeps its own number."""
+
+    def value(z):
+        scene = survey.hill(z, period=2 * np.pi, parameters=("a", "q"))
+        return float(survey.evaluate(scene, a=1.3, q=0.4).discriminant)
+
+    one, two = (
+        value(lambda u, p, rate=rate: p[0] + p[1] * np.cos(rate * u)) for rate in (1.0, 2.0)
+    )
+    assert abs(one - value(lambda u, p: p[0] + p[1] * np.cos(u))) < 1e-11
+    assert abs(two - value(lambda u, p: p[0] + p[1] * np.cos(2 * u))) < 1e-11
+    assert abs(one - two) > 1e-3
