@@ -14,7 +14,6 @@ import gc
 import hashlib
 import inspect
 import os
-import time
 from functools import cache
 from pathlib import Path
 
@@ -135,25 +134,9 @@ def is_first(work):
     return True
 
 
-# At a first use, waits for the process that compiles further kernels for this one (see
-# `sweep.compile_ahead`).
-other_compiler = None
-waited = 0.0
-
-
-def wait_for_other_compiler():
-    """Wait for the other process that compiles: it will be done sooner than if this one began now."""
-    global waited
-    wait = other_compiler
-    if wait is not None:
-        began = time.perf_counter()
-        wait()
-        waited = max(waited, time.perf_counter() - began)  # threads wait side by side
-
-
 def compile_seconds():
-    """Seconds in which this process has compiled kernels so far, or waited for another that does."""
-    return waited + (_COMPILING.duration if _COMPILING.done else 0.0)
+    """Seconds in which this process has compiled kernels so far."""
+    return _COMPILING.duration if _COMPILING.done else 0.0
 
 
 _FLAGS = {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}

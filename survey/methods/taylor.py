@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from survey.kernels import jit
+from survey import waiting
 from survey.kernels.body import motion
 from survey.kernels.cylinder import (
     basins,
@@ -129,11 +129,11 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
         return
     ahead = np.zeros((len(P), lockstep_phi.STATE))
     # compile the longer one, by a call on nothing, while that process compiles the other
-    if jit.other_compiler:
+    if waiting.other_compiler:
         _abels_in_time(
             P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0]
         )
-        jit.wait_for_other_compiler()
+        waiting.wait()
     _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
 

@@ -42,7 +42,6 @@ import psutil
 from survey import grid, modules, scenes
 from survey.errors import BadInput
 from survey.file.labels import provenance
-from survey.kernels.jit import compile_seconds
 from survey.measures.cylinder import basins, fate
 from survey.measures.floquet import dense as floquet
 from survey.measures.hill import dense
@@ -52,6 +51,7 @@ from survey.precision.cases import own_file
 from survey.request import ranges
 from survey.request.checks import check_options, check_parameters, methods_of
 from survey.scene import Request, exists
+from survey.waiting import compile_seconds
 
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
 REPEATS = 5

@@ -6,6 +6,7 @@ import contextlib
 import subprocess
 import sys
 
+from survey import waiting
 from survey.kernels import jit
 from survey.sweep.dispatch import cpus
 
@@ -35,11 +36,11 @@ def compiling_ahead(scene, request):
         return
     command = [sys.executable, "-c", program(ahead, request)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
-        jit.other_compiler = process.stdout.readline  # a line, or the end
+        waiting.other_compiler = process.stdout.readline  # a line, or the end
         try:
             yield
         finally:
-            jit.other_compiler = None
+            waiting.other_compiler = None
             process.kill()
 
 

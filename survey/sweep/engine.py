@@ -15,7 +15,6 @@ from survey import status
 from survey.file import disk
 from survey.file.blocks import Blocks
 from survey.file.labels import counts_in, layout
-from survey.kernels.jit import compile_seconds
 from survey.sweep import cluster, dispatch, edges_and_cells, measured
 from survey.sweep.assembly import Assembly
 from survey.sweep.compile_ahead import compiling_ahead
@@ -24,6 +23,7 @@ from survey.sweep.fingerprint import code_version, compilers, fingerprint, refus
 from survey.sweep.plan import estimates, refuse_too_large
 from survey.sweep.reuse import solve_block
 from survey.sweep.time_left import TimeLeft
+from survey.waiting import compile_seconds
 
 SAMPLES = 16  # blocks, spread over the map, that are solved first
 

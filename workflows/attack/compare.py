@@ -163,9 +163,9 @@ def failed(batch):
 
 
 def _compile_seconds():
-    from survey.kernels import jit
+    from survey import waiting
 
-    return jit.compile_seconds()
+    return waiting.compile_seconds()
 
 
 def _flat(batch, array):

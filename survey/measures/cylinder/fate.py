@@ -13,6 +13,7 @@ from functools import lru_cache, partial
 
 import numpy as np
 
+from survey import waiting
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
@@ -22,7 +23,6 @@ from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, OF_F, OF_G,
 from survey.kernels.cylinder.flow_double import energy as energy_beside
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import OK, SEPARATRIX, STEP_LIMIT
-from survey.kernels.jit import wait_for_other_compiler
 from survey.measures.cylinder import ends
 from survey.measures.cylinder.solution import tolerances, trajectories
 
@@ -489,7 +489,7 @@ def fates(method, s, starts, tolerance, more=1):
         return out
     if s.stratum in (I0, I1):
         return (_free if s.stratum == I0 else _conservative)(s, starts)
-    wait_for_other_compiler()
+    waiting.wait()
     starts = np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
     known = {kind: s.cycles(kind).table for kind in (KINDS if len(starts) > FEW else s.found)}
     run = partial(_by_tables, method, s, tolerance, more)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from survey import status
+from survey import status, waiting
 from survey.kernels.hill import answers as kernels
-from survey.kernels.jit import wait_for_other_compiler
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
@@ -60,7 +59,7 @@ class Answers(answers.Answers):
             *own,
         )
         if asked.wanted[kernels.EXPONENT // 2 :].any():
-            wait_for_other_compiler()
+            waiting.wait()
             kernels.transcendental(
                 first, results, squares, asked.wanted, asked.rtol, asked.full_period, *own
             )

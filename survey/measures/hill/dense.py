@@ -28,8 +28,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from survey import status
-from survey.kernels import jit
+from survey import status, waiting
 from survey.kernels.hill import answers as kernels
 from survey.kernels.hill.series import (
     NEAR,
@@ -311,10 +310,10 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
 
 
 def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, open_points):
-    jit.wait_for_other_compiler()
+    waiting.wait()
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     if len(series) > 1:
-        jit.wait_for_other_compiler()  # once more, to the end: see `compile_ahead`
+        waiting.wait()  # once more, to the end: see `compile_ahead`
         _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points)
         return
     x, wide = 2 * x * x - 1 if axis.even else x, ~(bars[0] <= asked.rtol)
@@ -428,7 +427,7 @@ class NodalBounds:
 def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     """Answer those `chosen` rows that a series across rows serves; returns the others."""
     # compile this, by a call on nothing, while that process compiles what the nodes need
-    if jit.other_compiler:
+    if waiting.other_compiler:
         chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((2, 0)), np.empty((0, 0)))
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))

@@ -7,8 +7,7 @@ through one kernel call of at most about a second.
 
 import numpy as np
 
-from survey import methods, status
-from survey.kernels import jit
+from survey import methods, status, waiting
 from survey.kernels.hill.answers import UNTRIED, first_rungs, segments
 from survey.kernels.lanes import DY2_BAR, RESULTS, Y1_BAR, Y1_ZEROS
 from survey.measures.answers import Ladder
@@ -162,7 +161,7 @@ def _chain(problem, method, rung, out):
             method.hill_chain(samples, problem.c2, h, p, order, first, last, out)
 
     # compile this, by calls on nothing, while that process compiles the rest
-    if jit.other_compiler:
+    if waiting.other_compiler:
         compose(np.empty((0, 0, 2, nodes.size)), np.empty((0, 0)), starts[:0], ends[:0])
     for at in np.flatnonzero(np.bincount(on_rung)):
         steps, own = int(STEP_COUNTS.rungs[at]), on_rung == at

@@ -8,8 +8,7 @@ end.
 
 import numpy as np
 
-from survey import status
-from survey.kernels.jit import wait_for_other_compiler
+from survey import status, waiting
 from survey.kernels.libration import danby_double, traces_double
 from survey.measures.libration import panels
 from survey.measures.libration.answers import Answers
@@ -21,7 +20,7 @@ def solve(e, mu, rtol, answers, points, dense=False):
     """Answer the `points` (ascending) of rows e (R) of mu (R, L), in place; by the rows' series
     first, if `dense`.
     """
-    wait_for_other_compiler()
+    waiting.wait()
     row_of = points // mu.shape[1]
     if dense:
         for row in np.unique(row_of):

@@ -6,7 +6,7 @@ A method fills, for each well (a row of `kernels.nutation.wells`), the periods' 
 
 import numpy as np
 
-from survey.kernels import jit
+from survey import waiting
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.kernels.nutation import brun, brun_lanes
 from survey.kernels.nutation import records as rc
@@ -53,9 +53,9 @@ def in_lanes(kernel, points, actions):
     """
     n = points.shape[1]
     out, wells, done = np.empty((OUTPUTS, n)), np.empty(n), np.empty(n)
-    if jit.other_compiler:
+    if waiting.other_compiler:
         brun_lanes.compile_some(kernel)
-        jit.wait_for_other_compiler()
+        waiting.wait()
     kernel(points, actions, out, wells, done)
     return out, wells, done == brun_lanes.DONE
 
@@ -67,9 +67,9 @@ def named(values):
 
 def compile_periods(method):
     """Compile what `periods` calls, while another process compiles what finds the wells."""
-    if jit.other_compiler:
+    if waiting.other_compiler:
         periods(method, np.empty((0, nu.SIZE)), np.empty(0, np.int64), 1e-6)
-        jit.wait_for_other_compiler()
+        waiting.wait()
 
 
 def periods(method, rows, kinds, rtol):

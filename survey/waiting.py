@@ -1,0 +1,27 @@
+"""What the first use of a scene waits for: another process compiles some of its kernels meanwhile.
+
+The run hands over a function that waits for that process (see `sweep.compile_ahead`); measures and
+methods call it before they need those kernels.
+"""
+
+import time
+
+from survey.kernels import jit
+
+other_compiler = None  # at a first use, waits for what is compiled elsewhere
+_waited = 0.0
+
+
+def wait():
+    """Wait for what is compiled elsewhere: it is done sooner than if this process began now."""
+    global _waited
+    function = other_compiler
+    if function is not None:
+        began = time.perf_counter()
+        function()
+        _waited = max(_waited, time.perf_counter() - began)  # threads wait side by side
+
+
+def compile_seconds():
+    """Seconds in which this process has compiled kernels so far, or waited for another that does."""
+    return _waited + jit.compile_seconds()
