@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 UNKNOWN = np.iinfo(np.int32).min
+SHARES = (0.5, 0.31, 0.69)  # of a part: where it is cut, the first at which the integer is known
 NEAR = 1e-3  # of the map: what chords of curves may be off
 
 
@@ -24,9 +25,8 @@ def segments(values, curves, weights_of, border=1, optional=()):
     """
     found = {}
     for axis in (0, 1):
-        lines = (
-            values if axis == 1 else values.T
-        )  # along the axis, by the position on the other one
+        # along the axis, by the position on the other one
+        lines = values if axis == 1 else values.T
         ticks = np.linspace(0.0, 1.0, len(lines))
         for number in range(border, len(lines) - border):
             met = _met(curves, axis, ticks[number])
@@ -54,6 +54,36 @@ def along(values, ticks, met, weights_of, optional=()):
         sure = (positions > low + NEAR) & (positions < high - NEAR) & ~free
         change = values[last] - values[first]
         found[first, last] = _explained(change, weights[inside & sure], weights[inside & ~sure])
+    return found
+
+
+def cut(integer_at, ends):
+    """(positions (S) between the `ends` (S, 2) of parts, the integers there (S), UNKNOWN where none of
+    SHARES tells); `integer_at(some, positions)` are the integers in the parts `some`.
+    """
+    between = ends @ [1.0 - SHARES[0], SHARES[0]]
+    values = np.full(len(ends), UNKNOWN)
+    for share in SHARES:
+        some = np.flatnonzero(values == UNKNOWN)
+        if not some.size:
+            break
+        at = ends[some] @ [1.0 - share, share]
+        values[some] = integer_at(some, at)
+        known = values[some] != UNKNOWN
+        between[some[known]] = at[known]
+    return between, values
+
+
+def halves(ends, values, at, value):
+    """[(ends, integers at them, indices)] of the lower and of the upper halves of parts, cut `at`
+    (S) with the integer `value` (S), along which the integer changes.
+    """
+    found = []
+    for side in (1, 0):
+        own, at_ends = ends.copy(), values.copy()
+        own[:, side], at_ends[:, side] = at, value
+        changes = np.flatnonzero(at_ends[:, 0] != at_ends[:, 1])
+        found.append((own[changes], at_ends[changes], changes))
     return found
 
 

@@ -28,9 +28,8 @@ def check_boundaries(scene, name, table, given, options, proves=False):
             f"boundaries: no boundary curves are known for the scene {name}; leave the table out"
         )
     by_rows = measures.question(scene.FAMILY, "edges") is not None  # and so proofs are made
-    measures.question(
-        scene.FAMILY, "folds"
-    )  # which must keep to its table before anything is solved
+    # folds must keep to their table before anything is solved
+    measures.question(scene.FAMILY, "folds")
     if hasattr(measure, "refusal") and not (proves and by_rows):
         return _check_closed(measure, scene, name, table, axes, given, options)
     if not axes:

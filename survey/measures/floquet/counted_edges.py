@@ -18,9 +18,8 @@ from survey.measures.floquet.multipliers import (
     PLUS_ONE,
     UNDECIDED,
 )
-from survey.measures.segments import UNKNOWN, along
+from survey.measures.segments import UNKNOWN, along, cut, halves
 
-SHARES = (0.5, 0.31, 0.69)  # of a part: where it is cut, the first at which the number is known
 HALVINGS = 60
 REAL = 1e-3  # rad: arguments of multipliers that count as real
 
@@ -60,33 +59,16 @@ def _halved(count, ends, numbers, grain):
     """
     done = []
     while len(ends):
-        between = ends @ [1.0 - SHARES[0], SHARES[0]]
-        number = np.full(len(ends), UNKNOWN)
-        for share in SHARES:
-            some = np.flatnonzero((number == UNKNOWN) & (np.diff(ends)[:, 0] > grain))
-            if some.size:
-                at = ends[some] @ [1.0 - share, share]
-                number[some] = count(at)
-                known = some[number[some] != UNKNOWN]
-                between[known] = at[number[some] != UNKNOWN]
+        between, number = ends.mean(axis=1), np.full(len(ends), UNKNOWN)
+        wide = np.flatnonzero(np.diff(ends)[:, 0] > grain)
+        between[wide], number[wide] = cut(lambda _some, at: count(at), ends[wide])
         known = number != UNKNOWN
         done.append((ends[~known], numbers[~known], between[~known]))
-        ends, numbers = (
-            np.concatenate([_with(own, side, new) for side in (0, 1)])
-            for own, new in ((ends[known], between[known]), (numbers[known], number[known]))
-        )
-        changes = numbers[:, 0] != numbers[:, 1]
-        ends, numbers = ends[changes], numbers[changes]
+        lower, upper = halves(ends[known], numbers[known], between[known], number[known])
+        ends, numbers = (np.concatenate([lower[k], upper[k]]) for k in (0, 1))
     if not done:
         return np.zeros((0, 2)), np.zeros((0, 2), int), np.zeros(0)
     return tuple(np.concatenate(list(part)) for part in zip(*done, strict=True))
-
-
-def _with(pairs, side, new):
-    """The pairs (m, 2) with `new` (m) at one side."""
-    pairs = pairs.copy()
-    pairs[:, side] = new
-    return pairs
 
 
 def _shrunk(count, numbers, known, unknown):

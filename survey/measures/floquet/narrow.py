@@ -19,9 +19,8 @@ import numpy as np
 
 from survey.measures.floquet import row_count
 from survey.measures.floquet.multipliers import UNDECIDED
-from survey.measures.segments import UNKNOWN, segments
+from survey.measures.segments import UNKNOWN, cut, halves, segments
 
-SHARES = (0.5, 0.31, 0.69)  # of a segment: where it is cut, the first at which the index is known
 SHORT = 1e-9  # of the map: segments that are not cut any more
 SURE = 1e-6  # half the longest one that is drawn
 ZERO = 1e-3  # the largest value, of at most 1, of a function that is 0 there
@@ -51,12 +50,10 @@ class _Segments:
 
     def cut(self, at, index):
         """Those of both halves along which the index changes."""
-        halves = []
-        for side in (0, 1):
-            ends, values = self.ends.copy(), self.index.copy()
-            ends[:, 1 - side], values[:, 1 - side] = at, index
-            halves.append(_Segments(self.line, ends, values)[values[:, 0] != values[:, 1]])
-        return halves
+        return [
+            _Segments(self.line[some], ends, values)
+            for ends, values, some in halves(self.ends, self.index, at, index)
+        ]
 
 
 def curves(index, function, passed, kind, drawn):
@@ -141,14 +138,12 @@ def _shortened(index, segments, axis, ticks):
         segments = segments[long]
         if not segments.line.size:
             break
-        at = np.empty(segments.line.size)
-        value = np.full(segments.line.size, UNKNOWN)
-        for share in SHARES:
-            some = np.flatnonzero(value == UNKNOWN)
-            if some.size:
-                at[some] = segments.ends[some] @ [1.0 - share, share]
-                x = np.stack([at[some], ticks[segments.line[some]]], axis=1)
-                value[some] = index(x if axis == 0 else x[:, ::-1])
+
+        def index_at(some, at, line=segments.line):
+            x = np.stack([at, ticks[line[some]]], axis=1)
+            return index(x if axis == 0 else x[:, ::-1])
+
+        at, value = cut(index_at, segments.ends)
         known = value != UNKNOWN
         done.append(segments[~known])
         near, far = segments[known].cut(at[known], value[known])
