@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.jit import kernel
+from survey.kernels.jit import inline, kernel
 from survey.kernels.math.chebyshev import restrict
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
@@ -199,6 +199,9 @@ def _lanes(
     within `bars`, and roots z + i y (d, LANES), nearly.
     """
     K, d = len(c), len(z)
+    if n == 2 and not (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
+        _of_two(c, bars, outputs, count, paired, asked, rtol, floats, verdict, crossing, missed)
+        return
     w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
     rho, lane_z = np.empty(d), np.empty((d, 2))
     re, im, bar, sign = np.empty(n), np.empty(n), np.empty(n), np.zeros(n, np.int8)
@@ -238,6 +241,62 @@ def _lanes(
             missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
                 open_signs and (asked[KREIN] or asked[CROSSING])
             )
+
+
+@kernel
+def _of_two(c, bars, outputs, count, paired, asked, rtol, floats, verdict, crossing, missed):
+    """The spectral radius and the verdict of systems of two states, in closed form."""
+    for lane in range(count):
+        p, decided = outputs[lane], UNDECIDED
+        if paired:
+            value, off = _radius_of_pair(c[0, lane], bars[0, lane])
+            decided = STABLE if value == 1.0 else UNSTABLE if off < math.inf else UNDECIDED
+        else:
+            value, off = _radius_of_two(c[0, lane], c[1, lane], bars[0, lane], bars[1, lane])
+            if (value + off) * (1.0 + 4.0 * EPS) < 1.0:
+                decided = STABLE
+            elif (value - off) * (1.0 - 4.0 * EPS) > 1.0:
+                decided = UNSTABLE
+        floats[8, p], floats[9, p], verdict[p], crossing[p] = value, off, decided, UNDECIDED
+        missed[p] = (asked[VERDICT] and decided == UNDECIDED) or (
+            asked[RADIUS] and not off <= rtol * (1.0 + value)
+        )
+
+
+@inline
+def _radius_of_pair(c, bar):
+    """The larger modulus of the multipliers l and 1 / l, l + 1 / l = -c, and its error bound: 1 and 0
+    on the circle, NaN and infinity where that is open.
+    """
+    size = abs(c)
+    off = bar + 2.0 * EPS * size
+    if size + off < 2.0:
+        return 1.0, 0.0
+    near = size - off
+    if not near > 2.0:
+        return math.nan, math.inf
+    value = 0.5 * (size + math.sqrt((size - 2.0) * (size + 2.0)))
+    steep = 1.0 + near / math.sqrt((near - 2.0) * (near + 2.0))
+    return value, 0.5 * off * steep * (1.0 + 8.0 * EPS) + 8.0 * EPS * value
+
+
+@inline
+def _radius_of_two(trace, det, trace_bar, det_bar):
+    """The larger modulus of the roots of l^2 + trace l + det, and its error bound."""
+    half = 0.5 * abs(trace)
+    off, wide = 0.5 * trace_bar + EPS * half, det_bar + EPS * abs(det)
+    inner = half * half - det  # of the square root
+    doubt = ((2.0 * half + off) * off + wide + 2.0 * EPS * (half * half + abs(det))) * (
+        1.0 + 8.0 * EPS
+    )
+    if inner + doubt < 0.0:
+        value = math.sqrt(det)
+        off = wide / value if wide < det else math.inf  # |sqrt(x + e) - sqrt(x)| <= |e| / sqrt(x)
+    else:
+        root = math.sqrt(max(inner, 0.0))
+        value = half + root
+        off += doubt / root if inner > doubt else 2.0 * math.sqrt(2.0 * doubt)
+    return value, off * (1.0 + 8.0 * EPS) + 4.0 * EPS * value
 
 
 @kernel

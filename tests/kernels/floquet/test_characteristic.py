@@ -11,7 +11,7 @@ from survey.kernels.floquet import characteristic
 from survey.measures.floquet.answers import Answers
 
 
-def answered(coefficients, doubts, starts, n, paired, rtol=1.0):
+def answered(coefficients, doubts, starts, n, paired, rtol=1.0, multipliers=True):
     """The Answers of one point, as a series of one term."""
     answer = Answers(1, n)
     series = np.array(coefficients, dtype=float).reshape(1, -1)
@@ -20,8 +20,8 @@ def answered(coefficients, doubts, starts, n, paired, rtol=1.0):
     characteristic.answer(
         series, np.array(doubts, dtype=float).reshape(-1, 1, 1), np.zeros(1), table, np.zeros(2, np.int64),
         np.stack([starts.real, starts.imag], axis=-1).reshape(1, 1, -1, 2), np.zeros((1, 1), np.int64), n, paired,
-        np.array([True, True, True, False, False]), rtol, answer.floats, answer.signs, answer.verdict, answer.crossing,
-        answer.missed,
+        np.array([multipliers, True, True, False, False]), rtol, answer.floats, answer.signs,
+        answer.verdict, answer.crossing, answer.missed,
     )  # fmt: skip
     return answer
 
@@ -107,6 +107,43 @@ def test_sums_of_multipliers_and_their_inverses(m):
         assert answer.verdict[0] in (-1, int(on_circle))
         kinds.add(int(answer.verdict[0]))
     assert kinds >= {0, 1}
+
+
+@pytest.mark.parametrize("paired", [False, True])
+def test_the_radius_of_two_states_in_closed_form(paired):
+    """Asked for without the multipliers; near double roots, the unit circle and 0 too."""
+    rng, kinds, sharp = np.random.default_rng(7), set(), 0
+    for _ in range(600):
+        near = 10.0 ** rng.uniform(-12, 0)
+        if paired:
+            c = np.array([rng.choice([2.0 + near, 2.0 - near, 10 * near, 1e5 * near])])
+        else:
+            size, angle = rng.choice([1.0 + near, 1.0 - near, near]), rng.choice([near, 1.0, np.pi])
+            c = np.array([-2 * size * np.cos(angle), size**2])
+            if rng.random() < 0.5:
+                c = np.array([-(size + 0.7 * near), 0.7 * size * near * rng.choice([-1, 1])])
+        c[0] *= rng.choice([-1.0, 1.0])
+        doubts = near * 10.0 ** rng.uniform(-9, 0.5) * rng.uniform(size=c.size)
+        answer = answered(c, doubts, np.zeros(c.size, complex), 2, paired, multipliers=False)
+        value, off = answer.floats[8:10, 0]
+        for signs in np.array([[-1, -1], [-1, 1], [1, -1], [1, 1], [0, 0]])[:, : c.size]:
+            with mpmath.workdps(40):
+                exact = roots_of(c, signs * doubts)
+                if paired:
+                    exact = [
+                        (s + k * mpmath.sqrt(mpmath.mpc(s) ** 2 - 4)) / 2
+                        for s in exact
+                        for k in (1, -1)
+                    ]
+                radius = max(abs(root) for root in exact)
+                if not answer.missed[0]:
+                    assert abs(radius - mpmath.mpf(value)) <= off + 1e-30
+                stable = abs(radius - 1) < 1e-25 if paired else radius < 1
+            assert answer.verdict[0] in (-1, int(stable))
+        kinds.add(int(answer.verdict[0]))
+        within = answered(c, 0 * doubts, np.zeros(c.size, complex), 2, paired, multipliers=False)
+        sharp += within.floats[9, 0] <= 1e-14 / near
+    assert kinds == {-1, 0, 1} and sharp > 500
 
 
 def test_double_roots_are_left_to_the_point_itself():
