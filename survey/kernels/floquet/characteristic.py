@@ -88,7 +88,7 @@ def answer(
                 for i in range(d):
                     z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
                     y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
-            _lanes(
+            answer_lanes(
                 c,
                 bars,
                 z,
@@ -163,7 +163,7 @@ def answer_points(
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
-        _lanes(
+        answer_lanes(
             c,
             bars,
             z,
@@ -192,7 +192,7 @@ def _polynomials(table):
 
 
 @kernel
-def _lanes(
+def answer_lanes(
     c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
 ):
     """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to
@@ -302,17 +302,23 @@ def _radius_of_two(trace, det, trace_bar, det_bar):
 @kernel
 def _roots(c, d, z, y, parts):
     """Weierstrass's iteration from z + i y, in lanes."""
+    for _ in range(ITERATIONS):
+        improve(c, d, z, y, parts)
+
+
+@kernel
+def improve(c, d, z, y, parts):
+    """One iteration of it."""
     pr, pi, qr, qi = parts[0], parts[1], parts[2], parts[3]
     lanes = len(pr)
-    for _ in range(ITERATIONS):
-        for i in range(d):
-            _value(c, d, z[i], y[i], pr, pi)
-            _product(z, y, i, d, qr, qi)
-            x, t = z[i], y[i]
-            for lane in range(lanes):
-                size = 1.0 / (qr[lane] * qr[lane] + qi[lane] * qi[lane])
-                x[lane] -= (pr[lane] * qr[lane] + pi[lane] * qi[lane]) * size
-                t[lane] -= (pi[lane] * qr[lane] - pr[lane] * qi[lane]) * size
+    for i in range(d):
+        _value(c, d, z[i], y[i], pr, pi)
+        _product(z, y, i, d, qr, qi)
+        x, t = z[i], y[i]
+        for lane in range(lanes):
+            size = 1.0 / (qr[lane] * qr[lane] + qi[lane] * qi[lane])
+            x[lane] -= (pr[lane] * qr[lane] + pi[lane] * qi[lane]) * size
+            t[lane] -= (pi[lane] * qr[lane] - pr[lane] * qi[lane]) * size
 
 
 @kernel

@@ -438,13 +438,10 @@ def coefficients(M, E, scale, structure, steps_of=None):
         )
         if k <= kept:
             found[:, k - 1] = B
+        shift = 1.001 * (abs(B) * np.swapaxes(E, 1, 2)).sum(axis=(1, 2))
         B = MB + c[:, k, None, None] * one
         off = off + (bars[:, k] + EPS * abs(c[:, k]))[:, None, None] * one
-        wide = (
-            wide
-            + (bars[:, k] + n * (abs(B) * np.swapaxes(E, 1, 2)).sum(axis=(1, 2)))[:, None, None]
-            * one
-        )
+        wide = wide + (bars[:, k] + shift + EPS * abs(c[:, k]))[:, None, None] * one
         if structure == "symplectic" and k < n:
             form[0, :, k] = (B * np.swapaxes(J, 1, 2)).sum(axis=(1, 2))
             form[1, :, k] = (wide * abs(np.swapaxes(J, 1, 2))).sum(axis=(1, 2))
@@ -470,12 +467,12 @@ def _in_sums(c, bars, m):
     """The sum of c_j (l^j + l^-j), c_0 once, as a polynomial of s = l + 1 / l, highest power first,
     and bounds.
     """
-    change = _sums(m)
+    change = sums_of_powers(m)
     return (c @ change)[:, ::-1], ((bars + 4 * EPS * abs(c)) @ abs(change))[:, ::-1]
 
 
 @lru_cache
-def _sums(m):
+def sums_of_powers(m):
     """Row j: l^j + l^-j (1 for j = 0) as a polynomial of s = l + 1 / l, from the constant term on
     (m + 1, m + 1).
     """

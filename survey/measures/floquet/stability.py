@@ -11,6 +11,7 @@ undecided   the error bounds allow either
 import numpy as np
 
 from survey import status
+from survey.kernels.floquet import leverrier
 from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
 from survey.measures.floquet import dense, maslov, monodromy, multipliers
@@ -56,6 +57,7 @@ OUTPUTS = (
 SYMPLECTIC = frozenset(["krein", *(o.name for o in maslov.OUTPUTS)])
 # Factors of the number of steps; from the second on, errors are carried sharply.
 LADDER = answers.Ladder(1.5 ** np.arange(16), np.arange(16) + 1, None, most=16)
+FEW = 6  # states at most whose characteristic polynomial is looked at first
 CHUNK = 65536  # points n^2 that are solved together: bounds the memory
 
 
@@ -66,6 +68,45 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     `period` (N) is needed for the accuracy of the exponent; `growth` (2, N), if given, is that of
     `monodromy.SystemPoints`.
     """
+    n = matrices.M.shape[1]
+    few = 2 <= n <= FEW and (structure == "none" or n % 2 == 0)
+    if not few or asked == {"monodromy"} or matrices.sharp.any():
+        return by_discs(matrices, structure, rtol, asked, period, growth)
+    found = by_coefficients(matrices, structure, rtol, asked, period, growth)
+    left = np.flatnonzero(found.missed)
+    if left.size:
+        growth = growth if growth is None else growth[:, left]
+        period = period if period is None else period[left]
+        found.replace(left, by_discs(matrices[left], structure, rtol, asked, period, growth))
+    return found
+
+
+def by_coefficients(matrices, structure, rtol, asked, period=None, growth=None):
+    """As `assess`, by characteristic polynomials."""
+    M, E = (np.ascontiguousarray(values) for values in (matrices.M, matrices.E))
+    N, n = M.shape[:2]
+    found, paired = Answers(N, n), structure != "none"
+    change = dense.sums_of_powers(n // 2)
+    forms = dense.sums_of_powers(n // 2 - 1) if structure == "symplectic" else np.zeros((0, 0))
+    det = np.zeros((2, 0))
+    # Liouville: beside huge multipliers this tells more of small ones than M
+    if growth is not None:
+        with np.errstate(over="ignore", invalid="ignore"):
+            det = np.exp(growth[0]) * np.stack([np.ones(N), np.expm1(growth[1]) + 8 * EPS])
+    found.floats[:] = np.nan
+    leverrier.answer_matrices(
+        M, E, det, change, forms, paired, np.array(dense.flags(asked)), rtol, found.floats, found.signs,
+        found.verdict, found.crossing, found.missed,
+    )  # fmt: skip
+    if "monodromy" in asked:
+        found.missed |= ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
+    if period is not None and "exponent" in asked:
+        found.missed |= wide_exponents(found, period, rtol)
+    return found
+
+
+def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
+    """As `assess`, by discs that hold the multipliers."""
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
     found, paired = Answers(N, n), structure != "none"

@@ -1,0 +1,178 @@
+"""Multipliers, and what follows from them, of many matrices by the coefficients of their
+characteristic polynomials.
+
+With B_0 = 1, c_k = -tr(M B_(k-1)) / k and B_k = M B_(k-1) + c_k (Leverrier, Faddeev); an error dM of
+M changes c_k by the mean of -tr(B_(k-1) dM) on the way from M to M + dM. All errors are bounded by
+sums of positive terms. `characteristic` answers from the coefficients and their bounds; what it
+leaves open, as where multipliers nearly meet, or rounding beside huge ones hides the small, is
+`missed`: that takes eigenvectors, which cost ten times as much.
+
+Source: D. K. Faddeev, V. N. Faddeeva, Computational Methods of Linear Algebra (1963), 47.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.floquet.characteristic import LANES, answer_lanes, improve
+from survey.kernels.jit import kernel
+from survey.kernels.math.roundoff import EPS
+
+MOST = 60  # iterations from a circle to the roots
+CLOSE = 1e-4  # a correction, relative to the largest root, from which they converge as from nearby
+
+
+@kernel
+def answer_matrices(
+    M, E, det, change, forms, paired, asked, rtol, floats, signs, verdict, crossing, missed
+):
+    """Answer N points from M (N, n, n), known within E: columns of `floats`, `signs`, ... as in
+    `stability.Answers`; det (2, N) or (2, 0): its determinant, and to within what it is known.
+
+    Row j of change (m + 1, m + 1), m = n / 2, and of forms (m, m): l^j + l^-j (1 for j = 0) as a
+    polynomial of s = l + 1 / l, from the constant term on. Without `forms`, of size (0, 0), there
+    are no Krein signs.
+    """
+    N, n = M.shape[:2]
+    m, of_forms = n // 2, len(forms) > 0
+    d = m if paired else n
+    K = 2 * d if of_forms else d
+    squares, sums = np.empty((7, n, n)), np.empty((4, n + 1))
+    c, bars = np.empty((K, LANES)), np.empty((K, LANES))
+    z, y, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
+    outputs = np.empty(LANES, np.int64)
+    for first in range(0, N, LANES):
+        count = min(LANES, N - first)
+        for lane in range(count):
+            p = first + lane
+            outputs[lane] = p
+            _leverrier(M[p], E[p], squares, sums)
+            if paired:
+                _in_sums(sums[0], sums[1], m, change, c, bars, 0, lane)
+                if of_forms:
+                    _in_sums(sums[2], sums[3], m, forms, c, bars, d, lane)
+            else:
+                for k in range(n):
+                    c[k, lane], bars[k, lane] = sums[0, k + 1], sums[1, k + 1]
+                if det.shape[1] and det[1, p] < bars[n - 1, lane]:
+                    c[n - 1, lane] = -det[0, p] if n % 2 else det[0, p]
+                    bars[n - 1, lane] = det[1, p]
+        for lane in range(count, LANES):
+            for k in range(K):
+                c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
+        _near_roots(c, d, z, y, parts)
+        answer_lanes(
+            c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+        )  # fmt: skip
+
+
+@kernel
+def _leverrier(M, E, squares, sums):
+    """Fill sums (4, n + 1) with c_k and their bounds, and tr(B_k J), J = (0 1; -1 0), and theirs, k = 0
+    to n.
+    """
+    # off: what rounding does to B, wide: what all errors do; X, offs, wides: the same of M B
+    B, X, size, off = squares[0], squares[1], squares[2], squares[3]
+    offs, wide, wides = squares[4], squares[5], squares[6]
+    c, bars, form, form_bars = sums[0], sums[1], sums[2], sums[3]
+    n = len(M)
+    m = n // 2
+    for i in range(n):
+        for j in range(n):
+            B[i, j], off[i, j], wide[i, j] = 1.0 if i == j else 0.0, 0.0, 0.0
+            size[i, j] = abs(M[i, j]) + E[i, j]
+    c[0], bars[0], form[0], form_bars[0] = 1.0, 0.0, 0.0, 0.0
+    for k in range(1, n + 1):
+        shift = trace = rounded = 0.0
+        for i in range(n):
+            for j in range(n):
+                total = tall = one = two = 0.0
+                for r in range(n):
+                    total += M[i, r] * B[r, j]
+                    tall += size[i, r] * abs(B[r, j])
+                    one += size[i, r] * off[r, j]
+                    two += size[i, r] * wide[r, j] + E[i, r] * abs(B[r, j])
+                X[i, j] = total
+                offs[i, j], wides[i, j] = one + n * EPS * tall, two + n * EPS * tall
+                shift += (abs(B[i, j]) + wide[i, j]) * E[j, i]
+            trace += X[i, i]
+            rounded += offs[i, i] + n * EPS * abs(X[i, i])
+        c[k] = -trace / k
+        here = rounded / k + EPS * abs(c[k])
+        bars[k] = (here + shift) * (1.0 + n * n * EPS)
+        form[k] = form_bars[k] = 0.0
+        for i in range(n):
+            for j in range(n):
+                B[i, j], off[i, j], wide[i, j] = X[i, j], offs[i, j], wides[i, j]
+            B[i, i] += c[k]
+            off[i, i] += here + EPS * abs(B[i, i])
+            wide[i, i] += bars[k] + EPS * abs(B[i, i])
+        for i in range(m):
+            low, high = B[m + i, i], B[i, m + i]
+            form[k] += low - high
+            form_bars[k] += wide[m + i, i] + wide[i, m + i] + n * EPS * (abs(low) + abs(high))
+
+
+@kernel
+def _in_sums(c, c_bars, m, change, out, out_bars, first, lane):
+    """c_m + the sum of c_(m-j) (l^j + l^-j) as a polynomial of s = l + 1 / l in rows `first` on, highest
+    power first: of c without the first, 1; of tr(B_k J), whose first is 0, all.
+    """
+    most = len(change) - 1
+    for i in range(m):
+        power, total, bound = m - 1 - i, 0.0, 0.0
+        for j in range(most + 1):
+            total += c[m - j] * change[j, power]
+            bound += (c_bars[m - j] + (m + 4) * EPS * abs(c[m - j])) * abs(change[j, power])
+        out[first + i, lane], out_bars[first + i, lane] = total, bound
+
+
+@kernel
+def _near_roots(c, d, z, y, parts):
+    """Fill z + i y with roots, roughly."""
+    if d == 1:
+        for lane in range(LANES):
+            z[0, lane], y[0, lane] = -c[0, lane], 0.0
+    elif d == 2:
+        for lane in range(LANES):
+            half = -0.5 * c[0, lane]
+            inner = half * half - c[1, lane]
+            root = math.sqrt(abs(inner))
+            if inner < 0.0:
+                z[0, lane], y[0, lane], z[1, lane], y[1, lane] = half, root, half, -root
+            else:
+                far = half + (root if half >= 0.0 else -root)
+                z[0, lane], y[0, lane], y[1, lane] = far, 0.0, 0.0
+                z[1, lane] = c[1, lane] / far if far != 0.0 else 0.0
+    else:
+        _from_circle(c, d, z, y, parts)
+
+
+@kernel
+def _from_circle(c, d, z, y, parts):
+    """Weierstrass's iteration from points of a circle until it converges as from near by."""
+    before = np.empty((2, d, LANES))
+    for lane in range(LANES):
+        radius = 1e-3
+        for k in range(d):
+            radius = max(radius, abs(c[k, lane]) ** (1.0 / (k + 1)))
+        for i in range(d):
+            angle = (2.0 * math.pi * i + 1.0) / d  # no mirror images
+            z[i, lane], y[i, lane] = radius * math.cos(angle), radius * math.sin(angle)
+    converged = np.zeros(LANES, np.bool_)
+    for _ in range(MOST):
+        before[0], before[1] = z, y
+        improve(c, d, z, y, parts)
+        left = False
+        for lane in range(LANES):
+            moved = largest = 0.0
+            for i in range(d):
+                if converged[lane]:  # what follows depends on no neighbour
+                    z[i, lane], y[i, lane] = before[0, i, lane], before[1, i, lane]
+                moved = max(moved, abs(z[i, lane] - before[0, i, lane]))
+                moved = max(moved, abs(y[i, lane] - before[1, i, lane]))
+                largest = max(largest, abs(z[i, lane]), abs(y[i, lane]))
+            converged[lane] = moved < CLOSE * largest
+            left = left or not converged[lane]
+        if not left:
+            return
