@@ -160,6 +160,13 @@ def test_a_portrait_says_why():
     assert gyrostat.why(found).startswith(words)
 
 
+def test_a_portrait_beside_a_fold_says_so():
+    p = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.3 - 1e-10, "s3": -1.1}
+    portrait = survey.evaluate("gyrostat", question="portrait", **p)
+    assert int(portrait.verdict) == -1
+    assert "fold of equilibria" in portrait.survey.point().why
+
+
 def test_a_fate_says_why():
     fates = survey.open(FATES).survey
     assert "limit_phi = 2.6135" in fates.point(phi0=0.3, w0=0.0).why

@@ -102,7 +102,12 @@ class AbelScene(FunctionScene):
             return gyrostat.why(answer)
         if "mean_f" not in answer:
             return "the return maps show no cycle or equilibrium on the way, and w grows: that end is attracting"
-        return gyrostat.why(answer).replace(named(answer, "K"), named(answer, "mean_f"))
+        numbers = ("mean_f", "mean_g", "K", "L")
+        last = next((i for i, name in enumerate(numbers) if answer[name]), 0)
+        # numbers that are 0 for all parameters decide nothing
+        first = last if answer["verdict"] == "structurally_stable" else 0
+        margins = ", ".join(named(answer, name) for name in numbers[first : last + 1])
+        return gyrostat.why(answer).replace(named(answer, "K"), margins)
 
     def trajectory(self, point, answer, options, time=None):
         """The motion from `phi0`, `w0`, and some of its neighbours (see `survey.scenes`)."""

@@ -323,7 +323,8 @@ def _why_portrait(answer):
         "degenerate": "one of the margins is within its error bar of 0",
     }
     return f"stratum {answer['stratum']}, {', '.join(margins)}: " + words.get(
-        answer["verdict"], "near a saddle connection or a fold of cycles, the bars leave it open"
+        answer["verdict"],
+        "near a saddle connection, or a fold of equilibria or cycles, the bars leave it open",
     )
 
 

@@ -10,6 +10,8 @@ from survey.measures.cylinder import basins, fate, portrait
 from survey.status import INVALID_PARAMETERS, OK
 
 MOST_TURNINGS = 2**31 - 1  # are kept as int32
+# how far beside parameters others are tried: a number that vanishes there too is taken for 0 throughout
+BESIDE = 1e-3
 
 
 def dense(point, names, name):
@@ -97,19 +99,20 @@ def _only(here, values):
     return np.where(here, values, np.nan) if here.any() else np.broadcast_to(np.nan, here.shape)
 
 
-def _systems(point, names, flows):
-    """`flows` of the parameters `names`, which it is given as rows, and their shape in the block."""
+def _systems(point, names):
+    """The parameters `names` as rows, and their shape in the block."""
     given = np.stack(
         np.broadcast_arrays(*(np.asarray(point[key], dtype=float) for key in names)), axis=-1
     )
-    return flows(given.reshape(-1, len(names))), given.shape[:-1]
+    return given.reshape(-1, len(names)), given.shape[:-1]
 
 
 def fates(point, names, flows, method, request):
     """The fates of phi0, w0: one skeleton for each set of the parameters `names`, then its initial states."""
     map_asked = basins.asked(request, names)
     starts = [np.asarray(point[key], dtype=float) for key in ("phi0", "w0")]
-    systems, own = _systems(point, names, flows)
+    given, own = _systems(point, names)
+    systems = flows(given)
     shape = np.broadcast_shapes(own, *(array.shape for array in starts))
     group = np.broadcast_to(np.arange(len(systems)).reshape(own), shape).ravel()
     starts = np.stack([np.broadcast_to(array, shape).ravel() for array in starts], axis=-1)
@@ -128,9 +131,17 @@ def fates(point, names, flows, method, request):
 
 def portraits(point, names, flows, method, request):
     """One portrait for each set of the parameters `names`."""
-    systems, shape = _systems(point, names, flows)
+    given, shape = _systems(point, names)
+    systems = flows(given)
     good = np.isfinite(systems).all(axis=1)
     result = portrait.empty(len(systems), INVALID_PARAMETERS, systems.shape[1])
-    for name, values in portrait.solve(method, systems[good], request.rtol).items():
+
+    def beside(i):
+        near = given[good][i]
+        away = BESIDE * (1.0 + np.abs(near)) * np.sin(1.0 + np.arange(len(near)))
+        rows = [flows((near + side * away)[None])[0] for side in (1.0, -1.0)]
+        return next((row for row in rows if np.isfinite(row).all()), rows[0])
+
+    for name, values in portrait.solve(method, systems[good], request.rtol, beside).items():
         result[name][good] = values
     return {name: values.reshape(shape + values.shape[1:]) for name, values in result.items()}

@@ -33,6 +33,15 @@ class Ends:
     bars: tuple[float, float, float, float]
     attract: np.ndarray  # w -> +inf, w -> -inf: 1, -1, or 0 where that is not decided
 
+    @property
+    def decides(self):
+        """The number (from 0) of the first of the four that is not 0; 4 where all are."""
+        return _first((self.mean_f, self.mean_g, self.K, self.L))
+
+
+def _first(values):
+    return next((i for i, value in enumerate(values) if value), len(values))
+
 
 def of(row):
     """The Ends of the flow `row` of `equation.program`."""
@@ -52,10 +61,10 @@ def of(row):
         0.0 if abs(value) <= bar else float(value) for value, bar in zip(found, bars, strict=True)
     ]
     signs = np.sign(values)
-    decides = next((i for i in range(4) if signs[i]), None)
+    decides = _first(values)
     attract = (
         np.zeros(2)
-        if decides is None
+        if decides == len(values)
         else signs[decides] * np.array([[1, 1], [1, -1]])[decides % 2]
     )
     return Ends(*values, tuple(bars.tolist()), attract)

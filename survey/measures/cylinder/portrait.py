@@ -77,9 +77,11 @@ def empty(count, status, columns=0):
     return result | {"status": np.full(count, status, dtype=np.int64)}
 
 
-def solve(method, systems, rtol):
+def solve(method, systems, rtol, beside=None):
     """Every output for rows of six finite parameters, or of programs, for which K and L are those
     of `ends`.
+
+    beside(i): the program of the same functions at parameters next to those of row i.
     """
     own = systems.shape[1] > COLUMNS
     result = empty(len(systems), OK, systems.shape[1])
@@ -99,7 +101,8 @@ def solve(method, systems, rtol):
         s = remembered(method, six)
         end, limit = destinations.table(method, s, rtol)
         result["branch_end"][i, : len(end)], result["branch_limit"][i, : len(end)] = end, limit
-        result["verdict"][i] = _verdict(s, end)
+        neutral = _changes(s.p, beside(i)) if own else s.K == 0.0 and not _is_exact(s.p)
+        result["verdict"][i] = _verdict(s, end, neutral)
         for name, table in zip(COUNTS[2:], (s.plus, s.minus, s.librations), strict=True):
             result[name][i] = len(table)
         cycles = [
@@ -162,10 +165,21 @@ def _type(row):
     return 1 if kind == eq.SADDLE else 8
 
 
-def _verdict(s, ends_of_branches):
-    """Is the point structurally stable, by the error bounds?"""
+def _changes(p, beside):
+    """Is a number that does not decide the ends of the program p, since it is 0, another one beside it?
+
+    A number that is 0 at all parameters, as the mean of cos phi, stays 0 when these change.
+    """
+    if p[MEAN] != 0.0:
+        return False
+    return not np.isfinite(beside).all() or ends.of(beside).decides < ends.of(p).decides
+
+
+def _verdict(s, ends_of_branches, neutral):
+    """Is the point structurally stable, by the error bounds? `neutral`: does a small change change what
+    decides the ends?
+    """
     scale = s.p[BOUND_F] + math.sqrt(s.p[BOUND_DG])
-    neutral = s.p[MEAN] == 0.0 if len(s.p) > COLUMNS else s.K == 0.0 and not _is_exact(s.p)
     doubtful = [row for row in s.librations if not _hyperbolic(row)]
     for cycles in (s.plus, s.minus):
         doubtful += [row for row in cycles if not (_hyperbolic(row) or _far(row, s.K, scale))]

@@ -117,6 +117,33 @@ def test_the_gyrostat_as_an_equation_of_ones_own_is_the_gyrostat():
         assert (one.turnings == two.turnings).where(both, True).all()
 
 
+def test_a_mean_that_is_0_for_all_parameters_does_not_make_portraits_degenerate():
+    six = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.5, "s3": -0.2}
+    own, known = (
+        survey.evaluate(scene, question="portrait", **six) for scene in (TWIN, "gyrostat")
+    )
+    assert int(own.verdict) == int(known.verdict) == 1
+    why = own.survey.point().why
+    assert "K = 0.06" in why and "mean_f" not in why
+    biased = survey.abel(
+        lambda phi, p: p[0] + math.cos(phi),
+        lambda phi, p: p[1] - math.sin(2 * phi) + 0.3 * math.cos(phi),
+        parameters=("a", "b"),
+        period=2 * math.pi,
+    )  # its mean changes with a, through 0
+    ds = survey.evaluate(biased, a=[-0.1, 0.0, 0.1], b=0.2, question="portrait")
+    assert ds.verdict.values.tolist() == [1, 0, 1]
+    assert "mean_f = 0" in ds.isel(a=1).survey.point().why
+    pushed = survey.abel(
+        lambda phi, p: p[0] * math.cos(phi),
+        lambda phi, p: p[1] - math.sin(phi),
+        parameters=("a", "b"),
+        period=2 * math.pi,
+    )  # g decides, but where b = 0
+    ds = survey.evaluate(pushed, a=0.3, b=[-0.4, 0.0, 0.4], question="portrait")
+    assert ds.verdict.values[[0, 2]].tolist() == [1, 1] and int(ds.verdict[1]) != 1
+
+
 def homoclinic(a):
     """I at which the saddle's branch w > 0 returns to it, by shooting from both sides to phi = pi."""
 
