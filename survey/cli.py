@@ -742,6 +742,12 @@ def _summarise(finished, paths):
     if attributes.get("surfaces_left_out"):
         lost = counted(attributes["surfaces_left_out"], "triangle")
         err.print(f"surfaces: {lost} with an uncertain corner left out (at edges and tips)")
+    if attributes.get("surfaces_unexplained"):
+        lost = counted(attributes["surfaces_unexplained"], "edge")
+        err.print(
+            f"surfaces: a surface is missing on {lost} of the lattice that is searched "
+            "(surfaces_unexplained), as where two pairs of multipliers pass together"
+        )
     if attributes.get("curves_unexplained"):
         segments = counted(attributes["curves_unexplained"], "segment")
         err.print(

@@ -27,8 +27,8 @@ MAX_ROWS = 1000  # of one output
 # Attributes that concern the file, not a point.
 OF_FILE = (
     "points", "accuracy_missed", "status_counts", "verdict_counts", "areas", "boundaries", "refine", "refine_points",
-    "surfaces", "surfaces_left_out", "edge_left_out", "edge_incomplete_rows", "curves_lost", "curves_unexplained",
-    "boundary_planes", "complete",
+    "surfaces", "surfaces_left_out", "surfaces_unexplained", "edge_left_out", "edge_incomplete_rows", "curves_lost",
+    "curves_unexplained", "boundary_planes", "complete",
 )  # fmt: skip
 
 

@@ -51,7 +51,8 @@ QUESTIONS = {
         "refusal": Function("why the scene has no surfaces, in words; None if it has", ("scene",)),
         "Functions": Value(
             "the functions, {class: function} in a box of three `axes`, whose zeros are the surfaces: "
-            "Functions(scene, box, axes, fixed, options, method, rtol) has on_lattice(x) -> {class: (values, bounds)}, "
+            "Functions(scene, box, axes, fixed, options, method, rtol) has on_lattice(x) -> ({class: (values, "
+            "bounds)}, numbers that change on surfaces alone, -1 where they are not known, or None), "
             "sharp(x, class) -> (values, bounds) and passing(x, class) -> (does it?, {name: (values, bounds)})",
             type,
             needed=True,

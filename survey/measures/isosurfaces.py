@@ -6,7 +6,8 @@ differ are cut by polygons with corners on the cubes' edges (marching cubes; on 
 alternating signs negative corners are kept apart, from both sides, so that neighbours fit). Each
 corner is then moved along its edge to the zero of the function, and bracketed there by signs that
 are certain. A surface that lies between two lines everywhere, or two that lie closer than them, may
-be missed. Triangles of which a corner cannot be made certain are left out.
+be missed; where a number that changes on surfaces alone shows that one is missing, that is counted.
+Triangles of which a corner cannot be made certain are left out.
 
 Positions are those of `survey.measures.square`, in three dimensions.
 
@@ -32,6 +33,7 @@ NEAR = 1e-4  # of the box: how near zeros of the cubics through four values of t
 HALVINGS = 8  # of the edge of a cube, where that fails
 SURE = 1e-6  # the widest bracket of a corner, half of it, that is drawn
 BEYOND = 0.05  # of an edge: how far a zero may lie beyond an end of uncertain sign
+COUNTS = "counts"  # beside the names of classes
 CORNERS = np.array(list(product((0, 1), repeat=3)))
 
 
@@ -41,7 +43,8 @@ class Surfaces:
 
     Per vertex its position `x` (m, 3), its `error` (m) along the axis `axis` (m), and `along`:
     {name: (values, errors)}; `corners` (t, 3) of the triangles are numbers of vertices. `left_out`:
-    triangles that are not there since a corner is not certain.
+    triangles that are not there since a corner is not certain; `unexplained`: edges of the lattice
+    along which the number of `on_lattice` changes and no surface passes, None if it has none.
     """
 
     kind: np.ndarray
@@ -53,6 +56,7 @@ class Surfaces:
     along: dict
     corners: np.ndarray
     left_out: int
+    unexplained: int | None
 
 
 def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
@@ -67,17 +71,24 @@ def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
     def lattice(i):
         def make():
             x = np.column_stack([np.full(len(plane), ticks[i]), plane])
-            return {str(kind): _signed(*found) for kind, found in functions.on_lattice(x).items()}
+            values, counts = functions.on_lattice(x)
+            found = {str(kind): _signed(*both) for kind, both in values.items()}
+            return found if counts is None else found | {COUNTS: counts}
 
         return once(f"surfaces-{LINES}-{i}", make)
 
     planes = each(lattice, range(LINES), "planes of the surfaces' lattice")
+    cube = (LINES, LINES, LINES)
+    on_lattice = {
+        name: np.stack([plane[name] for plane in planes]).reshape(cube) for name in planes[0]
+    }
+    counts = on_lattice.pop(COUNTS, None)
+    on_lattice = {name: _with_open_signs(values) for name, values in on_lattice.items()}
+    # edges on which a surface passes, or may
+    told = np.zeros((*cube, 3), bool)
     parts = []
     left_out = 0
-    for kind in map(int, planes[0]):
-        values = _with_open_signs(
-            np.stack([plane[str(kind)] for plane in planes]).reshape(LINES, LINES, LINES)
-        )
+    for kind, values in ((int(name), values) for name, values in on_lattice.items()):
         cut, corners = marched(values)
 
         def sharp(first, kind=kind, values=values, cut=cut):
@@ -92,8 +103,23 @@ def find(functions, grain, names, each=in_turn, once=lambda name, make: make()):
         found = {name: np.concatenate([part[name] for part in found]) for name in found[0]}
         certain = np.isfinite(found["error"])
         left_out += int((~certain[corners].all(axis=1)).sum())
+        told[tuple(cut[found["passes"] | ~certain].T)] = True
         parts += _pieces(kind, found, corners[(certain & found["passes"])[corners].all(axis=1)])
-    return _joined(parts, names, left_out)
+    lost = None if counts is None else int((_changing(counts) & ~told).sum())
+    return _joined(parts, names, left_out, lost)
+
+
+def _changing(counts):
+    """A mask (n, n, n, 3) of the lattice's edges, by their lower end and axis, along which a number
+    changes that is known at both ends.
+    """
+    changes = np.zeros((*counts.shape, 3), bool)
+    for axis in range(3):
+        low, high = [np.s_[:]] * 3, [np.s_[:]] * 3
+        low[axis], high[axis] = np.s_[:-1], np.s_[1:]
+        one, two = counts[tuple(low)], counts[tuple(high)]
+        changes[(*low, axis)] = (one != two) & (one >= 0) & (two >= 0)
+    return changes
 
 
 def _signed(values, bars):
@@ -276,7 +302,7 @@ def _pieces(kind, found, corners):
     return parts
 
 
-def _joined(parts, names, left_out):
+def _joined(parts, names, left_out, lost):
     """The Surfaces of the pieces."""
     vertices = np.array([len(found["error"]) for _, found, _ in parts], int)
     firsts = np.cumsum(vertices) - vertices
@@ -301,4 +327,5 @@ def _joined(parts, names, left_out):
             ]
         ),
         left_out=left_out,
+        unexplained=lost,
     )

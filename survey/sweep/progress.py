@@ -90,7 +90,7 @@ class Progress:
         if what == "blocks":
             points = counted(self.workflow.grid.points, "point")
             self._line(f"{points} in {counted(total, 'block')}, {reused:,} already done")
-        elif not self.bar:
+        elif total and not self.bar:
             self._line(f"searching: {_counted(total, what)}")
 
     @property

@@ -34,6 +34,8 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
         functions, box.grain, [output.name for output in measure.ALONG], each, once
     )
     about = {"surfaces": ", ".join(names), "surfaces_left_out": found.left_out}
+    if found.unexplained:
+        about["surfaces_unexplained"] = found.unexplained
     return xr.Dataset(
         _variables(workflow, measure, names, box.parameters(found.x), found), attrs=about
     )

@@ -70,6 +70,28 @@ def verified(path, points):
     assert end.value.code == 0
 
 
+def test_a_surface_that_two_pairs_pass_together_is_told_of(path, tmp_path, capsys):
+    """Two equal oscillators: no function changes its sign on the one's surface, but a number does."""
+    scene = tmp_path / "two.py"
+    text = SCENE.replace('("x",)', '("x", "y")')
+    for entry in ("out[0, 0] = p[0]", "out[0, 0] = 2 * p[2]"):
+        text = text.replace(entry, "out[1, 1] = " + entry)
+    scene.write_text(text)
+    axes = "".join(
+        f"[axes.{name}]\n" + "".join(f"{key} = {value}\n" for key, value in axis.items())
+        for name, axis in AXES.items()
+    )
+    file = tmp_path / "two.toml"
+    file.write_text(f'scene = "two.py"\n[boundaries]\nsurfaces = true\n{axes}')
+    with pytest.raises(SystemExit) as end:
+        main(["run", str(file), "-o", str(tmp_path / "two.nc")])
+    assert end.value.code == 0
+    assert "a surface is missing on " in capsys.readouterr().err
+    with xr.open_dataset(tmp_path / "two.nc") as two, xr.open_dataset(path) as one:
+        assert two.sizes["surface"] == 0 and "surfaces_unexplained" not in one.attrs
+        assert two.attrs["surfaces_unexplained"] == one.sizes["surface_vertex"]
+
+
 def test_the_file(path):
     assert reading.check(path) == []
     ds = xr.load_dataset(path)

@@ -5,7 +5,7 @@ They are zeros of the functions of `bifurcations`, as the curves on maps of two 
 `curves`).
 """
 
-from survey.measures.floquet import bifurcations, curves
+from survey.measures.floquet import bifurcations, curves, row_count
 from survey.measures.floquet.curves import ALONG, CLASSES, TITLE
 
 __all__ = ["ALONG", "CLASSES", "TITLE", "Functions", "refusal"]
@@ -27,9 +27,12 @@ class Functions:
         self.matrices = curves.matrices_of(scene, box, axes, fixed, options, method)
 
     def on_lattice(self, x):
-        """{class: (values, error bounds)}, to see where surfaces are."""
+        """{class: (values, error bounds)}, to see where surfaces are, and the numbers (N) of
+        multipliers outside the unit circle, -1 where they are not certain.
+        """
         M, E = self.matrices(x, ROUGH)
-        return {kind: function(M, E) for kind, function in self._of(M).items()}
+        counts = row_count.outside(M, E, self.structure)
+        return {kind: function(M, E) for kind, function in self._of(M).items()}, counts
 
     def sharp(self, x, kind):
         """(values, error bounds) of one class."""

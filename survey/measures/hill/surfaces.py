@@ -24,8 +24,8 @@ class Functions:
         self.options, self.method, self.rtol = options, method, rtol
 
     def on_lattice(self, x):
-        """{class: (values, error bounds)}, to see where surfaces are."""
-        return self._factors(x, ROUGH, FACTORS)
+        """{class: (values, error bounds)}, to see where surfaces are; nothing else is counted."""
+        return self._factors(x, ROUGH, FACTORS), None
 
     def sharp(self, x, kind):
         """(values, error bounds) of one class."""
