@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from rich.console import Console
 
 import survey
@@ -427,6 +428,35 @@ def test_edge_takes_physical_input_and_says_what_it_searched():
         survey.edge("satellite", along="inertia_ratio", amplitude=0.5, **shape)
     with pytest.raises(survey.BadInput, match="body"):
         survey.edge("libration_elliptic", along="e", body=["Earth-Moon", "Sun-Earth"])
+
+
+@pytest.mark.parametrize("e", [0.6, 0.9, 0.99, 0.999])
+def test_narrow_strips_beside_mu_0_end_too(e):
+    """They are narrower than the distance between two lines of a search over all mass ratios."""
+    (edge,) = survey.edge("libration_elliptic", along="mu", e=e).edge.values
+    around = survey.evaluate("libration_elliptic", mu=edge * np.array([0.999, 1.001]), e=e)
+    assert around.verdict.values.tolist() == [1, 0]
+    here = survey.evaluate("libration_elliptic", mu=0.2, e=e).survey.margin()
+    assert float(here.edge.sel(parameter="mu")) == pytest.approx(edge, abs=1e-12)
+
+
+def test_on_a_map_of_all_mass_ratios_stability_ends_up_to_its_border(tmp_path):
+    axes = {
+        "mu": {"start": 0.0, "stop": 0.5, "num": 5},
+        "e": {"start": 0.0, "stop": 0.9, "num": 5},
+    }
+    ds = survey.run(
+        {"scene": "libration_elliptic", "axes": axes, "boundaries": {}}, output=tmp_path / "d.nc"
+    )
+    assert float(ds.curve_e.max()) > 0.89
+    assert float(abs(ds.curve_mu).min()) < 2e-4
+    step = 1e-3 * ds.curve_mu.values
+    beside = survey.evaluate(
+        "libration_elliptic",
+        mu=xr.DataArray(np.stack([ds.curve_mu - step, ds.curve_mu + step]), dims=("side", "at")),
+        e=xr.DataArray(ds.curve_e.values, dims="at"),
+    ).verdict.values
+    assert (beside[0] != beside[1]).mean() > 0.9  # not where A and B meet, or at the tip
 
 
 @pytest.mark.parametrize(("e", "names"), [(0.1, ["B", "A", "KC"]), (0.33, ["B"]), (0.5, ["B"])])
