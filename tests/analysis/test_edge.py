@@ -471,6 +471,13 @@ def test_danbys_curves_are_named_where_the_verdict_changes_alone(e, names):
     assert (verdicts[::2].values != verdicts[1::2].values).all()
 
 
+def test_a_point_outside_the_domain_has_no_margin():
+    """No body has these moments of inertia: A > B + C."""
+    point = survey.evaluate("brun_triaxial", A=2.4, B=1.0, C=1.1, Omega=0.5)
+    with pytest.raises(BadInput, match=r"^margin: there is none at this point: .*exceed the sum"):
+        point.survey.margin()
+
+
 @pytest.mark.parametrize("along", ["s3", "b12"])
 def test_the_exact_edge_of_a_gyrostats_ends_is_found_whatever_the_signs(along):
     """K = b12 s3 - b31 s2 = 0, a hyperbola whose border on the line's narrow map is reached by
