@@ -81,6 +81,20 @@ def test_curves_of_a_part_of_a_map_are_planned_as_such(name, tmp_path):
     assert taken / 2 < expected < 2 * taken
 
 
+@pytest.mark.parametrize(
+    ("name", "taken"), [("libration_elliptic_proved", 6.2), ("libration_elliptic", 2.2)]
+)
+def test_cells_of_danbys_map_are_planned_as_they_were_measured(name, taken, tmp_path):
+    """In seconds of the processor, the second with the curves of the map."""
+    checked = workflow.check(
+        tomllib.loads((WORKFLOWS / f"{name}.toml").read_text(encoding="utf-8")),
+        output=tmp_path / "map.nc",
+        near=WORKFLOWS,
+    )
+    expected = plan.estimates(checked)[0]["further"] * cpus()
+    assert taken / 2 < expected < 2 * taken
+
+
 LINE = {"start": 0.01, "stop": 0.03, "num": 9}
 
 
