@@ -81,3 +81,14 @@ def test_a_tag_publishes_what_it_names():
     steps = " ".join(step.get("run", "") for step in release["jobs"]["build"]["steps"])
     assert f"dist/{PROJECT['name'].replace('-', '_')}-${{GITHUB_REF_NAME#v}}" in steps
     assert PROJECT["urls"]["Package index"].endswith(f"/project/{PROJECT['name']}/")
+
+
+def test_the_lowest_xdist_knows_the_options_of_pytest():
+    """--no-loadscope-reorder came with 3.8; without it pytest does not start."""
+    table = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    options = table["tool"]["pytest"]["ini_options"]["addopts"]
+    for extra, needs in PROJECT["optional-dependencies"].items():
+        for need in needs:
+            if need.startswith("pytest-xdist") and "--no-loadscope-reorder" in options:
+                lowest = tuple(int(part) for part in need.partition(">=")[2].split("."))
+                assert lowest >= (3, 8), extra

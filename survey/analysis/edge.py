@@ -285,6 +285,10 @@ def margin(ds):
     measure = measures.curves(module)
     if measure is None:
         raise BadInput(f"margin: {_UNKNOWN} {ds.attrs['scene']}; {_INSTEAD}")
+    if "status" in ds and int(ds.status) == status.INVALID_PARAMETERS:
+        raise BadInput(
+            f"margin: there is none at this point: {status.table(module)['invalid_parameters'][1]}"
+        )
     here, options = parameters(ds), options_at(ds, module)
     rows, reasons = [], []
     with watched(

@@ -115,6 +115,9 @@ QUESTIONS = {
             "the points that are solved along each side of a block", object, needed=True
         ),
         "MOST": Value("the largest number of cells", int, needed=True),
+        "CELL_SECONDS": Value(
+            "seconds of a cell on one thread, measured, for `survey plan`", float
+        ),
     },
 }
 

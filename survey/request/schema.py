@@ -109,7 +109,7 @@ def complaint(error):
         return f"{key} cannot be combined with other keys; give either values alone, or start, stop and num"
     if first["type"] == extra:
         remedy = REMEDIES.get(first["loc"][-1], "") if len(first["loc"]) > 1 else ""
-        return f"unknown key {key}{remedy or _nearest(first['loc'])}{more}"
+        return f"unknown key {key}{remedy or _nearest(first['loc'], first['input'])}{more}"
     if first["type"] == "missing":
         return f"{key} is missing; add it to the workflow{more}"
     if key.startswith("axes.body") and isinstance(first["input"], str):
@@ -147,14 +147,18 @@ def _is_number(given):
     return True
 
 
-def _nearest(location):
-    """The keys that are allowed beside an unknown one, the nearest first."""
+def _nearest(location, given):
+    """The keys that are allowed beside an unknown one, the nearest first; where one without a table belongs."""
     meant = modules.OTHER_WORDS.get(location[-1], location[-1])
-    for name in ("solver", "output") if len(location) == 1 else ():
+    alone = len(location) == 1 and not isinstance(given, dict)
+    for name in ("solver", "output") if alone else ():
         if meant in TABLES[name].model_fields:
             return f"; put {meant} under [{name}]"
     table = TABLES.get(location[0], File) if len(location) > 1 else File
     known = list(table.model_fields) + (["values"] if table is Spread else [])
-    return modules.unknown("", str(location[-1]), known).removeprefix(
+    words = modules.unknown("", str(location[-1]), known).removeprefix(
         f"unknown  {shown(str(location[-1]))}"
     )
+    if alone and "did you mean" not in words:
+        return f"; parameters stand under [axes], options under [options]{words}"
+    return words

@@ -178,6 +178,10 @@ def check(data, text="", output=None, default_path="survey.nc", near=None, prove
             raise BadInput(
                 "output.figures: there are no surfaces; write surfaces = true under [boundaries]"
             )
+        if figure in {output.name for output in scene.OUTPUTS} - {*request.variables}:
+            raise BadInput(
+                f"output.figures: {figure} is not among output.variables; add it there too"
+            )
         if figure not in (*request.variables, SURFACES):
             raise BadInput(
                 f"output.figures: {modules.unknown('variable', figure, sorted(request.variables))}"

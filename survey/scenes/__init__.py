@@ -99,7 +99,8 @@ CONTRACT = {
         dict,
     ),
     "curves_seconds": Value(
-        "seconds that the curves of [boundaries] of a map take, where they are searched", float
+        "seconds that the curves of [boundaries] take on a map of the whole domain, where they are searched",
+        float,
     ),
     "solve": Function("{output: array} of a block, see above", ("point", "request"), needed=True),
     "why": Function(

@@ -12,6 +12,7 @@ from survey.show.text import spaced
 _EDGES = "edges: even dark, odd grey;\nperiodic solid, antiperiodic dashed"
 _LIMITS = (-2.0, 2.0)  # of the trace D of Hill's equation: the edges of stability
 _RIM = withStroke(linewidth=2.0, foreground="#444444")
+_DARK = ("#000000", "#707070")
 _PALE = {"color": "#FFFFFF", "lw": 1.2, "path_effects": [_RIM]}
 _THIN = {"color": "#000000", "ls": ":", "lw": 0.8}
 _POINT = {"ls": "none", "mec": "#000000", "mew": 0.8}
@@ -190,15 +191,18 @@ def draw_edges(axes, ds, x):
         labelled.add(label)
 
 
-def draw_boundaries(axes, ds, x, y, gaps=None):
+def draw_boundaries(axes, ds, x, y, gaps=None, on_cells=False):
     """Draw the boundaries over the map, points above lines; returns their legend handles.
 
     `gaps`: the colour between the dashes of edges of tongues, which are lines themselves where they
-    are narrow.
+    are narrow. Dark lines have a white rim on cells, of which the undecided along them are black.
     """
     handles = {}
     for name, parts in curves_of(ds).items():
         label, properties = CURVES[name]
+        if on_cells and properties.get("color") in _DARK and "marker" not in properties:
+            rim = withStroke(linewidth=properties["lw"] + 1.0, foreground="#FFFFFF")
+            properties = properties | {"path_effects": [rim]}
         zorder = 3 if "marker" in properties else 2
         if label is _EDGES and properties["ls"] != "-":
             properties = properties | {"gapcolor": gaps}

@@ -44,7 +44,8 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
     plane = _plane(ds, variable) if boundaries else None
     failed = np.isin(state.values, list(status.FAILURES))
     outside = state.values == status.INVALID_PARAMETERS
-    if variable.name == "verdict" and "cell_verdict" in ds:
+    on_cells = variable.name == "verdict" and "cell_verdict" in ds
+    if on_cells:
         handles = draw_cells(axes, ds, x, y, failed, number, paper)
     elif "flag_values" in variable.attrs:
         handles = _verdicts(axes, x, y, ds, variable, state, number, paper)
@@ -82,7 +83,7 @@ def draw_map(axes, ds, variable, state, boundaries, paper, asked):
             if "flag_values" in variable.attrs
             else None
         )
-        handles += draw_boundaries(axes, plane, x, y, gaps)
+        handles += draw_boundaries(axes, plane, x, y, gaps, on_cells)
     if handles:
         add_legend(axes, handles)
     axes.set(xlabel=label_of(x, WIDE), ylabel=label_of(y, WIDE))

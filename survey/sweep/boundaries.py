@@ -26,7 +26,10 @@ from survey.measures.tasks import in_turn
 from survey.scene import Request
 from survey.sweep.line import OnLine, on_line
 
-ALONE = 1 / 15  # of the time of a map: of one axis, measured
+# of the time of a map, measured: of one axis, of which most are short or have few boundaries; and
+# the exponent with which the time of a part of a map grows with the part
+ALONE, ALONE_OWN, GROWTH = 1 / 35, 1 / 15, 0.7
+PARTS = 10.0  # width of a domain of which a map is a part
 ROWS = 128  # solved together
 COLUMNS = 9  # searched for curves that meet no row
 RTOL = 1e-13
@@ -109,7 +112,7 @@ def plan(workflow, cost):
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         maps = [pair for pair, _ in _maps(workflow)] or [tuple(sizes)]  # or an axis alone
         return {"bytes_per_curve_point": size}, sum(
-            _seconds_of_map(workflow.scene, measure, list(pair), cost) for pair in maps
+            _seconds_of_map(workflow, measure, list(pair), cost) for pair in maps
         )
     # measured: ten to twenty edges per row; about five hundred points of curves
     rows = {
@@ -125,15 +128,28 @@ def plan(workflow, cost):
     }, seconds
 
 
-def _seconds_of_map(scene, measure, axes, cost):
+def _seconds_of_map(workflow, measure, axes, cost):
     """Estimated seconds on one thread of the curves on one map, or along one axis."""
     if hasattr(measure, "seconds"):
         return measure.seconds(axes)  # measured
     if hasattr(measure, "searched"):
         # measured: some ten points solved for each point of a curve, and a lattice
-        seconds = getattr(scene, "curves_seconds", 1e5 * cost)
-        return seconds * (1.0 if len(axes) > 1 else ALONE)
+        seconds = getattr(workflow.scene, "curves_seconds", 1e5 * cost)
+        own = hasattr(workflow.scene, "HASH")  # whose time is that of maps as users draw them
+        seconds *= 1.0 if own else _part(workflow, axes) ** GROWTH
+        return seconds * (1.0 if len(axes) > 1 else ALONE_OWN if own else ALONE)
     return 0.1
+
+
+def _part(workflow, axes):
+    """The part of the domain that a map spans: the geometric mean over its axes, 1 for an unbounded
+    parameter.
+    """
+    widths = {p.name: p.maximum - p.minimum for p in workflow.scene.PARAMETERS}
+    spans = {name: np.ptp(workflow.grid.parameters[name][1]) for name in axes}
+    return prod(
+        min(spans[name] / widths[name], 1.0) if widths[name] <= PARTS else 1.0 for name in axes
+    ) ** (1.0 / len(axes))
 
 
 def _measure(workflow, question):

@@ -87,8 +87,12 @@ def compiling(workflow):
     needs compiled?)
     """
     about = _about(workflow)
-    keys = ("scene", "options", "method", "tables")
-    like = [one for one in _records() if all(one.get(key) == about[key] for key in keys)]
+    keys = ("kernels_of", "options", "method", "tables")
+    like = [
+        one
+        for one in ({"kernels_of": one.get("scene")} | one for one in _records())
+        if all(one.get(key) == about[key] for key in keys)
+    ]
     known = any(one["hash"] == jit.KERNEL_HASH for one in like) and not always_compiled(
         workflow.scene
     )
@@ -99,8 +103,12 @@ def compiling(workflow):
 def _about(workflow):
     """What distinguishes runs whose times differ for reasons other than the number of points."""
     request = workflow.request
+    scene = getattr(workflow.scene, "HASH", workflow.name)
+    own = hasattr(workflow.scene, "HASH") and not always_compiled(workflow.scene)
     return {
-        "scene": getattr(workflow.scene, "HASH", workflow.name),
+        "scene": scene,
+        # equations of one's own that are recorded, not compiled, have those of their family
+        "kernels_of": workflow.scene.FAMILY if own else scene,
         "options": ",".join(f"{key}={value}" for key, value in request.options.items()),
         "method": request.method,
         "axes": ",".join(workflow.grid.sizes),

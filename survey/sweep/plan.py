@@ -70,8 +70,9 @@ def _compiling(workflow):
     spent, done = measured.compiling(workflow)
     if done:
         return "done already"
-    usual = announce.SECONDS.get(workflow.scene.FAMILY, announce.USUAL)
-    if cpus() == 1 and hasattr(workflow.scene, "compile_ahead"):
+    usual = announce.seconds(workflow.name, workflow.scene, workflow.refine is not None)
+    divided = hasattr(workflow.scene, "compile_ahead") and workflow.name not in announce.OF_SCENES
+    if cpus() == 1 and divided:
         usual *= 2  # measured: what another processor compiles meanwhile comes after it
     about = lasting(usual if spent is None else spent)
     own = announce.always_compiled(workflow.scene)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from rich.console import Console
 
 import survey
@@ -429,6 +430,35 @@ def test_edge_takes_physical_input_and_says_what_it_searched():
         survey.edge("libration_elliptic", along="e", body=["Earth-Moon", "Sun-Earth"])
 
 
+@pytest.mark.parametrize("e", [0.6, 0.9, 0.99, 0.999])
+def test_narrow_strips_beside_mu_0_end_too(e):
+    """They are narrower than the distance between two lines of a search over all mass ratios."""
+    (edge,) = survey.edge("libration_elliptic", along="mu", e=e).edge.values
+    around = survey.evaluate("libration_elliptic", mu=edge * np.array([0.999, 1.001]), e=e)
+    assert around.verdict.values.tolist() == [1, 0]
+    here = survey.evaluate("libration_elliptic", mu=0.2, e=e).survey.margin()
+    assert float(here.edge.sel(parameter="mu")) == pytest.approx(edge, abs=1e-12)
+
+
+def test_on_a_map_of_all_mass_ratios_stability_ends_up_to_its_border(tmp_path):
+    axes = {
+        "mu": {"start": 0.0, "stop": 0.5, "num": 5},
+        "e": {"start": 0.0, "stop": 0.9, "num": 5},
+    }
+    ds = survey.run(
+        {"scene": "libration_elliptic", "axes": axes, "boundaries": {}}, output=tmp_path / "d.nc"
+    )
+    assert float(ds.curve_e.max()) > 0.89
+    assert float(abs(ds.curve_mu).min()) < 2e-4
+    step = 1e-3 * ds.curve_mu.values
+    beside = survey.evaluate(
+        "libration_elliptic",
+        mu=xr.DataArray(np.stack([ds.curve_mu - step, ds.curve_mu + step]), dims=("side", "at")),
+        e=xr.DataArray(ds.curve_e.values, dims="at"),
+    ).verdict.values
+    assert (beside[0] != beside[1]).mean() > 0.9  # not where A and B meet, or at the tip
+
+
 @pytest.mark.parametrize(("e", "names"), [(0.1, ["B", "A", "KC"]), (0.33, ["B"]), (0.5, ["B"])])
 def test_danbys_curves_are_named_where_the_verdict_changes_alone(e, names):
     """Beyond the tip, at e = 0.3145, A goes on between unstable motions."""
@@ -439,6 +469,13 @@ def test_danbys_curves_are_named_where_the_verdict_changes_alone(e, names):
         "libration_elliptic", e=e, mu=np.sort([*(found.edge - 1e-6), *(found.edge + 1e-6)])
     ).verdict
     assert (verdicts[::2].values != verdicts[1::2].values).all()
+
+
+def test_a_point_outside_the_domain_has_no_margin():
+    """No body has these moments of inertia: A > B + C."""
+    point = survey.evaluate("brun_triaxial", A=2.4, B=1.0, C=1.1, Omega=0.5)
+    with pytest.raises(BadInput, match=r"^margin: there is none at this point: .*exceed the sum"):
+        point.survey.margin()
 
 
 @pytest.mark.parametrize("along", ["s3", "b12"])

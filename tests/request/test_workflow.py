@@ -65,6 +65,17 @@ def test_defaults_are_filled_in():
         ),
         (["axes.kk.num=40", "solvr.rtol=1"], ["unknown key solvr; did you mean 'solver'?"]),
         (["axes.rho.vales=[1.0]"], ["unknown key axes.rho.vales; did you mean 'values'?"]),
+        (
+            ["a=1"],
+            [
+                "unknown key a; parameters stand under [axes], options under [options] (allowed: title"
+            ],
+        ),
+        (["outputs={path='x.nc'}"], ["unknown key outputs; did you mean 'output'?"]),
+        (
+            ["output.variables=['y1']", "output.figures=['verdict']"],
+            ["output.figures: verdict is not among output.variables; add it there too"],
+        ),
         (["refine.widht=0.1"], ["unknown key refine.widht; did you mean 'width'?"]),
         (["boundaries.axs=rho"], ["unknown key boundaries.axs; did you mean 'axis'?"]),
         (["output.variabls=['y1']"], ["unknown key output.variabls; did you mean 'variables'?"]),

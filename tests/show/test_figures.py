@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex, to_rgb
 import survey
 from survey import status
 from survey.errors import BadInput
-from survey.file.labels import fill_of
+from survey.file.labels import fill_of, flag_codes
 from survey.show import figures, maps, marks, palette
 
 
@@ -311,6 +311,10 @@ def test_the_legend_of_a_refined_map_says_what_is_drawn_as_undecided(tmp_path):
     figure = figures.draw(ds, "verdict")
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert f"undecided cells ({covered:.2g} % of the map)" in labels
+    plt.close(figure)
+    # the curves have a light rim
+    curves = [name for name in ds.data_vars if name.startswith(("curve_", "edge_"))]
+    figure = figures.draw(ds.drop_vars(curves), "verdict")
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     pixels = np.asarray(canvas.buffer_rgba()).astype(int)
@@ -319,6 +323,35 @@ def test_the_legend_of_a_refined_map_says_what_is_drawn_as_undecided(tmp_path):
     black = 100.0 * (inside[..., :3].sum(axis=-1) < 120).mean()
     assert 0.6 * covered < black < 1.4 * covered
     plt.close(figure)
+
+
+def test_dark_curves_are_seen_on_the_black_cells_of_a_refined_map(tmp_path):
+    axes = {
+        "mu": {"start": 0.0, "stop": 0.06, "num": 9},
+        "e": {"start": 0.0, "stop": 0.3, "num": 9},
+    }
+    ds = survey.run(
+        {"scene": "libration_elliptic", "axes": axes, "boundaries": {}, "refine": {"width": 0.02}},
+        output=tmp_path / "map.nc",
+    )
+    figure = figures.draw(ds, "verdict")
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[::-1].astype(int)
+    ends = np.cumsum(ds.curve_count.values)
+    for kind in ("A", "B"):
+        code = flag_codes(ds.curve_class.attrs)[kind]
+        first = int(np.flatnonzero(ds.curve_class.values == code)[0])
+        part = slice(ends[first] - ds.curve_count.values[first], ends[first])
+        at = np.stack([ds.curve_mu.values[part], ds.curve_e.values[part]], axis=1)
+        columns, rows = figure.axes[0].transData.transform(at[3:-3]).T.astype(int)
+        # the brightest pixel within three of the curve's; the cells are below 20
+        around = [
+            pixels[r - 3 : r + 4, c - 3 : c + 4, :3].min(axis=-1).max()
+            for r, c in zip(rows, columns, strict=True)
+        ]
+        assert np.mean(np.array(around) > 140) > 0.8, kind
+    plt.close("all")
 
 
 def test_bars_of_counts_have_whole_ticks():

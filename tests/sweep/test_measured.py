@@ -92,6 +92,23 @@ def test_compiling_is_reported_apart(mapped, monkeypatch):
     assert plan.plan(mapped)["compiling"] == "about 13 s besides, once on this machine"
 
 
+def test_recorded_equations_share_the_kernels_of_their_family(mapped, tmp_path):
+    def asked(rate):
+        path = tmp_path / f"rate{rate}.py"
+        path.write_text(
+            f'STATES, PARAMETERS, PERIOD = "x", "q", 1.0\ndef A(t, p, out): out[0, 0] = -{rate} * p[0]\n'
+        )
+        table = {"scene": str(path), "axes": {"q": [0.1, 0.2]}}
+        return workflow.check(table, output=mapped.path)
+
+    one, other = asked(1), asked(2)
+    assert one.scene.HASH != other.scene.HASH
+    measured.note(one, {"kernels": 1.0}, {"kernels": 2.0}, 21.0)
+    assert plan.plan(other)["compiling"] == "done already"
+    assert plan.plan(other)["time_from"] == plan.GUESSED
+    assert plan.plan(mapped)["compiling"] != "done already"
+
+
 def test_the_runs_most_alike_decide(mapped):
     other = workflow.check({**TABLE, "options": {"body": "oblate"}}, output=mapped.path)
     measured.note(other, {"kernels": 1.0}, {"kernels": 8.0}, 0.0)

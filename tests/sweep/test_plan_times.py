@@ -60,3 +60,61 @@ def test_plans_are_within_a_factor_of_2(name, tmp_path, monkeypatch):
             expected,
             taken[part],
         )
+
+
+CURVES = {  # seconds of the processor that curves of the triaxial satellite have taken
+    "window": ({"yaw_ratio": (0.3, 0.32), "roll_ratio": (0.6, 0.62)}, 4.5),
+    "tenth": ({"yaw_ratio": (0.1, 0.3), "roll_ratio": (0.4, 0.6)}, 17.9),
+    "quarter": ({"yaw_ratio": (-0.25, 0.25), "roll_ratio": (0.3, 0.8)}, 22.2),
+    "line": ({"yaw_ratio": (-0.99, 0.59)}, 4.2),
+}
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_curves_of_a_part_of_a_map_are_planned_as_such(name, tmp_path):
+    ends, taken = CURVES[name]
+    axes = {key: {"start": a, "stop": b, "num": 5} for key, (a, b) in ends.items()}
+    fixed = {"yaw_ratio": 0.3, "roll_ratio": 0.6, "amplitude": 0.5236}
+    table = {"scene": "satellite_triaxial", "axes": fixed | axes, "boundaries": {}}
+    checked = workflow.check(table, output=tmp_path / "map.nc")
+    expected = plan.estimates(checked)[0]["further"] * cpus()
+    assert taken / 2 < expected < 2 * taken
+
+
+@pytest.mark.parametrize(
+    ("name", "taken"), [("libration_elliptic_proved", 6.2), ("libration_elliptic", 2.2)]
+)
+def test_cells_of_danbys_map_are_planned_as_they_were_measured(name, taken, tmp_path):
+    """In seconds of the processor, the second with the curves of the map."""
+    checked = workflow.check(
+        tomllib.loads((WORKFLOWS / f"{name}.toml").read_text(encoding="utf-8")),
+        output=tmp_path / "map.nc",
+        near=WORKFLOWS,
+    )
+    expected = plan.estimates(checked)[0]["further"] * cpus()
+    assert taken / 2 < expected < 2 * taken
+
+
+LINE = {"start": 0.01, "stop": 0.03, "num": 9}
+
+
+@pytest.mark.parametrize(
+    ("scene", "axes", "more", "taken"),
+    [
+        ("mathieu", {"q": 1.0, "a": LINE}, {}, 4.3),
+        ("mathieu", {"q": LINE, "a": LINE}, {}, 6.8),
+        ("mathieu", {"q": LINE, "a": LINE}, {"refine": {"width": 0.01}}, 13.0),
+        ("libration", {"mu": LINE}, {}, 4.1),
+        ("libration", {"mu": LINE}, {"options": {"order": "8"}}, 10.6),
+        ("libration_elliptic", {"mu": LINE, "e": 0.1}, {"boundaries": {}}, 3.3),
+        ("libration_elliptic", {"mu": LINE, "e": LINE}, {"refine": {"width": 0.01}}, 13.7),
+    ],
+)
+def test_compiling_on_one_processor_is_planned_as_it_was_measured(
+    scene, axes, more, taken, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(plan, "cpus", lambda: 1)
+    monkeypatch.setattr(measured, "_records", list)
+    checked = workflow.check({"scene": scene, "axes": axes} | more, output=tmp_path / "map.nc")
+    said = float(plan.plan(checked)["compiling"].split()[1])
+    assert taken / 2 < said < 2 * taken

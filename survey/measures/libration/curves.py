@@ -48,7 +48,9 @@ def closed(square, axes, fixed, options):
             return _function(name, here["e"], here["mu"])
 
         for x, error in contours.lines(on_map, square, LINES):
-            found.append((code, square.parameters(x), error, {}))
+            at = square.parameters(x)
+            for part in contours.runs(_is_boundary(**dict(zip(axes, at.T, strict=True)))):
+                found.append((code, at[part], error[part], {}))
     return joined(found, [])
 
 
@@ -76,11 +78,14 @@ def _of_circular(square):
 
 
 def _function(name, e, mu):
-    """(values, bars) of the function that vanishes on the curve, at points (N); NaN where it means
-    something else.
+    """(values, bars) of the function that vanishes on the curve, at points (N); NaN where it is not
+    defined.
+
+    At mu = 0 A and B are negative, and known: the first line of a map is no end of what is
+    searched. There K vanishes for all e.
     """
     out, bars = np.full((2, e.size), np.nan)
-    inside = (mu > 0.0) & (mu <= 0.5) & (e >= 0.0) & (e < 1.0)
+    inside = ((mu > 0.0) if name == "KC" else (mu >= 0.0)) & (mu <= 0.5) & (e >= 0.0) & (e < 1.0)
     if not inside.any():
         return out, bars
     values, errors = danby.factors(e[inside], mu[inside])
@@ -88,8 +93,19 @@ def _function(name, e, mu):
     if name == "KC":
         (ab, ab_bar), (cd, cd_bar) = product.py_func(a, b, ea, eb), product.py_func(c, d, ec, ed)
         value, bar = np.vectorize(discriminant)(t, ab, cd, et, ab_bar, cd_bar)
+        value = np.where(_between(t), value, np.nan)
     else:
         value, bar = (a, ea) if name == "A" else (b, eb)
-    on_circle = (t > 0.0) & (t < 2.0)  # beyond the tip A vanishes between unstable motions
-    out[inside], bars[inside] = np.where(on_circle, value, np.nan), bar
+    out[inside], bars[inside] = value, bar
     return out, bars
+
+
+def _is_boundary(mu, e):
+    """Is stability lost at these points, which lie on one of the curves? Beyond the tip A vanishes
+    between unstable motions.
+    """
+    return _between(danby.factors(e, mu)[0][:, 4])
+
+
+def _between(t):
+    return (t > 0.0) & (t < 2.0)
