@@ -1,10 +1,12 @@
 """Cells decided by the signs of a few functions: stable where all are positive, unstable where one
-is negative.
+is negative; and stable where a symmetric matrix is definite, whose leading minors are further ones.
 
 On a block each function is its tensor Chebyshev series to within a bound, as in
 `survey.measures.hill.cells`, whose series and cells these are; the cells of a block are halved on
 the series alone, all of one size together.
 """
+
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +19,7 @@ from survey.kernels.hill.cells import (
     HALVED_Y,
     INDEX_X,
     LEAF,
+    OTHER,
     STABLE_PART,
     TAIL_X,
     TAIL_Y,
@@ -28,16 +31,16 @@ from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import cells
 
 
-def find(solve, x, y, each, report, values):
+def find(solve, x, y, each, report, values, minors=0):
     """The `hill.cells.Cells` of the rectangle of the Sides x and y.
 
-    `values(out)` makes the functions and their bounds (B, F, n, n) of what `solve` gives; other
-    arguments as there.
+    `values(out)` makes the functions and their bounds (B, F, n, n) of what `solve` gives, of which
+    the last `minors` are the leading minors of a matrix; other arguments as there.
     """
-    return cells.find(solve, x, y, each, report, values, _descend)
+    return cells.find(solve, x, y, each, report, values, partial(_descend, minors=minors))
 
 
-def _descend(series, doubts, blocks, depth, halves):
+def _descend(series, doubts, blocks, depth, halves, minors):
     """As `kernels.hill.cells.descend`: leaves (M, LEAF) of blocks, cells of one size halved together."""
     leaves = []
     slack = doubts.sum(axis=2)
@@ -45,11 +48,13 @@ def _descend(series, doubts, blocks, depth, halves):
     where = blocks.astype(np.int64)
     of = np.arange(len(blocks))
     while len(where):
-        verdict = decided(own, slack[of])
-        # a block whose own series is too loose is solved again, if it can be halved
-        loose = (verdict == UNDECIDED) & (
-            doubts[of][:, :, [TAIL_X, TAIL_Y]].sum(axis=2) > ENOUGH * _sizes(own)
-        ).any(axis=1)
+        verdict = decided(own, slack[of], minors)
+        # a block whose own series is too loose is solved again, if it can be halved; not where a
+        # function is 0 but for the errors of its values
+        tails, other = doubts[of][:, :, [TAIL_X, TAIL_Y]].sum(axis=2), doubts[of][:, :, OTHER]
+        loose = (verdict == UNDECIDED) & (tails > np.maximum(ENOUGH * _sizes(own), other)).any(
+            axis=1
+        )
         to_split = (
             (where == blocks[of]).all(axis=1)
             & loose
@@ -70,11 +75,16 @@ def _sizes(series):
     return abs(series).sum(axis=(2, 3))
 
 
-def decided(series, slack):
+def decided(series, slack, minors=0):
     """The verdicts of cells (M), from the mean of each function and the sum of its other coefficients."""
     middle = series[:, :, 0, 0]
     swing = (_sizes(series) - abs(middle) + slack) * (1.0 + 256.0 * EPS)
-    unstable, stable = (middle < -swing).any(axis=1), (middle > swing).all(axis=1)
+    signs = np.where(middle > swing, 1, np.where(middle < -swing, -1, 0))
+    signs, of_minors = np.split(signs, [signs.shape[1] - minors], axis=1)
+    unstable, stable = (signs < 0).any(axis=1), (signs > 0).all(axis=1)
+    if minors:
+        negative = (-1) ** np.arange(1, minors + 1)  # those of a negative definite matrix
+        stable |= (of_minors > 0).all(axis=1) | (of_minors * negative > 0).all(axis=1)
     return np.where(unstable, UNSTABLE, np.where(stable, STABLE, UNDECIDED))
 
 

@@ -8,17 +8,21 @@ the characteristic polynomial of M.
                              S = T T' - R R', T and R the lower triangular Toeplitz matrices of the
                              coefficients of p from its first and from its last one on
     symplectic, reversible   the leading minors of the moments sum_s (4 - s^2) s^(j+k) of the roots s = l + 1 / l
+    symplectic               besides, those of J M + (J M)^T
 
 All are positive if all multipliers are inside the unit circle (S > 0; two multipliers l and 1 / l,
 or 1 / conj(l), take two from the rank of S, so that its last minor but one is 0 there), or if all s
-are real, different and between -2 and
-2. None is negative if these are inside or on the circle, or between -2 and 2 or at these. So where
-  one is negative, a
-multiplier is outside. Where s meet and do no harm, being of one Krein sign, the cells stay
-undecided.
+are real, different and between -2 and 2. None is negative if these are inside or on the circle, or
+between -2 and 2 or at these. So where one is negative, a multiplier is outside.
+
+Where s meet, a minor of the moments is 0. A symplectic M leaves the form of J M + (J M)^T as it is,
+so that motions are bounded, strongly, where this is definite: where all multipliers of one Krein
+sign are on one half of the circle, as those of equal oscillators are. Where others of one Krein
+sign meet and do no harm, the cells stay undecided.
 
 Source: M. Marden, Geometry of Polynomials (1966), 43 (Schur-Cohn); F. R. Gantmacher, The Theory of
-Matrices (1959), XV (moments).
+Matrices (1959), XV (moments); V. A. Yakubovich, V. M. Starzhinskii, Linear Differential Equations
+with Periodic Coefficients (1975), III (invariant forms).
 """
 
 from functools import partial
@@ -28,7 +32,12 @@ import numpy as np
 from survey.kernels.math.roundoff import EPS
 from survey.measures import sign_cells
 from survey.measures.floquet import bifurcations, dense
-from survey.measures.floquet.multipliers import STABLE, UNDECIDED, UNSTABLE
+from survey.measures.floquet.multipliers import (
+    STABLE,
+    UNDECIDED,
+    UNSTABLE,
+    symplectic_form,
+)
 from survey.measures.hill.cells import MOST, POINTS, Side, accuracy
 from survey.measures.tasks import in_turn
 
@@ -70,23 +79,32 @@ def refusal(scene, point):
 
 def keywords(scene):
     """Further arguments of `find` for the scene."""
-    return {"structure": scene.structure}
+    return {"structure": scene.structure, "states": len(scene.states)}
 
 
-def find(solve, x, y, each=in_turn, report=None, structure="none"):
-    """The `hill.cells.Cells` of the Sides x and y of a system of this structure; other arguments as there."""
-    return sign_cells.find(solve, x, y, each, report, partial(_values, structure=structure))
+def find(solve, x, y, each=in_turn, report=None, structure="none", states=2):
+    """The `hill.cells.Cells` of the Sides x and y of a system of this structure and so many states;
+    other arguments as there.
+    """
+    minors = states if structure == "symplectic" and states > 2 else 0
+    values = partial(_values, structure=structure, minors=minors)
+    return sign_cells.find(solve, x, y, each, report, values, minors)
 
 
-def _values(out, structure):
+def _values(out, structure, minors):
     """The functions and their bounds (B, F, m, m)."""
     M, E = out["monodromy"], out["monodromy_error"].astype(float)
     shape, n = M.shape[:-2], M.shape[-1]
     M, E = (one.reshape(-1, n, n) for one in (M, E))
-    values, bars = np.full((2, len(M), n // 2 if structure != "none" else n + 1), np.nan)
+    number = minors + (n // 2 if structure != "none" else n + 1)
+    values, bars = np.full((2, len(M), number), np.nan)
     good = np.flatnonzero(np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2)))
     if good.size:
-        values[good], bars[good] = margins(M[good], E[good], structure)
+        found = [margins(M[good], E[good], structure)]
+        found += [_of_form(M[good], E[good])] if minors else []
+        values[good], bars[good] = (
+            np.concatenate(both, axis=1) for both in zip(*found, strict=True)
+        )
     return tuple(np.moveaxis(one.reshape(*shape, -1), -1, 1) for one in (values, bars))
 
 
@@ -103,6 +121,14 @@ def margins(M, E, structure):
     minors = _minors(*_schur_cohn(c, d), most=n - 1)
     ends = ((-1.0) ** n * first, d_first), last
     return tuple(np.column_stack([*(end[k] for end in ends), minors[k]]) for k in (0, 1))
+
+
+def _of_form(M, E):
+    """The leading minors (N, n) of J M + (J M)^T, and their bounds."""
+    J = symplectic_form(M.shape[1])
+    Q, off = J @ M, abs(J) @ E
+    Q = Q + np.swapaxes(Q, 1, 2)
+    return _minors(Q, off + np.swapaxes(off, 1, 2) + EPS * abs(Q))
 
 
 def _schur_cohn(c, d):

@@ -91,6 +91,29 @@ def test_areas_of_mathieus_map(tmp_path):
     assert errors[1] < 0.4 * errors[0] < 0.4
 
 
+def test_two_equal_oscillators_are_settled_as_one_is(tmp_path):
+    """Their multipliers meet everywhere: J M + (J M)^T is definite where they are on the circle."""
+
+    def K(t, p, out):
+        out[0, 0] = out[1, 1] = p[0] - 2 * p[1] * math.cos(2 * t)
+
+    pair = survey.floquet(
+        K=K,
+        period=math.pi,
+        parameters=("a", "q"),
+        states=("x", "y"),
+        structure="symplectic",
+    )
+    known = ran(mathieu(0.0), tmp_path, 0.01, a=(-1.0, 6.0), q=(0.0, 3.0))
+    ds = ran(pair, tmp_path, 0.01, a=(-1.0, 6.0), q=(0.0, 3.0))
+    assert (ds.area_error <= 2.0 * known.area_error.max()).all()
+    assert (abs(ds.area - known.area) <= ds.area_error + known.area_error).all()
+    assert ds.attrs["refine_points"] <= 2 * known.attrs["refine_points"]
+    for _ in range(3):
+        (a, q), verdict = inside(ds, np.random.default_rng(6), "a", "q")
+        np.testing.assert_array_equal(margin(a, q, 0.0) > 0, verdict == 1)
+
+
 def test_two_oscillators(tmp_path):
     """The example: strongly stable cells and unstable ones, by points, and by `survey verify`."""
     scene = str(WORKFLOWS / "coupled_mathieu.py")
