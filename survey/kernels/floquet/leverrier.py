@@ -51,6 +51,9 @@ def answer_matrices(
                 _in_sums(sums[0], sums[1], m, change, c, bars, 0, lane)
                 if of_forms:
                     _in_sums(sums[2], sums[3], m, forms, c, bars, d, lane)
+                if not _palindromic(sums[0], sums[1]):
+                    for k in range(K):
+                        bars[k, lane] = math.inf
             else:
                 for k in range(n):
                     c[k, lane], bars[k, lane] = sums[0, k + 1], sums[1, k + 1]
@@ -111,6 +114,16 @@ def _leverrier(M, E, squares, sums):
             low, high = B[m + i, i], B[i, m + i]
             form[k] += low - high
             form_bars[k] += wide[m + i, i] + wide[i, m + i] + n * EPS * (abs(low) + abs(high))
+
+
+@kernel
+def _palindromic(c, bars):
+    """May the polynomial be the same from its last coefficient on, as where 1 / l is a root with l?"""
+    n = len(c) - 1
+    for k in range(n + 1):
+        if abs(c[k] - c[n - k]) > bars[k] + bars[n - k]:
+            return False
+    return True
 
 
 @kernel

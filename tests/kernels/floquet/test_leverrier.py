@@ -77,6 +77,17 @@ def test_multipliers_of_all_matrices_within_the_bounds(n, structure):
         assert both.any()
 
 
+@pytest.mark.parametrize("n", [2, 4])
+def test_a_structure_that_the_polynomial_has_not(n):
+    """Multipliers 0.5 and 3: 1 / l is none of them, whatever was said."""
+    M = np.diag([0.5, 3.0, 0.7, 1.2][:n])[None]
+    for asked in (ASKED, {"spectral_radius", "verdict"}):
+        found = stability.by_coefficients(
+            Matrices.plain(M, 1e-15 * abs(M)), "reversible", 1.0, asked
+        )
+        assert found.missed.all() and found.verdict.tolist() == [UNDECIDED]
+
+
 def test_what_is_left_open_goes_to_the_discs():
     """A double multiplier off the circle: missed here, answered by discs in `assess`."""
     M = np.array(
