@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from survey.request import workflow
-from survey.sweep import engine, measured, plan
+from survey.sweep import dispatch, engine, measured, plan
 from survey.sweep.dispatch import cpus
 
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
@@ -113,7 +113,7 @@ LINE = {"start": 0.01, "stop": 0.03, "num": 9}
 def test_compiling_on_one_processor_is_planned_as_it_was_measured(
     scene, axes, more, taken, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(plan, "cpus", lambda: 1)
+    monkeypatch.setattr(dispatch, "cpus", lambda: 1)
     monkeypatch.setattr(measured, "_records", list)
     checked = workflow.check({"scene": scene, "axes": axes} | more, output=tmp_path / "map.nc")
     said = float(plan.plan(checked)["compiling"].split()[1])
