@@ -70,7 +70,8 @@ def _compiling(workflow):
     spent, done = measured.compiling(workflow)
     if done:
         return "done already"
-    usual = announce.seconds(workflow.name, workflow.scene, workflow.refine is not None)
+    cells, options = workflow.refine is not None, workflow.request.options
+    usual = announce.seconds(workflow.name, workflow.scene, cells, options)
     about = lasting(usual if spent is None else spent)
     own = announce.always_compiled(workflow.scene)
     when = "at each run, as the equation is your own" if own else "once on this machine"
