@@ -29,11 +29,9 @@ class Survey:
                 "this dataset was not written by survey: it has no status, or no attribute scene "
                 "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
             )
-        stacked = [dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype == object
-                   and ds[dim].size and isinstance(ds[dim].values.flat[0], tuple)]  # fmt: skip
-        if stacked:
+        if schema.stacked(ds):
             raise BadInput(
-                f"this survey is stacked along {stacked[0]}: restore its axes with .unstack()"
+                f"this survey is stacked along {schema.stacked(ds)}: restore its axes with .unstack()"
             )
         schema.check(ds, complete=False)
         self._ds = ds

@@ -194,7 +194,11 @@ def evaluate(
     user_scene.check(module, grid)
     try:
         with watched(
-            scene, module, grid.points, lambda: _seconds(module, request, grid)
+            scene,
+            module,
+            grid.points,
+            lambda: _seconds(module, request, grid),
+            options=request.options,
         ) as progress:
             found = solve.compute(grid, module, request, progress=progress)
         ds = count(labelled(grid, module, scene, request, found), found)

@@ -524,3 +524,16 @@ def test_what_cannot_be_answered_is_said_in_one_line(mathieu, ask, words):
 def test_a_foreign_dataset_is_refused():
     with pytest.raises(BadInput, match="not written by survey"):
         xr.Dataset({"t": ("x", [1.0])}).survey.map()
+
+
+def test_a_coordinate_that_is_no_parameter_is_told_what_to_do():
+    ds = survey.evaluate("mathieu", a=[0.5, 1.0], q=[0.1, 0.2]).rename(a="aa")
+    for ask in (
+        lambda: ds.survey.margin(aa=1.0, q=0.1),
+        lambda: ds.survey.trajectory(aa=1.0, q=0.1, figure=False),
+        lambda: ds.survey.zoom(aa=(0.5, 1.0), num=3),
+    ):
+        with pytest.raises(
+            survey.BadInput, match=r"no coordinate a, .*: .* such as ds\.rename\(aa='a'\)"
+        ):
+            ask()

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from survey import api, measures, modules, status
-from survey.analysis.given import options_at, parameters
+from survey.analysis.given import check_names, options_at, parameters
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes
 from survey.request import physical, user_scene
@@ -289,6 +289,7 @@ def margin(ds):
         raise BadInput(
             f"margin: there is none at this point: {status.table(module)['invalid_parameters'][1]}"
         )
+    check_names(ds, module)
     here, options = parameters(ds), options_at(ds, module)
     rows, reasons = [], []
     with watched(

@@ -65,7 +65,10 @@ def _together(datasets):
         if tables
         else ""
     )
-    return _concat([of_points(part) for part in given]), left_out
+    joined = _concat([of_points(part) for part in given])
+    if all(part.attrs.get("complete") == 1 for part in given):
+        joined.attrs["complete"] = 1  # also when it is saved
+    return joined, left_out
 
 
 def _concat(parts):
@@ -123,6 +126,10 @@ def _part(given):
     if "status" not in given or "scene" not in given.attrs:
         raise BadInput(
             "concat: a dataset was not written by survey: it has no status, or no attribute scene"
+        )
+    if schema.stacked(given):
+        raise BadInput(
+            f"concat: a survey is stacked along {schema.stacked(given)}: restore its axes with .unstack()"
         )
     schema.check(given, complete=False)
     return given
@@ -202,7 +209,8 @@ def _described(joined, parts, axis):
             ("version_", "commit", "dirty", "kernel_hash", "cpu", "source")
         ):
             attributes[key] = " | ".join(values)
-    attributes["workflow"] = _workflow(attributes.get("workflow", ""), joined[axis])
+    if "workflow" in attributes:
+        attributes["workflow"] = _workflow(attributes["workflow"], joined[axis])
     attributes["history"] = (
         f"{now()}: {command()}: {counted(len(parts), 'survey')} joined along {axis}"
     )

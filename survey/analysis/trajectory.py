@@ -4,7 +4,7 @@ import numpy as np
 import xarray as xr
 
 from survey import api
-from survey.analysis.given import options_at, parameters
+from survey.analysis.given import check_names, options_at, parameters
 from survey.analysis.point import values
 from survey.errors import BadInput
 from survey.request import user_scene
@@ -26,6 +26,7 @@ def solve(point, time=None):
         raise BadInput(
             f"the scene {name} has no trajectory; its file would have to define that function"
         )
+    check_names(point, scene)
     options = options_at(point, scene)
     symbols = {p.name: p.symbol for p in scene.PARAMETERS}
     given = {key: value for key, value in parameters(point).items() if key in symbols}

@@ -84,7 +84,7 @@ def combined(ds, given):
             "map: the coordinates of the array are not those of the survey; combine surveys with "
             "the same axes"
         ) from None
-    about = {"long_name": str(given.name or "combined verdict").replace("_", " "), "units": "1"}
+    about = {"long_name": _title(ds, given).replace("_", " "), "units": "1"}
     codes = xr.DataArray(
         given.values.astype(np.int8),
         given.coords,
@@ -92,3 +92,13 @@ def combined(ds, given):
         attrs=about | flag_attributes(COMBINED),
     )
     return ds.assign(combined=codes, status=xr.zeros_like(ds.status).assign_attrs(ds.status.attrs))
+
+
+def _title(ds, given):
+    """The array's name, unless it is one that xarray kept from what the array was made of, as in `~stable`."""
+    name = given.name
+    if name in _kinds(ds) or name in flag_codes(ds.status.attrs):
+        own = bool((where(ds, name) == given).all())
+    else:
+        own = name is not None and name not in ds.variables
+    return str(name) if own else "combined verdict"

@@ -7,7 +7,7 @@ import numpy as np
 
 from survey import api, modules
 from survey.analysis.areas import refuse_members
-from survey.analysis.given import options_at
+from survey.analysis.given import check_names, options_at
 from survey.analysis.point import unknown_axis
 from survey.errors import BadInput, Damaged
 from survey.file.labels import count, describe
@@ -20,6 +20,7 @@ from survey.wording import shown
 
 def sweep(ds, ranges, num=None, output=None):
     """The dataset of the finer map, in memory; or written by `survey.run` where there is an `output`."""
+    check_names(ds, user_scene.find(user_scene.of_dataset(ds))[1])
     ranges = _ranges(ds, ranges)
     for name in num if isinstance(num, dict) else ():
         if name not in ranges:

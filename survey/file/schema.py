@@ -30,6 +30,12 @@ PACKING = ("scale_factor", "add_offset", "missing_value", "_Unsigned")
 ENCODINGS = ("utf-8", "ascii")
 
 
+def stacked(ds):
+    """The dimension along which axes are stacked, or ""."""
+    return next((dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype == object
+                 and ds[dim].size and isinstance(ds[dim].values.flat[0], tuple)), "")  # fmt: skip
+
+
 def check(ds, complete=True):
     """Raise Damaged, naming the part, where the dataset is not one that survey writes.
 

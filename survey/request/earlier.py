@@ -51,6 +51,8 @@ def _unlike(workflow, attributes):
     """Why the file's values have other bits than those of this workflow at the same points, or ""."""
     if finished.lost(attributes):
         return "workers died while it was computed"
+    if not attributes.get("workflow"):
+        return "it holds no workflow, as files of survey.evaluate do not"
     try:
         data = tomllib.loads(attributes["workflow"])
         if data.get("scene") != workflow.name:
@@ -70,6 +72,8 @@ def _unlike(workflow, attributes):
     more = sorted(workflow.request.variables - old.request.variables)
     if more:
         return f"it has no {', '.join(more)}, and all values of a point are computed together"
+    if "fingerprint" not in attributes:
+        return "several surveys were joined in it; name one of their files"
     if attributes.get("fingerprint") != of_output(before):
         return "it is from another version of the code"
     return ""

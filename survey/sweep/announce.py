@@ -13,6 +13,7 @@ PATIENCE = 0.5  # seconds of compiling that pass without a word
 # measured, 2 cores, by family; of scenes of which less is compiled, on one, and what cells need besides
 SECONDS = {"hill": 8, "cylinder": 10, "abel": 18, "nutation": 15, "danby": 8, "normal_form": 7}
 OF_SCENES = {"mathieu": (6, 7), "libration_elliptic": (4, 8)}
+OF_QUESTIONS = {("cylinder", "trajectory"): 6}  # of which nothing is compiled beside
 USUAL = 10
 
 
@@ -33,20 +34,27 @@ def always_compiled(scene):
     return hasattr(scene, "HASH") and scene.FAMILY == "hill"
 
 
-def seconds(name, scene, cells=False):
-    """How long compiling a scene's kernels usually takes; with those of `cells`."""
+def seconds(name, scene, cells=False, options=None):
+    """How long compiling a scene's kernels usually takes here; with those of `cells`."""
+    from survey.sweep.dispatch import cpus  # loads dask
+
+    asked = scene.FAMILY, (options or {}).get("question")
+    if asked in OF_QUESTIONS:
+        return OF_QUESTIONS[asked]
     kernels, more = OF_SCENES.get(name, (SECONDS.get(scene.FAMILY, USUAL), 0))
-    return kernels + more * cells
+    divided = hasattr(scene, "compile_ahead") and name not in OF_SCENES
+    # measured: on one processor, what another compiles meanwhile comes after it
+    return (kernels + more * cells) * (2 if divided and cpus() == 1 else 1)
 
 
-def sentence(name, scene):
+def sentence(name, scene, options=None):
     """`compiling gyrostat, once on this machine, about 10 s`."""
     when = "in each process that solves it" if always_compiled(scene) else "on this machine"
-    return f"compiling {name}, once {when}, about {seconds(name, scene)} s"
+    return f"compiling {name}, once {when}, about {seconds(name, scene, options=options)} s"
 
 
 @contextlib.contextmanager
-def compiling(name, scene, say):
+def compiling(name, scene, say, options=None):
     """Name the compiling of the scene's kernels, by `say`, once it has taken a moment."""
     from numba.core import event
 
@@ -69,7 +77,7 @@ def compiling(name, scene, say):
 
         def tell(self):
             self.said = True
-            say(sentence(name, scene))
+            say(sentence(name, scene, options))
 
     listener = Listener()
     event.register("numba:compile", listener)

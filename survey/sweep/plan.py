@@ -70,10 +70,8 @@ def _compiling(workflow):
     spent, done = measured.compiling(workflow)
     if done:
         return "done already"
-    usual = announce.seconds(workflow.name, workflow.scene, workflow.refine is not None)
-    divided = hasattr(workflow.scene, "compile_ahead") and workflow.name not in announce.OF_SCENES
-    if cpus() == 1 and divided:
-        usual *= 2  # measured: what another processor compiles meanwhile comes after it
+    cells, options = workflow.refine is not None, workflow.request.options
+    usual = announce.seconds(workflow.name, workflow.scene, cells, options)
     about = lasting(usual if spent is None else spent)
     own = announce.always_compiled(workflow.scene)
     when = "at each run, as the equation is your own" if own else "once on this machine"

@@ -507,3 +507,20 @@ def test_the_exact_edge_of_a_gyrostats_ends_is_found_whatever_the_signs(along):
 def test_a_point_says_how_its_margins_are_found_where_that_takes_seconds():
     point = survey.evaluate("gyrostat", phi0=0.3, w0=0.5, b12=0.7, b31=-0.4, d=1.1, s2=0.5)
     assert "ds.survey.margin()" in repr(point.survey.point())
+
+
+@pytest.mark.parametrize("sign", ["1", "-1"])
+def test_lines_of_bruns_problem_meet_all_at_which_wells_begin_or_join(sign):
+    """Curves end where the line is, which rounding hides: many were left out."""
+    random = np.random.default_rng(4)
+    for _ in range(6):
+        point = dict(zip(("l", "alpha", "beta"), random.uniform(-0.8, 0.8, 3), strict=True))
+        for along in point:
+            fixed = {key: value for key, value in point.items() if key != along}
+            found = survey.edge("brun", along=along, sign=sign, **fixed, **{along: (-2.0, 2.0)})
+            line = np.linspace(-2.0, 2.0, 401)
+            ds = survey.evaluate("brun", sign=sign, **fixed, **{along: line})
+            wells = np.isfinite(ds.period.values.reshape(line.size, -1)).sum(axis=1)
+            for i in np.flatnonzero(np.diff(wells)):
+                inside = (found.edge > line[i]) & (found.edge < line[i + 1])
+                assert inside.any() and float(found.edge_error[inside].max()) < 1e-11

@@ -120,8 +120,16 @@ def test_what_does_not_fit_is_refused():
         other.assign(discriminant=other.discriminant + 1),
     )
     refused("was not written by survey", xr.Dataset())
+    other = survey.evaluate("mathieu", a=[0.2, 1.5], q=[0.5, 0.6])
+    refused(r"stacked along p: restore its axes with \.unstack", other.stack(p=("a", "q")))
     with pytest.raises(BadInput, match="give a list of surveys"):
         survey.concat(one)
+
+
+def test_what_was_joined_can_be_saved_and_opened(tmp_path):
+    joined = survey.concat([survey.evaluate("mathieu", a=[0.2, 1.5], q=q) for q in (0.4, 0.5)])
+    joined.to_netcdf(tmp_path / "joined.nc")
+    xr.testing.assert_equal(survey.open(tmp_path / "joined.nc"), joined)
 
 
 def test_bodies_are_joined_with_their_parameters():

@@ -60,6 +60,18 @@ def test_combined_verdicts_are_drawn(two):
         two[0].survey.map(two[0].exponent)
 
 
+def test_the_title_of_a_mask_is_true(two):
+    stable = two[0].survey.where("stable")
+    for mask, title in (
+        (stable, "\nstable"),
+        (~stable, "\ncombined verdict"),
+        (stable ^ (two[0].a > 1.0), "\ncombined verdict"),
+        ((~stable).rename("lost_to_both"), "\nlost to both"),
+        (two[0].discriminant > 0, "\ncombined verdict"),
+    ):
+        assert title in two[0].survey.map(mask).get_title()
+
+
 def test_axes_and_colours_of_a_map_are_chosen(two):
     ds = two[0]
     axes = ds.survey.map("discriminant", x="q", y="a", cmap="magma", vmin=-3.0, vmax=3.0)

@@ -12,7 +12,7 @@ import xarray as xr
 import survey
 from survey.kernels import jit
 from survey.request import workflow
-from survey.sweep import announce, engine, measured, plan
+from survey.sweep import announce, dispatch, engine, measured, plan
 
 ROOT = Path(__file__).parents[2]
 TABLE = {
@@ -77,10 +77,12 @@ def test_a_plan_says_what_it_knows_the_time_from(mapped):
 
 
 def test_compiling_is_reported_apart(mapped, monkeypatch):
-    monkeypatch.setattr(plan, "cpus", lambda: 1)  # which compiles one kernel after another
+    monkeypatch.setattr(dispatch, "cpus", lambda: 1)  # which compiles one kernel after another
     alone = plan.plan(mapped)["compiling"]
     assert alone == f"about {2 * announce.SECONDS['hill']} s besides, once on this machine"
-    monkeypatch.setattr(plan, "cpus", lambda: 2)
+    told = announce.sentence(mapped.name, mapped.scene)
+    assert told.endswith(f"about {2 * announce.SECONDS['hill']} s")
+    monkeypatch.setattr(dispatch, "cpus", lambda: 2)
     assert (
         plan.plan(mapped)["compiling"]
         == f"about {announce.SECONDS['hill']} s besides, once on this machine"

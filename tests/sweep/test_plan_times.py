@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from survey.request import workflow
-from survey.sweep import engine, measured, plan
+from survey.sweep import dispatch, engine, measured, plan
 from survey.sweep.dispatch import cpus
 
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
@@ -104,6 +104,9 @@ LINE = {"start": 0.01, "stop": 0.03, "num": 9}
         ("mathieu", {"q": 1.0, "a": LINE}, {}, 4.3),
         ("mathieu", {"q": LINE, "a": LINE}, {}, 6.8),
         ("mathieu", {"q": LINE, "a": LINE}, {"refine": {"width": 0.01}}, 13.0),
+        ("gyrostat", {"w0": LINE, "t": 3.0}, {"options": {"question": "trajectory"}}, 5.2),
+        ("gyrostat", {"w0": LINE}, {"options": {"question": "fate"}}, 11.7),
+        ("gyrostat", {"w0": LINE, "phi": LINE}, {"options": {"question": "abel"}}, 11.3),
         ("libration", {"mu": LINE}, {}, 4.1),
         ("libration", {"mu": LINE}, {"options": {"order": "8"}}, 10.6),
         ("libration_elliptic", {"mu": LINE, "e": 0.1}, {"boundaries": {}}, 3.3),
@@ -113,7 +116,7 @@ LINE = {"start": 0.01, "stop": 0.03, "num": 9}
 def test_compiling_on_one_processor_is_planned_as_it_was_measured(
     scene, axes, more, taken, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr(plan, "cpus", lambda: 1)
+    monkeypatch.setattr(dispatch, "cpus", lambda: 1)
     monkeypatch.setattr(measured, "_records", list)
     checked = workflow.check({"scene": scene, "axes": axes} | more, output=tmp_path / "map.nc")
     said = float(plan.plan(checked)["compiling"].split()[1])

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import survey
+from survey.analysis import join
 from survey.errors import BadInput
 from survey.request import earlier, workflow
 from survey.sweep import cost, engine, solve
@@ -90,6 +91,22 @@ def test_the_reason_is_given_where_nothing_is_taken(brun, override, why):
     ):
         earlier.find(over_it, "old.nc")
     assert earlier.find(over_it, "old.nc", fresh=True) == (None, told)
+
+
+def test_files_of_no_one_run_say_so(brun):
+    base = {"scene": "brun", "options": {"sign": 1, "ratio": 0.5}}
+    axes = {"l": 1.0, "beta": 0.1, "alpha": {"values": [0.1, 0.2]}}
+    for name, beta in (("one", 0.1), ("other", 0.2)):
+        survey.run(base | {"axes": axes | {"beta": beta}}, output=f"{name}.nc")
+    join.merge(["one.nc", "other.nc"], "both.nc")
+    again = workflow.check(base | {"axes": axes}, output="new.nc")
+    assert "several surveys were joined in it" in earlier.find(again, "both.nc")[1]
+    points = [
+        survey.evaluate("brun", l=1.0, beta=b, alpha=[0.1], sign="1", ratio=0.5) for b in (0.1, 0.2)
+    ]
+    for ds in (points[0], survey.concat(points)):
+        ds.to_netcdf("points.nc")
+        assert "it holds no workflow" in earlier.find(again, "points.nc")[1]
 
 
 def test_a_map_whose_series_take_the_whole_axis_is_solved_anew(tmp_path, monkeypatch):

@@ -138,7 +138,32 @@ def _traced(part, square, axes, s):
         middle = own[own.size // 2] if own.size > 2 else 0.5 * (low + high)
         if inside(middle):
             found.append((STABLE if stable(middle) else SADDLE, _points(part, own, s)))
-    return found
+    if square.across is None:
+        return found
+    border = square.parameters(np.full(2, square.across))[1]
+    along = [(kind, here) for kind, here in found if (here[axes[1]][0] == border).all()]
+    at = changes(lambda t: position(t)[:, 1] >= square.across, t)
+    return along + [
+        (STABLE if stable(u) else SADDLE, _crossing(part, u, s, axes, border))
+        for u in at[(position(at)[:, 0] >= 0.0) & (position(at)[:, 0] <= 1.0)]
+    ]
+
+
+def _crossing(part, t, s, axes, border):
+    """The point of the part next to t at which its second parameter is `border`: rounding hides where, so
+    the error of the first covers all t at which the second may have that value.
+    """
+    here = _points(part, np.array([t]), s)
+    step, ends = np.spacing(abs(t)), np.array([t, t])
+    while (ends[0] > part.low or ends[1] < part.high) and step < part.high - part.low:
+        ends = np.clip([t - step, t + step], part.low, part.high)
+        value, bar = _points(part, ends, s)[axes[1]]
+        if (abs(value - border) > bar).all():
+            break
+        step *= 2.0
+    first, bar = here[axes[0]]
+    reach = abs(_points(part, ends, s)[axes[0]][0] - first).max()
+    return here | {axes[0]: (first, bar + reach), axes[1]: (np.array([border]), np.zeros(1))}
 
 
 def _points(part, t, s):
