@@ -7,7 +7,20 @@ decided by a limit of steps.
 
 import math
 
+import numpy as np
+
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.creeping import (
+    END_BAR,
+    END_PHI,
+    END_W,
+    PASSAGE,
+    across,
+    creeps,
+    crept,
+    trapped,
+    turnings_ahead,
+)
 from survey.kernels.cylinder.equilibria import (
     ANGLE,
     BAR,
@@ -216,7 +229,7 @@ def fate(
             out[rc.NET_TURNS] = turns + offset(phi, eqs[row, ANGLE])[1]
             out[rc.TURNINGS] = INFINITE if eqs[row, KIND] == FOCUS else UNDETERMINED
             return
-    T = table()
+    T, far, slow = table(), np.empty(PASSAGE), False
     how = setting(p, w0, tolerance)
     saa = slip * slip
     sab = 0.0
@@ -248,6 +261,9 @@ def fate(
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = (target if passed else x1), (0.0 if turned else w1)
         f, g, _dg = values(p, phi)
+        slow = slow and not turned and creeps(f, g, w)
+        if slow:
+            saa, sab, sbb = 0.0, 0.0, across(f, g, w, saa, sab, sbb)
         # the initial phi and w err as those of a step do
         bar_phi, bar_w = bar(n + 1, saa), bar(n + 1, sbb)
         if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(w))):
@@ -359,6 +375,8 @@ def fate(
         turns += k
         if held < 0:
             held = captured(eqs, count, phi, w, bar_phi + bar_w)
+        if held < 0 and n % 4 == 0:
+            held = trapped(p, eqs, count, phi, w, bar_phi + bar_w, True)
         if held >= 0:
             x, k = offset(phi, eqs[held, ANGLE])
             out[rc.VERDICT], out[rc.LIMIT], out[rc.NET_TURNS] = EQUILIBRIUM, held, turns + k
@@ -368,8 +386,18 @@ def fate(
             if settled(p, eqs[held, F], eqs[held, DG], x, w):
                 out[rc.TURNINGS] = turnings
                 return
+            more = turnings_ahead(p, eqs, count, held, phi, w, bar_phi + bar_w)
+            if more >= 0:
+                out[rc.TURNINGS] = turnings + more
+                return
             if abs(x) + abs(w) < 1e3 * (bar_phi + bar_w + eqs[held, BAR]):
                 return
+        elif n % 4 == 0 and crept(
+            p, eqs, count, phi, w, bar_phi, bar_w, True, abs(target - phi), far
+        ):
+            phi, w = far[END_PHI], far[END_W]
+            # as in `returns`; the error along the motion does not count
+            saa, sab, sbb, slow = 0.0, 0.0, far[END_BAR] * far[END_BAR] / n, True
     out[rc.STATUS] = STEP_LIMIT if held < 0 else OK
 
 

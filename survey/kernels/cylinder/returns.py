@@ -11,6 +11,21 @@ import math
 
 import numpy as np
 
+from survey.kernels.cylinder.creeping import (
+    DOUBT,
+    END_BAR,
+    END_PHI,
+    END_W,
+    EXPONENT,
+    LEAST_EXPONENT,
+    PASSAGE,
+    across,
+    creeps,
+    crept,
+    stands_still,
+    trapped,
+)
+from survey.kernels.cylinder.creeping import TIME as PASSED_IN
 from survey.kernels.cylinder.equilibria import ANGLE, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
 from survey.kernels.cylinder.program import COLUMNS, MEAN
@@ -50,6 +65,9 @@ EDGES = 7
 MOST_CYCLES = 16
 MOST_NODES = 400
 LIMIT = 40_000
+# error up to which a motion beside a saddle that creeps counts as on the side where it is: borders of
+# classes are found no more exactly than that
+SIDES = 1e-10
 
 
 @inline
@@ -59,7 +77,9 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
     how = setting(p, w0, tolerance)
     phi, w, saa, sab, sbb, e, y, y_error, t = section, w0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     node[X], node[CLASS] = w0, UNKNOWN
-    target = section + TWO_PI
+    target, far, slow = section + TWO_PI, np.empty(PASSAGE), False
+    doubt = 0.0
+    balanced = len(p) == COLUMNS or p[MEAN] == 0.0  # then w - F is periodic, and y its change
     for n in range(1, LIMIT):
         h = expand(begin, p, phi, w, how, T)
         x1, w1, de, dy = at(p, T, h)
@@ -82,8 +102,8 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
             f, g, _dg = values(p, section)
             slope = f + g / w
             own = bar(n, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0))
-            change, balanced = y, len(p) == COLUMNS or p[MEAN] == 0.0
-            if not balanced:  # then w - F is not periodic
+            change = y
+            if not balanced:
                 change = w - w0
                 own += 2.0 * ROUNDOFF_UP * (w + w0)
             fast = balanced and w0 / (p[BOUND_F] + math.sqrt(p[BOUND_DG]) + 1e-300) > 10.0
@@ -94,11 +114,25 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
                 math.exp(e) * w0 / (w0 + change),
                 t,
             )
-            node[ERROR] = min(own, other) if fast else own
+            node[ERROR] = (min(own, other) if fast else own) + doubt
             return
-        if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
-            node[CLASS] = NO_IMAGE
-            return
+        if slow:
+            f, g, _dg = values(p, phi)
+            slow = creeps(f, g, w)
+            if slow:
+                saa, sab, sbb = 0.0, 0.0, across(f, g, w, saa, sab, sbb)
+        if n % 4 == 0:
+            bar_phi, bar_w = bar(n, saa), bar(n, sbb)
+            if runs_in(p, eqs, count, phi, w, bar_phi + bar_w):
+                node[CLASS] = NO_IMAGE
+                return
+            certain = bar_phi + bar_w >= SIDES
+            if crept(p, eqs, count, phi, w, bar_phi, bar_w, certain, target - phi, far):
+                phi, w, t = far[END_PHI], far[END_W], t + far[PASSED_IN]
+                e, balanced = max(e + far[EXPONENT], LEAST_EXPONENT), False
+                # (a + b_1 + ... + b_m)^2 <= (n + m) (a^2/n + b_1^2 + ... + b_m^2)
+                saa, sab, sbb, slow = 0.0, 0.0, far[END_BAR] * far[END_BAR] / n, True
+                doubt += far[DOUBT]
 
 
 @inline
@@ -107,6 +141,8 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
     T = table()
     how = setting(p, 0.0, tolerance)
     phi, w, saa, sab, sbb, e, t, right = x0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False
+    far, slow = np.empty(PASSAGE), False
+    doubt = 0.0
     node[X], node[CLASS] = x0, UNKNOWN
     for n in range(1, LIMIT):
         h = expand(begin, p, phi, w, how, T)
@@ -123,12 +159,26 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
         if phi < x0 - TWO_PI or phi > high:
             node[CLASS] = NO_IMAGE
             return
-        if n % 4 == 0 and captured(eqs, count, phi, w, bar(n, saa) + bar(n, sbb)) >= 0:
-            node[CLASS] = NO_IMAGE
-            return
+        if slow:
+            f, g, _dg = values(p, phi)
+            slow = creeps(f, g, w)
+            if slow:
+                saa, sab, sbb = 0.0, 0.0, across(f, g, w, saa, sab, sbb)
+        if n % 4 == 0:
+            bar_phi, bar_w = bar(n, saa), bar(n, sbb)
+            if runs_in(p, eqs, count, phi, w, bar_phi + bar_w):
+                node[CLASS] = NO_IMAGE
+                return
+            certain = bar_phi + bar_w >= SIDES
+            if crept(p, eqs, count, phi, w, bar_phi, bar_w, certain, TWO_PI, far):
+                phi, w, t = far[END_PHI], far[END_W], t + far[PASSED_IN]
+                e = max(e + far[EXPONENT], LEAST_EXPONENT)
+                # (a + b_1 + ... + b_m)^2 <= (n + m) (a^2/n + b_1^2 + ... + b_m^2)
+                saa, sab, sbb, slow = 0.0, 0.0, far[END_BAR] * far[END_BAR] / n, True
+                doubt += far[DOUBT]
         if turned and right:
             inside = between(eqs, count, node[LEFT], phi)
-            node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa)
+            node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa) + doubt
             node[SLOPE] = math.exp(e) * values(p, x0)[1] / values(p, phi)[1]
             node[CLASS] = (
                 inside if between(eqs, count, min(phi, x0), max(phi, x0)) == 0 else NO_IMAGE
@@ -136,6 +186,16 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             return
         if turned:
             node[LEFT], right = phi, True
+
+
+@kernel
+def runs_in(p, eqs, count, phi, w, bar):
+    """Does every state within `bar` of (phi, w) run into an equilibrium? See SIDES."""
+    if captured(eqs, count, phi, w, bar) >= 0:
+        return True
+    if bar >= SIDES:
+        return trapped(p, eqs, count, phi, w, bar, True) >= 0
+    return trapped(p, eqs, count, phi, w, 0.0, False) >= 0 or stands_still(p, eqs, count, phi, w)
 
 
 @kernel
