@@ -161,7 +161,15 @@ def test_a_portrait_says_why():
 
 
 def test_a_portrait_beside_a_fold_says_so():
-    p = {"b12": 0.7, "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": 0.3 - 1e-10, "s3": -1.1}
+    """1.6e-12 beside a fold at which f is 0.03."""
+    p = {
+        "b12": -0.14140811534218814,
+        "b31": 0.23442711423437074,
+        "d": 0.09151670328235219,
+        "c23": 0.5803500161908991,
+        "s2": -0.7045029491084941,
+        "s3": 0.7110221663925083,
+    }
     portrait = survey.evaluate("gyrostat", question="portrait", **p)
     assert int(portrait.verdict) == -1
     assert "fold of equilibria" in portrait.survey.point().why

@@ -17,7 +17,7 @@ class Functions:
         self.function, self.bar, self.passes, self.points = function, bar, passes, 0
 
     def on_lattice(self, x):
-        return {7: self.sharp(x, 7)}
+        return {7: self.sharp(x, 7)}, None
 
     def sharp(self, x, kind):
         assert kind == 7
