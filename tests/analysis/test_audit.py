@@ -30,7 +30,7 @@ def maps():
         axes = {
             key: np.sort(np.atleast_1d(v)).tolist() for key, v in draw(scene, options, 5).items()
         }
-        slow = [pytest.mark.slow] * (case.id == "gyrostat-fate")
+        slow = [pytest.mark.slow] * (case.id in ("gyrostat-fate", "gyrostat-portrait"))
         yield pytest.param(scene.__name__.rpartition(".")[2], options, axes, id=case.id, marks=slow)
     for scene, options, axes in OTHERS:
         yield pytest.param(scene, options, axes, id="-".join([Path(scene).stem, *axes]))
