@@ -29,10 +29,7 @@ class Survey:
                 "this dataset was not written by survey: it has no status, or no attribute scene "
                 "(arithmetic drops attributes: xr.set_options(keep_attrs=True) keeps them)"
             )
-        if schema.stacked(ds):
-            raise BadInput(
-                f"this survey is stacked along {schema.stacked(ds)}: restore its axes with .unstack()"
-            )
+        schema.refuse_stacked(ds, "this")
         schema.check(ds, complete=False)
         self._ds = ds
 

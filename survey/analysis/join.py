@@ -127,10 +127,7 @@ def _part(given):
         raise BadInput(
             "concat: a dataset was not written by survey: it has no status, or no attribute scene"
         )
-    if schema.stacked(given):
-        raise BadInput(
-            f"concat: a survey is stacked along {schema.stacked(given)}: restore its axes with .unstack()"
-        )
+    schema.refuse_stacked(given, "concat: a")
     schema.check(given, complete=False)
     return given
 

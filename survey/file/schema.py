@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from survey.errors import Damaged
+from survey.errors import BadInput, Damaged
 
 # the largest compression ratio of deflate: a file that declares more holds values that were never
 # written
@@ -30,10 +30,14 @@ PACKING = ("scale_factor", "add_offset", "missing_value", "_Unsigned")
 ENCODINGS = ("utf-8", "ascii")
 
 
-def stacked(ds):
-    """The dimension along which axes are stacked, or ""."""
-    return next((dim for dim in ds.status.dims if dim in ds.coords and ds[dim].dtype == object
-                 and ds[dim].size and isinstance(ds[dim].values.flat[0], tuple)), "")  # fmt: skip
+def refuse_stacked(ds, which):
+    """Raise BadInput where axes of `which` survey are stacked."""
+    for dim in ds.status.dims:
+        own = ds[dim].values if dim in ds.coords else np.zeros(0)
+        if own.dtype == object and own.size and isinstance(own.flat[0], tuple):
+            raise BadInput(
+                f"{which} survey is stacked along {dim}: restore its axes with .unstack()"
+            )
 
 
 def check(ds, complete=True):

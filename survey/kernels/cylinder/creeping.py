@@ -306,13 +306,21 @@ def crept(p, table, count, phi, w, bar_phi, bar_w, certain, most, out):
 
 
 @inline
-def across(f, g, w, saa, sab, sbb):
-    """The square of the error of w where phi is exact: an error along the motion counts no more."""
-    slope = f + g / w
-    return max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0)
+def after_passage(far, n, t, e, doubt):
+    """phi, w, the time and the integral of f at the end of the passage `far`, the square of the error of
+    w after n steps, for which (a + b_1 + ... + b_m)^2 <= (n + m) (a^2/n + b_1^2 + ... + b_m^2), and doubts.
+    """
+    square = far[END_BAR] * far[END_BAR] / n
+    e = max(e + far[EXPONENT], LEAST_EXPONENT)
+    return far[END_PHI], far[END_W], t + far[TIME], e, square, doubt + far[DOUBT]
 
 
 @inline
-def creeps(f, g, w):
-    """Does w follow the slow manifold still, so that errors fall?"""
-    return abs(f + g / w) < -0.5 * f
+def narrowed(f, g, w, saa, sab, sbb):
+    """(does w follow the slow manifold still, so that errors fall?, the error ellipse): there phi counts
+    as exact, as an error along the motion counts no more.
+    """
+    slope = f + g / w
+    if not abs(slope) < -0.5 * f:
+        return False, saa, sab, sbb
+    return True, 0.0, 0.0, max(sbb - 2.0 * slope * sab + slope * slope * saa, 0.0)

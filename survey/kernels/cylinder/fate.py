@@ -11,13 +11,10 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.creeping import (
-    END_BAR,
-    END_PHI,
-    END_W,
     PASSAGE,
-    across,
-    creeps,
+    after_passage,
     crept,
+    narrowed,
     trapped,
     turnings_ahead,
 )
@@ -261,9 +258,9 @@ def fate(
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = (target if passed else x1), (0.0 if turned else w1)
         f, g, _dg = values(p, phi)
-        slow = slow and not turned and creeps(f, g, w)
+        slow = slow and not turned
         if slow:
-            saa, sab, sbb = 0.0, 0.0, across(f, g, w, saa, sab, sbb)
+            slow, saa, sab, sbb = narrowed(f, g, w, saa, sab, sbb)
         # the initial phi and w err as those of a step do
         bar_phi, bar_w = bar(n + 1, saa), bar(n + 1, sbb)
         if not (bar_phi < TRUST and bar_w < TRUST * (1.0 + abs(w))):
@@ -395,9 +392,8 @@ def fate(
         elif n % 4 == 0 and crept(
             p, eqs, count, phi, w, bar_phi, bar_w, True, abs(target - phi), far
         ):
-            phi, w = far[END_PHI], far[END_W]
-            # as in `returns`; the error along the motion does not count
-            saa, sab, sbb, slow = 0.0, 0.0, far[END_BAR] * far[END_BAR] / n, True
+            phi, w, _t, _e, sbb, _doubt = after_passage(far, n, 0.0, 0.0, 0.0)
+            saa, sab, slow = 0.0, 0.0, True
     out[rc.STATUS] = STEP_LIMIT if held < 0 else OK
 
 

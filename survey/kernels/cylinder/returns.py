@@ -12,20 +12,13 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder.creeping import (
-    DOUBT,
-    END_BAR,
-    END_PHI,
-    END_W,
-    EXPONENT,
-    LEAST_EXPONENT,
     PASSAGE,
-    across,
-    creeps,
+    after_passage,
     crept,
+    narrowed,
     stands_still,
     trapped,
 )
-from survey.kernels.cylinder.creeping import TIME as PASSED_IN
 from survey.kernels.cylinder.equilibria import ANGLE, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
 from survey.kernels.cylinder.program import COLUMNS, MEAN
@@ -118,9 +111,7 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
             return
         if slow:
             f, g, _dg = values(p, phi)
-            slow = creeps(f, g, w)
-            if slow:
-                saa, sab, sbb = 0.0, 0.0, across(f, g, w, saa, sab, sbb)
+            slow, saa, sab, sbb = narrowed(f, g, w, saa, sab, sbb)
         if n % 4 == 0:
             bar_phi, bar_w = bar(n, saa), bar(n, sbb)
             if runs_in(p, eqs, count, phi, w, bar_phi + bar_w):
@@ -128,11 +119,8 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
                 return
             certain = bar_phi + bar_w >= SIDES
             if crept(p, eqs, count, phi, w, bar_phi, bar_w, certain, target - phi, far):
-                phi, w, t = far[END_PHI], far[END_W], t + far[PASSED_IN]
-                e, balanced = max(e + far[EXPONENT], LEAST_EXPONENT), False
-                # (a + b_1 + ... + b_m)^2 <= (n + m) (a^2/n + b_1^2 + ... + b_m^2)
-                saa, sab, sbb, slow = 0.0, 0.0, far[END_BAR] * far[END_BAR] / n, True
-                doubt += far[DOUBT]
+                phi, w, t, e, sbb, doubt = after_passage(far, n, t, e, doubt)
+                saa, sab, slow, balanced = 0.0, 0.0, True, False
 
 
 @inline
@@ -161,9 +149,7 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             return
         if slow:
             f, g, _dg = values(p, phi)
-            slow = creeps(f, g, w)
-            if slow:
-                saa, sab, sbb = 0.0, 0.0, across(f, g, w, saa, sab, sbb)
+            slow, saa, sab, sbb = narrowed(f, g, w, saa, sab, sbb)
         if n % 4 == 0:
             bar_phi, bar_w = bar(n, saa), bar(n, sbb)
             if runs_in(p, eqs, count, phi, w, bar_phi + bar_w):
@@ -171,11 +157,8 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
                 return
             certain = bar_phi + bar_w >= SIDES
             if crept(p, eqs, count, phi, w, bar_phi, bar_w, certain, TWO_PI, far):
-                phi, w, t = far[END_PHI], far[END_W], t + far[PASSED_IN]
-                e = max(e + far[EXPONENT], LEAST_EXPONENT)
-                # (a + b_1 + ... + b_m)^2 <= (n + m) (a^2/n + b_1^2 + ... + b_m^2)
-                saa, sab, sbb, slow = 0.0, 0.0, far[END_BAR] * far[END_BAR] / n, True
-                doubt += far[DOUBT]
+                phi, w, t, e, sbb, doubt = after_passage(far, n, t, e, doubt)
+                saa, sab, slow = 0.0, 0.0, True
         if turned and right:
             inside = between(eqs, count, node[LEFT], phi)
             node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa) + doubt

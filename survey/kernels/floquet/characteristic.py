@@ -308,7 +308,7 @@ def _roots(c, d, z, y, parts):
 
 @kernel
 def improve(c, d, z, y, parts):
-    """One iteration of it."""
+    """One step of Weierstrass's iteration from z + i y, in lanes."""
     pr, pi, qr, qi = parts[0], parts[1], parts[2], parts[3]
     lanes = len(pr)
     for i in range(d):

@@ -98,11 +98,21 @@ def by_coefficients(matrices, structure, rtol, asked, period=None, growth=None):
         M, E, det, change, forms, paired, np.array(dense.flags(asked)), rtol, found.floats, found.signs,
         found.verdict, found.crossing, found.missed,
     )  # fmt: skip
+    _note_missed(found, matrices, rtol, asked, period)
+    return found
+
+
+def _note_missed(found, matrices, rtol, asked, period):
+    """Note which points miss the accuracy of M, or of the exponent, where these are asked."""
     if "monodromy" in asked:
-        found.missed |= ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
+        found.missed |= _rough(matrices, rtol)
     if period is not None and "exponent" in asked:
         found.missed |= wide_exponents(found, period, rtol)
-    return found
+
+
+def _rough(matrices, rtol):
+    with np.errstate(invalid="ignore"):
+        return ~(matrices.E <= rtol * (1 + abs(matrices.M))).all(axis=(1, 2))
 
 
 def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
@@ -110,12 +120,13 @@ def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
     M, E = matrices.M, matrices.E
     N, n = M.shape[:2]
     found, paired = Answers(N, n), structure != "none"
-    with np.errstate(invalid="ignore"):
-        rough = ~(E <= rtol * (1 + abs(M))).all(axis=(1, 2))
     if asked == {"monodromy"}:  # as for boundaries: nothing of multipliers is computed
         found.floats[:] = np.nan
         known = np.isfinite(M).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
-        found.missed, found.status[:] = rough, np.where(known, status.OK, status.OVERFLOW)
+        found.missed, found.status[:] = (
+            _rough(matrices, rtol),
+            np.where(known, status.OK, status.OVERFLOW),
+        )
         return found
     discs = multipliers.Discs(matrices)
     found.verdict = multipliers.verdicts(discs, M, E, paired)
@@ -147,9 +158,7 @@ def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
         far = ~(bar <= rtol * (1 + value))
     found.missed = lost | ((found.verdict == UNDECIDED) & ("verdict" in asked))
     found.missed |= (wide & ("multiplier_re" in asked)) | (far & ("spectral_radius" in asked))
-    found.missed |= rough & ("monodromy" in asked)
-    if period is not None and "exponent" in asked:
-        found.missed |= wide_exponents(found, period, rtol)
+    _note_missed(found, matrices, rtol, asked, period)
     found.status[:] = np.where(lost, status.OVERFLOW, status.OK)
     found.verdict[lost], found.crossing[lost] = UNDECIDED, UNDECIDED
     return found
