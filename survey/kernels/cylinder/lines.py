@@ -4,9 +4,11 @@ A line is followed forward in time, with the error ellipse of `steps`, and cut w
 window's borders. Of the ellipse only what lies across the line counts: an error along it leaves a
 point on the line.
 
-A branch ends where it reaches an attracting equilibrium, or its windings come closer to one another than GAP of the
-window, or it has left the window for good: an orbit that has once made a full turn beyond the window, and gains |w|
-on the section, does so again with every turn, since the return map increases.
+A branch ends where it reaches an attracting equilibrium, or its windings come closer to one another than NEAREST of
+the window, or it has left the window for good: an orbit that has once made a full turn beyond the window, and gains
+|w| on the section, does so again with every turn, since the return map increases.
+
+A window may be a line of constant phi or of constant w; then the points are where the line that is followed crosses it.
 """
 
 import math
@@ -25,8 +27,8 @@ from survey.kernels.cylinder.steps import (
 )
 from survey.kernels.jit import inline, kernel
 
-# a window; sizes of logarithms if LOG
-PHI_LOW, PHI_HIGH, W_LOW, W_HIGH, PHI_SIZE, W_SIZE, PHI_LOG, W_LOG = range(8)
+# a window; sizes of logarithms if LOG; the distance, of the window, of windings that still part
+PHI_LOW, PHI_HIGH, W_LOW, W_HIGH, PHI_SIZE, W_SIZE, PHI_LOG, W_LOG, NEAREST = range(9)
 # a point: phi in [-pi, pi], w, turns taken out of phi
 ANGLE_AT, VELOCITY, TURNS, BORDER, ERROR = range(5)
 POINT = 5
@@ -35,7 +37,6 @@ BRANCH, ROTATION, LIBRATION = range(3)  # what is followed: cycles once round
 MOST_POINTS = 30_000
 LIMIT = 50_000  # steps
 
-GAP = 3e-3  # of the window
 # chords, in units of the window, and the angle (rad) between two of them
 LONG, SHORT, BEND = 0.01, 2e-4, 0.04
 FINEST, COARSEST = 32, 4096  # samples of a step
@@ -59,6 +60,19 @@ def copies(window, phi):
     return math.ceil((window[PHI_LOW] - phi) / TWO_PI), math.floor(
         (window[PHI_HIGH] - phi) / TWO_PI
     )
+
+
+@kernel
+def within(window, phi, w):
+    """Is (phi, w) in the window? Nothing is in one without area."""
+    first, last = copies(window, phi)
+    return first <= last and window[W_LOW] <= w <= window[W_HIGH] and has_area(window)
+
+
+@kernel
+def has_area(window):
+    """Is the window no line?"""
+    return window[PHI_LOW] < window[PHI_HIGH] and window[W_LOW] < window[W_HIGH]
 
 
 @kernel
@@ -107,11 +121,31 @@ def crossing(at, p, T, window, border, low, high):
 
 
 @inline
-def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolerance, out):
-    """Fill `out` (m, POINT) with the points of a line from `start` (START_PHI to START_W_BAR);
-    returns their number.
+def vertex(at, p, T, low, high):
+    """dt between low and high where w is extreme, once."""
+    x, w, _e, _y = at(p, T, low)
+    f, g, _dg = values(p, x)
+    rises = f * w + g > 0.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        x, w, _e, _y = at(p, T, middle)
+        f, g, _dg = values(p, x)
+        if (f * w + g > 0.0) == rises:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
-    Rows of NaN part what lies in the window. `section`: an angle that rotations pass.
+
+@inline
+def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolerance, out):
+    """Fill `out` (m, POINT) with the points of a line from `start` (START_PHI to START_W_BAR).
+
+    Returns their number, and whether the line was followed to its end: not where its windings come
+    closer than NEAREST, or its error or its length end it. Rows of NaN part what lies in the window.
+    `section`: an angle that rotations pass.
     """
     T = table()
     how = setting(p, start[rc.START_W], tolerance)
@@ -120,13 +154,12 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
     saa, sab, sbb = start[rc.START_PHI_BAR] ** 2, 0.0, start[rc.START_W_BAR] ** 2
     sign = start_sign(p, phi, w)
     target = phi + sign * TWO_PI
-    first, last = copies(window, phi)
-    inside, drawn = first <= last and window[W_LOW] <= w <= window[W_HIGH], False
+    inside, drawn = within(window, phi, w), False
     # the last point that is kept, in units of the window, and its direction
     old_x, old_y, old_turn = 0.0, 0.0, 0.0
     # |w| on the section; is all beyond the window since; turning point
     before, far, right = math.nan, True, math.nan
-    done = False
+    done, to_its_end, lost = False, False, False
     if inside:
         write(p, window, 1, phi, w, turns, INSIDE, (saa, sab, sbb), out[0])
         size, drawn = 1, True
@@ -136,18 +169,28 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
         h, x1, w1, turned = until_turning(at, p, T, h, sign)
         if not (h > 0.0 and math.isfinite(w1) and math.isfinite(x1)):
             break
-        done = turned and kind == LIBRATION and sign > 0
+        done = to_its_end = turned and kind == LIBRATION and sign > 0
         if kind == ROTATION and (x1 - target) * sign >= 0.0:
             h = passage(at, p, T, target, sign > 0, h)
             x1, w1, _e, _y = at(p, T, h)
-            done = True
+            done = to_its_end = True
         a, c = scales(window, phi, w)
         length = a * abs(x1 - phi) + c * abs(w1 - w)
         pieces = int(min(max(length / (0.4 * LONG), FINEST), COARSEST))
-        dt, x, v = 0.0, phi, w
-        for k in range(1, pieces + 1):
+        dt, x, v, k, cut = 0.0, phi, w, 1, False
+        f, g, _dg = values(p, x)
+        accel = f * v + g
+        while k <= pieces:
             to = h * k / pieces if k < pieces else h
             x2, w2, _e, _y = at(p, T, to)
+            f, g, _dg = values(p, x2)
+            if accel * (f * w2 + g) < 0.0 and not cut:  # w goes up and down in between
+                to, cut = vertex(at, p, T, dt, to), True
+                x2, w2, _e, _y = at(p, T, to)
+                f, g, _dg = values(p, x2)
+            else:
+                k, cut = k + 1, False
+            accel = f * w2 + g
             far = far and (w2 > window[W_HIGH] if sign > 0 else w2 < window[W_LOW])
             crossed = False
             for border in range(AT_PHI_LOW, AT_W_HIGH + 1):
@@ -157,31 +200,24 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
                     when = crossing(at, p, T, window, border, dt, to)
                     xb, wb, _e, _y = at(p, T, when)
                     loose = 1e-12 * (1.0 + abs(xb))
-                    first, last = copies(window, xb)
-                    wide_first = copies(window, xb - loose)[0]
-                    wide_last = copies(window, xb + loose)[1]
-                    first, last = min(first, wide_first), max(last, wide_last)
+                    first, last = copies(window, xb + loose)[0], copies(window, xb - loose)[1]
                     level = border == AT_W_LOW or border == AT_W_HIGH
                     if first <= last and (level or window[W_LOW] <= wb <= window[W_HIGH]):
                         ellipse = carried(p, T, when, wb, saa, sab, sbb)
-                        if (
-                            not write(p, window, n, xb, wb, turns, border, ellipse, out[size])
-                            < WORST
-                        ):
-                            done = True
-                            break
+                        error = write(p, window, n, xb, wb, turns, border, ellipse, out[size])
+                        if not error < WORST:
+                            lost, done = True, done or has_area(window)
+                            continue
                         size, crossed, drawn = size + 1, True, True
-            first, last = copies(window, x2)
-            inside = first <= last and window[W_LOW] <= w2 <= window[W_HIGH]
-            f, g, _dg = values(p, x2)
+            inside = within(window, x2, w2)
             a, c = scales(window, x2, w2)
-            turn = math.atan2(c * (f * w2 + g), a * w2)
+            turn = math.atan2(c * accel, a * w2)
             away = math.hypot(a * (x2 - old_x), c * (w2 - old_y))
             bent = abs(offset(turn, old_turn)[0]) > BEND and away > SHORT
-            if inside and (bent or away > LONG or (done and k == pieces)) and size + 3 < len(out):
+            if inside and (bent or away > LONG or (done and k > pieces)) and size + 3 < len(out):
                 ellipse = carried(p, T, to, w2, saa, sab, sbb)
                 if not write(p, window, n, x2, w2, turns, INSIDE, ellipse, out[size]) < WORST:
-                    done = True
+                    lost = done = True
                     break
                 size, old_x, old_y, old_turn, drawn = size + 1, x2, w2, turn, True
             if not inside and drawn and size + 3 < len(out):
@@ -202,14 +238,16 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
             _x, here, _e, _y = at(p, T, passage(at, p, T, level, sign > 0, h))
             here = abs(here)
             c = scales(window, phi, w)[1]
-            if not math.isnan(before) and (c * abs(here - before) < GAP or (far and here > before)):
-                break
+            if not math.isnan(before):
+                to_its_end = far and here > before
+                if to_its_end or c * abs(here - before) < window[NEAREST]:
+                    break
             before, far = here, True
         if turned:
             before, far = math.nan, True
             if sign > 0 and kind == BRANCH:
                 a = scales(window, x1, 0.0)[0]
-                if a * abs(x1 + turns * TWO_PI - right) < GAP:
+                if a * abs(x1 + turns * TWO_PI - right) < window[NEAREST]:
                     break
                 right = x1 + turns * TWO_PI
             sign = -sign
@@ -219,16 +257,18 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
         target -= k * TWO_PI
         old_x -= k * TWO_PI
         if kind == BRANCH and settled_beside(p, window, eqs, count, phi, w):
+            to_its_end = True
             break
-    return size
+    return size, to_its_end and not lost
 
 
 @kernel
 def settled_beside(p, window, eqs, count, phi, w):
-    """Is (phi, w) closer than GAP to an attracting equilibrium?"""
+    """Is (phi, w) closer than NEAREST to an attracting equilibrium?"""
     a, c = scales(window, phi, w)
     for i in range(count):
         x, _turns = offset(phi, eqs[i, ANGLE])
-        if eqs[i, KIND] != SADDLE and math.hypot(a * x, c * w) < GAP and values(p, phi)[0] < 0.0:
+        near = math.hypot(a * x, c * w) < window[NEAREST]
+        if eqs[i, KIND] != SADDLE and near and values(p, phi)[0] < 0.0:
             return True
     return False

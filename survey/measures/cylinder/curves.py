@@ -80,8 +80,7 @@ def searched(scene, square, axes, fixed, options):
         return closed(square, axes, fixed, {})
     if set(axes) == set(STATE):
         (flow,) = scene.flows(np.array([[fixed[p.name] for p in scene.own]]))
-        found = [(CLASSES[kind], *rest) for kind, *rest in separatrices.found(square, axes, flow)]
-        return joined(found, [output.name for output in ALONG])
+        return _of_states(square, axes, flow)
     plane = own_bifurcations.ScenePlane(square, tuple(axes), fixed, scene)
     return _of_parameters(plane, own_bifurcations.found)
 
@@ -91,11 +90,17 @@ def closed(square, axes, fixed, options):
     if set(axes) != set(STATE):
         plane = bifurcations.ParameterPlane(square, tuple(axes), fixed)
         return _of_parameters(plane, bifurcations.found)
-    found = [
-        (CLASSES[kind], *rest)
-        for kind, *rest in separatrices.found(square, axes, [fixed[k] for k in SYSTEM])
-    ]
-    return joined(found, [output.name for output in ALONG])
+    return _of_states(square, axes, [fixed[k] for k in SYSTEM])
+
+
+def _of_states(square, axes, flow):
+    """The Curves on a map of initial states."""
+    found, lacking = separatrices.found(square, axes, flow)
+    curves = joined(
+        [(CLASSES[kind], *rest) for kind, *rest in found], [output.name for output in ALONG]
+    )
+    curves.complete = False if lacking and square.across is not None else None
+    return curves
 
 
 def _of_parameters(plane, find):

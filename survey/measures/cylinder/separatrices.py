@@ -7,6 +7,7 @@ H = V(saddle) (section 2), and where g = 0 the lines w - F = +-|b|, between whic
 """
 
 import math
+from copy import copy
 
 import numpy as np
 
@@ -19,37 +20,54 @@ from survey.kernels.cylinder.flow import BOUND_G, OF_F, OF_G
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.measures.cylinder.fate import I0, I1, G, flow_of, outline, remembered, signed
-from survey.measures.sampled import runs
+from survey.measures.sampled import changes, runs
 from survey.methods import taylor
 
 SYSTEM = ("b12", "b31", "d", "c23", "s2", "s3")
 TOLERANCE = 1e-17  # truncation of one step
 FURTHEST = 2e-3  # from its saddle, of the map: where a branch is begun
+CLOSEST = 1e-9  # rad or rad per unit of time: as close to a saddle as a branch on a line is begun
+# of the map, of a line: windings that are nearer to each other are not told apart
+ON_MAP, ON_LINE = 3e-3, 1e-4
 TINY = 1e-300
 TWO_PI = 2.0 * math.pi
 
 
 def found(square, axes, flow):
     """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the curves and the
-    equilibria on the map.
+    equilibria on the map, and whether they are known to lack one.
 
     `flow`: the six parameters of SYSTEM, or a program (see `equation`), of which no closed form is
-    known.
+    known. Where one border of the map is asked for alone, branches and cycles are followed to where
+    they cross it.
     """
     window = Window(square, axes.index("phi0"))
+    followed = window if square.across is None else window.border()
     s = outline(flow)
     if len(flow) > COLUMNS and (s.stratum != G or s.unknown):
-        return []
+        return [], True
+    on_map = square.across is None
     if s.stratum == I0:
-        return list(_free(window, flow))
-    curves = list(_levels(window, s) if s.stratum == I1 else _branches(window, s))
-    if s.stratum != I1 and not s.folded:
-        curves += _cycles(window, remembered(taylor, flow))
-    return curves + list(_equilibria(window, s))
+        return list(_free(window, flow) if on_map else _free_on_line(followed, flow)), False
+    if s.stratum == I1:
+        curves = _levels(window, s) if on_map else _levels_on_line(followed, s)
+        return [*curves, *_equilibria(window, s)], False
+    curves, lacking = _branches(followed, s)
+    if s.folded:
+        return [*curves, *_equilibria(window, s)], True
+    s = remembered(taylor, flow)
+    cycles, unsure = _cycles(followed, s)
+    lacking |= unsure or not s.conclusive
+    return [*curves, *cycles, *_equilibria(window, s)], lacking
 
 
 class Window:
-    """A map of phi0 and w0; `at` (0 or 1) is the axis of phi0."""
+    """A map of phi0 and w0; `at` (0 or 1) is the axis of phi0.
+
+    A line of constant phi0 or w0 where `flat`, an axis of the two, is not None.
+    """
+
+    flat, nearest = None, ON_MAP
 
     def __init__(self, square, at):
         self.square, self.at = square, at
@@ -61,10 +79,52 @@ class Window:
         )
         self.size = high - low
 
+    def border(self):
+        """The border of the map that alone is asked for."""
+        line = copy(self)
+        line.flat, line.nearest = 1 - self.at, ON_LINE
+        value = self.square.parameters(np.array([0.0, self.square.across]))[1]
+        line.low, line.high, line.log, line.size = (
+            each.copy() for each in (self.low, self.high, self.log, self.size)
+        )
+        line.low[line.flat] = line.high[line.flat] = value
+        line.log[line.flat] = False
+        line.size[line.flat] = TWO_PI if line.flat == 0 else 1.0 + abs(value)
+        return line
+
+    def reach(self, saddles):
+        """How far from the saddles their branches are begun (rad): so that chords to there are
+        short, and on a line before they cross it.
+        """
+        slopes = [0.5 * (abs(row[eq.F]) + _spread(row)) for row in saddles]
+        far = FURTHEST * np.array([self.size[0], self.size[1] / max(slopes)])
+        if self.flat == 0:
+            far = 0.5 * np.abs(
+                [math.remainder(self.low[0] - x, TWO_PI) for x in saddles[:, eq.ANGLE]]
+            )
+        elif self.flat == 1:
+            far = 0.5 * abs(self.low[1]) / np.array(slopes)
+        return min(0.1, *np.maximum(far, CLOSEST))
+
+    def end_at(self, saddle):
+        """The point (1, POINT) at which a branch ends at its saddle; on a line that is closer to
+        the saddle than CLOSEST, its crossing.
+        """
+        angle, bar, border = saddle[eq.ANGLE], saddle[eq.BAR], lines.INSIDE
+        error = math.hypot(*(bar / self.size))
+        slope = 0.5 * (_spread(saddle) - saddle[eq.F])
+        off = math.remainder(self.low[0] - angle, TWO_PI)
+        if self.flat == 0 and abs(off) <= CLOSEST:
+            angle, border = angle + off, lines.AT_PHI_LOW
+            error = 2.0 * slope * (abs(off) + bar) / self.size[1]
+        elif self.flat == 1 and abs(self.low[1]) <= CLOSEST:
+            border, error = lines.AT_W_LOW, (bar + 2.0 * abs(self.low[1]) / slope) / self.size[0]
+        return np.array([[angle - TWO_PI * (angle > math.pi), 0.0, 0.0, border, error]])
+
     def for_lines(self, side):
         """As `kernels.cylinder.lines` takes it, for w of the sign `side` times that of the map."""
         w = sorted((side * self.low[1], side * self.high[1]))
-        return np.array([self.low[0], self.high[0], *w, *self.size, *self.log])
+        return np.array([self.low[0], self.high[0], *w, *self.size, *self.log, self.nearest])
 
     def parameters(self, phi, w):
         return np.roll(np.column_stack(np.broadcast_arrays(phi, w)), self.at, axis=1)
@@ -96,39 +156,38 @@ def _flipped(p):
 
 
 def _branches(window, s):
-    """Both stable branches of every saddle."""
-    p = _flipped(s.p)
+    """Both stable branches of every saddle, and whether one was cut short."""
+    p, found, cut = _flipped(s.p), [], False
     starts = np.zeros((2 * max(len(s.equilibria), 1), rc.START))
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
     if not len(saddles):
-        return
-    steepest = max(
-        0.5 * (abs(row[eq.F]) + math.sqrt(row[eq.F] ** 2 + 4.0 * row[eq.DG])) for row in saddles
-    )
-    reach = min(
-        0.1,
-        FURTHEST * min(window.high[0] - window.low[0], (window.high[1] - window.low[1]) / steepest),
-    )
-    size = unstable(p, s.equilibria, len(s.equilibria), starts, reach)
+        return found, cut
+    size = unstable(p, s.equilibria, len(s.equilibria), starts, window.reach(saddles))
     for i, start in enumerate(starts[:size]):
         saddle = saddles[i // 2]
         known = {"equilibrium_phi": (saddle[eq.ANGLE], saddle[eq.BAR])}
-        points = _followed(window, -1.0, p, start, s, lines.BRANCH)
-        bar = math.hypot(*(saddle[eq.BAR] / window.size))
-        first = np.array(
-            [[saddle[eq.ANGLE] - TWO_PI * (saddle[eq.ANGLE] > math.pi), 0.0, 0.0, 0.0, bar]]
-        )
+        points, ended = _followed(window, -1.0, p, start, s, lines.BRANCH)
+        cut |= not ended
+        first = window.end_at(saddle)
         off = start[rc.START_PHI] - saddle[eq.ANGLE]
         shift = round((start[rc.START_PHI] - first[0, lines.ANGLE_AT] - off) / TWO_PI)
         first[0, lines.TURNS] = shift
-        yield from _copied(window, np.vstack([first, points]), "stable_manifold", known)
+        found += _copied(window, np.vstack([first, points]), "stable_manifold", known)
+    return found, cut
+
+
+def _spread(saddle):
+    """The difference between the two slopes of a saddle's branches."""
+    return math.sqrt(saddle[eq.F] ** 2 + 4.0 * saddle[eq.DG])
 
 
 def _cycles(window, s):
-    """One period of every cycle that is certain."""
+    """One period of every cycle that is certain, and whether one is not, or was cut short."""
+    found, unsure = [], False
     for side, table in ((1.0, s.plus), (-1.0, s.minus), (0.0, s.librations)):
         for row in table:
             if row[rt.CYCLE_CLASS] < 0.0:
+                unsure = True
                 continue
             stable = row[rt.MULTIPLIER] < 1.0
             start = np.array([row[rt.CYCLE_X], 0.0, row[rt.CYCLE_BAR], 0.0])
@@ -137,18 +196,23 @@ def _cycles(window, s):
             sign = 1.0 if stable else -1.0
             start[rc.START_W] *= sign
             kind = lines.ROTATION if side else lines.LIBRATION
-            points = _followed(window, sign, s.p if stable else _flipped(s.p), start, s, kind)
+            flow = s.p if stable else _flipped(s.p)
+            points, ended = _followed(window, sign, flow, start, s, kind)
+            unsure |= not ended
             known = {"multiplier": (row[rt.MULTIPLIER], row[rt.MULTIPLIER_BAR])}
-            yield from _copied(
-                window, points, "stable_cycle" if stable else "unstable_cycle", known
-            )
+            found += _copied(window, points, "stable_cycle" if stable else "unstable_cycle", known)
+    return found, unsure
 
 
 def _followed(window, side, p, start, s, kind):
-    """Points (m, POINT) of a line in the system itself; `side`: the sign of its w in the system p."""
+    """Points (m, POINT) of a line in the system itself, and whether it was followed to its end.
+
+    `side`: the sign of its w in the system p.
+    """
     out = np.zeros((lines.MOST_POINTS, lines.POINT))
     given = window.for_lines(side), s.equilibria, len(s.equilibria), s.section, kind
-    out = out[: taylor.flow_line(p, start, *given, TOLERANCE, out)]
+    size, ended = taylor.flow_line(p, start, *given, TOLERANCE, out)
+    out = out[:size]
     out[:, lines.VELOCITY] *= side
     if side < 0.0:
         flipped = np.array(
@@ -156,7 +220,7 @@ def _followed(window, side, p, start, s, kind):
         )
         known = np.isfinite(out[:, lines.BORDER])
         out[known, lines.BORDER] = flipped[out[known, lines.BORDER].astype(int)]
-    return out
+    return out, ended
 
 
 def _copied(window, points, kind, known):
@@ -165,8 +229,8 @@ def _copied(window, points, kind, known):
     if not np.isfinite(phi).any():
         return
     unwrapped = phi + TWO_PI * turns
-    loose = 1e-9 * (1.0 + abs(phi))
-    for k in window.copies(np.nanmin(unwrapped), np.nanmax(unwrapped)):
+    loose = 1e-9 * (1.0 + abs(phi))  # points on a border are so within rounding
+    for k in window.copies(np.nanmin(unwrapped - loose), np.nanmax(unwrapped + loose)):
         x, v = phi + TWO_PI * (turns + k), w.copy()
         for mark, axis, end in (
             (lines.AT_PHI_LOW, 0, window.low[0]),
@@ -183,7 +247,7 @@ def _copied(window, points, kind, known):
             & (v <= window.high[1])
         )
         for part in np.split(np.arange(x.size), 1 + np.flatnonzero(np.diff(good))):
-            if part.size > 1 and good[part[0]]:
+            if (part.size > 1 or window.flat is not None) and good[part[0]]:
                 shift = ROUNDOFF * (abs(x[part]) + TWO_PI) / window.size[0]
                 yield kind, window.parameters(x[part], v[part]), error[part] + shift, known
 
@@ -226,6 +290,22 @@ def _free(window, six):
             )
 
 
+def _free_on_line(line, six):
+    """As `_free`, where w = F +- |b| crosses the line."""
+    b12, b31 = six[OF_F]
+    b = math.hypot(b12, b31)
+    extreme = math.atan2(b12, b31) + math.pi * np.arange(3)
+    for side in (1.0, -1.0) if b else ():
+
+        def w(phi, side=side):
+            return b12 * np.sin(phi) + b31 * np.cos(phi) + side * b
+
+        for phi in _crossings(line, w, extreme):
+            slope = b12 * np.cos(phi) - b31 * np.sin(phi)
+            across = 4.0 * ROUNDOFF * b * (2.0 + abs(phi))
+            yield _crossing(line, phi, w(phi), slope, 1.0, across, {})
+
+
 def _levels(window, s):
     """b = 0: H = V(saddle) from each saddle to both sides, up to where it turns or to another saddle."""
     for row in s.equilibria:
@@ -264,6 +344,63 @@ def _levels(window, s):
                                 *(np.sqrt(level.error(far) * level.reach()) / window.size)
                             )
                         yield "stable_manifold", window.parameters(phi, w), error, known
+
+
+def _levels_on_line(line, s):
+    """As `_levels`, where H = V(saddle) crosses the line."""
+    for row in s.equilibria:
+        if row[eq.KIND] != eq.SADDLE:
+            continue
+        level = Level(s.p, row)
+        known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
+        for side in (1.0, -1.0):
+            far, turns = far_end(level, s, side)
+            if not turns and side < 0.0 and abs(far) >= TWO_PI:
+                continue  # the same as to the other side
+            # V is extreme at the equilibria
+            between = [
+                side * ((side * (y - level.angle)) % TWO_PI) for y in s.equilibria[:, eq.ANGLE]
+            ]
+            nodes = level.angle + np.unique([0.0, far, *(y for y in between if abs(y) < abs(far))])
+            for sign in (1.0, -1.0):
+
+                def w(phi, level=level, sign=sign):
+                    return sign * level.velocity(phi - level.angle)
+
+                for phi in _crossings(line, w, nodes):
+                    x, v = phi - level.angle, w(phi)
+                    across = level.error(x) + 4.0 * ROUNDOFF * v * v
+                    across += abs(level.slope(x)) * ROUNDOFF * abs(phi)
+                    if x == 0.0:
+                        across = abs(row[eq.DG]) * (row[eq.BAR] + ROUNDOFF) ** 2
+                    least = math.sqrt(across * abs(row[eq.DG])), math.sqrt(across)
+                    by_phi, by_w = max(abs(level.slope(x)), least[0]), max(abs(v), least[1])
+                    yield _crossing(line, phi, v, by_phi, by_w, across, known)
+
+
+def _crossings(line, w, nodes):
+    """The angles between the first and the last of the nodes, in any copy on the line, where
+    w(phi), monotone between nodes, crosses it.
+    """
+    low, high = nodes[0], nodes[-1]
+    if line.flat == 0:
+        angles = line.low[0] - TWO_PI * np.arange(
+            math.ceil((line.low[0] - high) / TWO_PI), math.floor((line.low[0] - low) / TWO_PI) + 1
+        )
+        return [phi for phi in angles if line.low[1] <= w(phi) <= line.high[1]]
+    value = line.low[1]
+    met = nodes[w(nodes) == value]
+    return np.unique([*met, *changes(lambda phi: w(phi) > value, nodes)])
+
+
+def _crossing(line, phi, w, by_phi, by_w, across, known):
+    """A row of `found`: the point of a curve of that gradient on the line; see `Window.error`."""
+    if line.flat == 0:
+        xs, w, error = line.low[:1], np.array([w]), across / abs(by_w) / line.size[1]
+    else:
+        xs = phi + TWO_PI * np.array(line.copies(phi, phi))
+        w, error = line.low[1], across / abs(by_phi) / line.size[0]
+    return "stable_manifold", line.parameters(xs, w), np.full(len(xs), error), known
 
 
 class Level:
