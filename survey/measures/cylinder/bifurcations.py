@@ -203,9 +203,11 @@ def _drawn(plane, curve, kind, t):
     xy = curve.xy(t)
     bar = curve.bar(t)
     known = {}
-    # a point on the border to within its rounding is on it
+    # a point on the border to within its rounding, or that of t, is on it
+    loose = bar + 2.0 * abs(curve.xy(t + np.spacing(abs(t) + TINY)) - xy)
     for border in (plane.square.low, plane.square.high):
-        xy = np.where(abs(xy - border) <= bar, border, xy)
+        near = abs(xy - border) <= loose
+        xy, bar = np.where(near, border, xy), np.where(near.any(axis=1)[:, None], loose, bar)
     error = np.hypot(*(bar / np.maximum(plane.widths(xy), TINY)).T) + 4.0 * plane.square.grain
     if curve.phi is not None:
         phi = curve.phi(t) % TURN[1]

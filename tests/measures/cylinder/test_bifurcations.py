@@ -167,3 +167,25 @@ def test_logarithmic_axes_and_planes_without_g_or_f():
     assert {kind for kind, *_ in found} >= {"fold", "subcritical_hopf", "ends"}
     assert max(error for _, _, error, *_ in found) < 1e-10
     assert not list(points(("d", "c23"), {"b12": 0.0, "b31": 0.0, "s2": 0.0, "s3": 0.0}))
+
+
+def test_the_hyperbola_of_the_ends_meets_the_border_of_a_narrow_map():
+    """b12 s3 = b31 s2, where s3 and b31 are small: the curve is followed by log |b12|, whose
+    rounding moved its end off the border.
+    """
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        b12, s2 = rng.uniform(0.1, 1.0, 2) * rng.choice([-1.0, 1.0], 2)
+        b31 = 10.0 ** rng.uniform(-12.0, 0.0)
+        square = Square(
+            np.array([-1.5, b12]), np.array([1.5, b12 + 1e-3]), np.array([False, False]), 0.0
+        )
+        fixed = {"b31": b31, "d": 0.3, "c23": 0.2, "s2": s2}
+        plane = bifurcations.ParameterPlane(square, ("s3", "b12"), fixed)
+        exact = float(mp.mpf(b31) * mp.mpf(s2) / mp.mpf(b12))
+        if abs(exact) > 1.4:
+            continue
+        ((_, xy, error, _),) = bifurcations._ends(plane)
+        met = xy[:, 1] == b12
+        assert met.any()
+        assert (abs(xy[met, 0] - exact) <= 3.0 * error[met] + 1e-18).all()
