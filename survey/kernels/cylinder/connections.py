@@ -1,5 +1,5 @@
-"""Branches of the saddles up to their first turning points: what shows whether one saddle is
-connected with another.
+"""Branches of the saddles up to their first turning points, and from there back to the angle of
+their saddle: what shows whether one saddle is connected with another.
 
 Each branch is followed as an unstable one that leaves to the right, w > 0, in one of four systems:
 the system itself; that of S1, (b, w, t) -> -(b, w, t), where branches are stable; that of S2, (phi,
@@ -35,14 +35,25 @@ from survey.kernels.cylinder.flow import (
     values,
 )
 from survey.kernels.cylinder.program import COLUMNS as GYROSTAT
-from survey.kernels.cylinder.steps import bar, carried, expand, passage, time_of_turning
+from survey.kernels.cylinder.steps import (
+    bar,
+    carried,
+    expand,
+    passage,
+    time_of_turning,
+    until_turning,
+)
 from survey.kernels.jit import constant, for_constants, inline, kernel
 
 ITSELF, REVERSED, MIRRORED, BOTH = range(4)
 # w and its error bound at the next equilibria to the right, the last of them the saddle itself, a
 # turn further; then the turning point, its bound, the number of those equilibria before it, the
-# angle of the saddle, its bound, their number, and how far to the right of the saddle they are.
-TURN, TURN_BAR, PASSED, FROM, FROM_BAR, COLUMNS, OFFSETS = range(2 * MOST, 2 * MOST + 7)
+# angle of the saddle, its bound, their number, -w where a branch that turned behind one equilibrium
+# passes the angle of its saddle on its way back, or minus the distance by which it turns before,
+# its bound, and how far to the right of the saddle the equilibria are.
+TURN, TURN_BAR, PASSED, FROM, FROM_BAR, COLUMNS, BACK, BACK_BAR, OFFSETS = range(
+    2 * MOST, 2 * MOST + 9
+)
 ROW = OFFSETS + MOST
 LIMIT = 600  # steps
 # difference of V, in units of its own, up to which the first of two saddles counts as the higher
@@ -53,7 +64,7 @@ NEAR = 1e-10  # velocities, in those of the system, at which a branch counts as 
 
 @inline
 def first_turn(setting, begin, at, p, start, tolerance, row):
-    """Fill w, TURN and PASSED of `row`, whose other columns are filled."""
+    """Fill w, TURN, PASSED and BACK of `row`, whose other columns are filled."""
     T = table()
     how = setting(p, start[rc.START_W], tolerance)
     phi, w, n, k = start[rc.START_PHI], start[rc.START_W], 0, 0
@@ -84,8 +95,45 @@ def first_turn(setting, begin, at, p, start, tolerance, row):
         phi, w = x1, w1
         if turned:
             row[TURN], row[TURN_BAR], row[PASSED] = x1 - row[FROM], bar(n, saa) + 1e-15, k
+            if k == 1 and row[COLUMNS] == 4.0:
+                way_back(setting, begin, at, p, x1, (n, saa, sab, sbb), tolerance, row)
             return
         if w < least:
+            return
+
+
+@inline
+def way_back(setting, begin, at, p, phi, error, tolerance, row):
+    """Fill BACK of `row`, from the turning point phi on; `error`: the number of steps before, and
+    the error ellipse.
+    """
+    T = table()
+    how = setting(p, 0.0, tolerance)
+    n, saa, sab, sbb = error
+    w, last = 0.0, n + LIMIT
+    least = NEAR * (p[BOUND_F] + math.sqrt(p[BOUND_DG]))
+    while n < last:
+        h = expand(begin, p, phi, w, how, T)
+        n += 1
+        h, x1, w1, turned = until_turning(at, p, T, h, -1.0)
+        if not (h > 0.0 and math.isfinite(w1)):
+            return
+        if x1 <= row[FROM]:
+            dt = passage(at, p, T, row[FROM], False, h)
+            x, v, _e, _y = at(p, T, dt)
+            aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
+            f, g, _dg = values(p, x)
+            slope = (f * v + g) / v
+            row[BACK] = -v
+            row[BACK_BAR] = bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0))
+            row[BACK_BAR] += abs(slope) * (4e-16 + row[FROM_BAR])
+            return
+        saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
+        phi, w = x1, w1
+        if turned:
+            row[BACK], row[BACK_BAR] = row[FROM] - x1, bar(n, saa) + 1e-15
+            return
+        if abs(w) < least:
             return
 
 

@@ -1,14 +1,18 @@
 """Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable
 branch of a saddle.
 
-Two kinds are looked for: those on which w keeps its sign, over at most a turn, and those with one
-turning point (a loop, or a way back to another saddle). For either, a function of the parameters
-says by how much both branches miss each other: the difference of w where they pass the same
-equilibrium, or of their turning points. It is continuous, and beyond the angle that a branch does
-not reach it is continued by how far from it the branch turns. Its zeros are found as those of
-`survey.measures.contours`, and followed on from where the lattice loses them, as where folds and
-points of codimension two are near (`survey.measures.tips`); connections with more turning points
-are not looked for.
+Three kinds are looked for: those on which w keeps its sign, over at most a turn; those with one
+turning point (a loop, or a way back to another saddle); and loops with two, one to either side of
+the saddle, which surround both equilibria beside it. Other loops there are none: a closed curve
+that is not wound round the cylinder has two turning points, and does not meet its copies a turn
+away. Ways from one saddle to the other with more turning points are not looked for; no cycle is
+born in them.
+
+For each, a function of the parameters says by how much both branches miss each other: the
+difference of w where they pass the same equilibrium, or of their turning points. It is continuous,
+and beyond the angle that a branch does not reach it is continued by how far from it the branch
+turns. Its zeros are found as those of `survey.measures.contours`, and followed on from where the
+lattice loses them, as where folds and points of codimension two are near (`survey.measures.tips`).
 
 Saddles are told apart by their V; where two have the same the labels change, and a jump there is
 not a zero.
@@ -54,6 +58,8 @@ def _every():
         yield Connection(
             ((sides[0], one), (sides[1], two)), partial(_turning, one == wall, two == wall)
         )
+    for sides, saddle in product((UPPER, LOWER), (HIGH, LOW)):
+        yield Connection(((sides[0], saddle), (sides[1], saddle)), _returning)
 
 
 def found(plane):
@@ -154,6 +160,15 @@ def _level(row, column):
     return np.where(passed, w, np.where(short < 0.0, short, np.nan)), np.where(
         passed, row[:, 2 * column + 1], row[:, cn.TURN_BAR]
     )
+
+
+def _returning(one, two):
+    """For two branches of a saddle that turn, one to either side of it: w where they pass it on
+    their ways back.
+    """
+    v, w = one[:, cn.BACK], two[:, cn.BACK]
+    value = np.where((v < 0.0) & (w < 0.0), np.nan, v - w)
+    return value, one[:, cn.BACK_BAR] + two[:, cn.BACK_BAR]
 
 
 def _turning(first_own, second_own, one, two):
