@@ -75,7 +75,9 @@ def way_back(six, phi, saddle):
         step = 1 / (10 * max(abs(r[-1]) ** (mp.mpf(1) / 30) for r in rows))
         at = [lambda t, r=r: mp.polyval(r, t, asc=True) for r in rows]
         if at[0](step) <= saddle:
-            t = mp.findroot(lambda t: at[0](t) - saddle, (0, step), solver="anderson", tol=1e-60)
+            t = mp.findroot(
+                lambda t, at=at: at[0](t) - saddle, (0, step), solver="anderson", tol=1e-60
+            )
             return float(-at[1](t))
         if at[1](step) >= 0:
             return float(saddle - at[0](mp.findroot(at[1], step, tol=1e-60)))
