@@ -133,7 +133,9 @@ def _start(axes, variable):
     phi0 = variable.coords.get("phi0")
     if phi0 is None or phi0.ndim or not min(axes.get_xlim()) <= float(phi0) <= max(axes.get_xlim()):
         return []
-    axes.axvline(float(phi0), **_START)
+    # at an end of the axis it lies over the frame
+    over = {"zorder": 3, "clip_on": False} if float(phi0) in axes.get_xlim() else {}
+    axes.axvline(float(phi0), **_START | over)
     return [Line2D([], [], label="initial angle", **_START)]
 
 
