@@ -524,3 +524,21 @@ def test_lines_of_bruns_problem_meet_all_at_which_wells_begin_or_join(sign):
             for i in np.flatnonzero(np.diff(wells)):
                 inside = (found.edge > line[i]) & (found.edge < line[i + 1])
                 assert inside.any() and float(found.edge_error[inside].max()) < 1e-11
+
+
+def test_a_line_meets_both_edges_of_narrow_tongues():
+    """Where pairs of multipliers collide and part again within 1e-4 of the axis: beside each edge the
+    verdicts differ, and no function changes its sign between the points of a search.
+    """
+    scene, epsilon = ROOT / "workflows/coupled_mathieu.py", 0.2162394190794506
+    found = survey.edge(scene, along="Omega", Omega=(0.3, 3.0), epsilon=epsilon)
+    about = found.edge_class.attrs
+    codes = dict(zip(about["flag_meanings"].split(), about["flag_values"], strict=True))
+    collisions = found.edge.values[found.edge_class.values == codes["collision"]]
+    low, high = collisions.reshape(-1, 2)[:2].T
+    assert (high - low < [2e-4, 6e-3]).all() and (found.edge_error < 1e-8).all()
+    off = 1e-6
+    omega = np.stack([low - off, low + off, high - off, high + off])
+    verdicts = survey.evaluate(scene, Omega=omega.ravel(), epsilon=epsilon).survey.names()
+    expected = np.array(["stable", "unstable", "unstable", "stable"])
+    assert (verdicts.values.reshape(omega.shape) == expected[:, None]).all()

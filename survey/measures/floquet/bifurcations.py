@@ -16,6 +16,7 @@ M. Starzhinskii, Linear Differential Equations with Periodic Coefficients (1975)
 """
 
 import numpy as np
+from scipy.linalg import svd
 
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
@@ -29,6 +30,7 @@ from survey.measures.floquet.multipliers import (
 
 CLOSE = 1e-2  # far more than two s differ, next to a collision, by the error bounds of M
 CHUNK = 2_000_000  # entries of matrices that are treated together
+BY_GESDD = 36  # rows of a matrix
 
 
 def functions(n, structure):
@@ -116,7 +118,7 @@ def determinant(A, E, relative=True):
         A, E = (X * scale[:, None, :] / scale[:, :, None] for X in (A, E))
         good = np.isfinite(A).all(axis=(1, 2)) & np.isfinite(E).all(axis=(1, 2))
         A, E, size = A[good], E[good], size[good]
-        U, s, V = np.linalg.svd(A)
+        U, s, V = _svd(A)
         E = E + abs(A - (U * s[:, None, :]) @ V) + n * EPS * (abs(U) * s[:, None, :]) @ abs(V)
         # U and V are orthogonal but for rounding
         B = (1 + 1e-12) * (np.swapaxes(abs(U), 1, 2) @ E @ np.swapaxes(abs(V), 1, 2)).sum(axis=2)
@@ -128,6 +130,16 @@ def determinant(A, E, relative=True):
         value[good] = product * np.sign(np.linalg.det(U) * np.linalg.det(V))
         bar[good] = off * (1 + 1e-12) + 8 * n * EPS * product
     return value, bar
+
+
+def _svd(A):
+    """np.linalg.svd of A (N, n, n). Of larger ones LAPACK's gesdd starts threads, which take up to a
+    hundred times the time of the work where cores are busy; gesvd starts none.
+    """
+    if A.shape[1] <= BY_GESDD or not len(A):
+        return np.linalg.svd(A)
+    each = (svd(one, lapack_driver="gesvd", check_finite=False) for one in A)
+    return tuple(np.stack(part) for part in zip(*each, strict=True))
 
 
 def _distances(s, some):

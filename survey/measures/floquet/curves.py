@@ -40,6 +40,8 @@ ALONG = (
            applies="where the error bounds allow one number alone"),
 )  # fmt: skip
 LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
+TICKS = 8 * (LINES - 1) + 1  # of a line that alone is asked for
+DIPS, PARTS = 12, 8  # how often, and into how many parts, the surroundings of an extremum are cut
 NEAR = 3e-5  # of the map: how near curves of splines are
 BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 # one after another: times NEAR, along the best axis or the other
@@ -87,7 +89,8 @@ def searched(scene, square, axes, fixed, options):
         roughly = orbits.rough
         on_lattice = orbits.on_lattice()
     else:
-        structure, number, roughly = scene.structure, LINES, None
+        number = LINES if square.across is None else TICKS
+        structure, roughly = scene.structure, None
         matrices = matrices_of(scene, square, axes, fixed, options)
         on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
     n = on_lattice[0].shape[1]
@@ -359,9 +362,10 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
         at = np.flatnonzero(
             np.isfinite(dense[1:] + dense[:-1]) & ((dense[1:] > 0.0) != (dense[:-1] > 0.0))
         )
-    if not at.size:
-        return []
     start = fine[at] + dense[at] / (dense[at] - dense[at + 1]) / (fine.size - 1)
+    start = np.sort(np.append(start, _dips(function, ticks, values[:, 0], across)))
+    if not start.size:
+        return []
     parts = [np.array([[t, across]]) for t in start]
     return _closed_in(
         function,
@@ -371,6 +375,35 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
         0.5 / (lines - 1),
         tried[: len(tried) // 2],
     )
+
+
+def _dips(function, ticks, values, across):
+    """Positions next to zeros of a function between `ticks` at which its `values` have one sign:
+    about an extremum, as at both edges of a narrow tongue.
+    """
+    before, here, after = values[:-2], values[1:-1], values[2:]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        least = (here * before > 0.0) & (here * after > 0.0)
+        least &= (abs(here) <= abs(before)) & (abs(here) < abs(after))
+        # of the parabola through the three, which is 0 within twice that depth
+        depth = (after - before) ** 2 / (8.0 * (after - 2.0 * here + before))
+        at = np.flatnonzero(least & (abs(here) < 2.0 * abs(depth)))
+    ends, signs, found = np.stack([ticks[at], ticks[at + 2]], axis=1), np.sign(here[at]), []
+    for _ in range(DIPS):
+        if not ends.size:
+            break
+        t = np.linspace(*ends.T, PARTS + 1, axis=1)
+        x = np.stack([t.ravel(), np.full(t.size, across)], axis=1)
+        value = function(x)[0].reshape(t.shape) * signs[:, None]
+        value[np.isnan(value)] = np.inf
+        crossed = (value < 0.0).any(axis=1)
+        for own, v in zip(t[crossed], value[crossed], strict=True):
+            k = np.flatnonzero((v[1:] < 0.0) != (v[:-1] < 0.0))
+            found += list(own[k] + (own[k + 1] - own[k]) * v[k] / (v[k] - v[k + 1]))
+        t, value, signs = t[~crossed], value[~crossed], signs[~crossed]
+        rows, k = np.arange(len(t)), np.clip(value.argmin(axis=1), 1, PARTS - 1)
+        ends = np.stack([t[rows, k - 1], t[rows, k + 1]], axis=1)
+    return found
 
 
 def _sharpened(function, pieces, grain):
