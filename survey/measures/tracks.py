@@ -23,6 +23,7 @@ LEAST, MOST = 3e-5, 2000  # step on the map at which a curve is given up, and po
 SLOW = 12  # points that have not come further than as many of the LEAST steps end a curve
 SAME, APART = 3e-4, 0.05  # of the map, and of x: curves so near to one another are one
 WIDEST = 1e-6  # error of a point that is kept
+CUT = 24  # parts of a segment that a curve crosses
 DENSER = 4  # times the nodes of a line of the lattice, where one line alone is searched
 TINY = 1e-300
 
@@ -286,6 +287,25 @@ def from_lattice(number, things, function_of, square):
                     here, there = np.array([ticks[i], ticks[j]]), np.array([ticks[k], ticks[m]])
                     for label, start in _changes(known[i][j], known[k][m], here, there):
                         _add(found, label, *function_of(label), square.grain, start)
+    return _alone(found, function_of)
+
+
+def from_segments(segments, things, function_of, square):
+    """As `from_lattice`, of the curves that cross `segments` [positions (2, 2) of their ends], each cut
+    into CUT parts.
+    """
+    found = []
+    for low, high in segments:
+        x = low + np.linspace(0.0, 1.0, CUT + 1)[:, None] * (high - low)
+        nodes = [(position, things(position)) for position in x]
+        for (here, some), (there, others) in pairwise(nodes):
+            for label, start in _changes(some, others, here, there):
+                _add(found, label, *function_of(label), square.grain, start)
+    return _alone(found, function_of)
+
+
+def _alone(found, function_of):
+    """Those [(label, Track)] that do not lie on longer ones."""
     found.sort(key=lambda one: -len(one[1].x))
     alone = []
     for label, track in found:

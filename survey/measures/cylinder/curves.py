@@ -6,7 +6,13 @@ part the portraits: see `bifurcations`.
 
 import numpy as np
 
-from survey.measures.cylinder import bifurcations, cycle_counts, own_bifurcations, separatrices
+from survey.measures.cylinder import (
+    bifurcations,
+    cycle_counts,
+    cycle_folds,
+    own_bifurcations,
+    separatrices,
+)
 from survey.measures.cylinder.separatrices import SYSTEM
 from survey.measures.sampled import joined
 from survey.scene import Output
@@ -110,7 +116,10 @@ def _of_parameters(plane, find):
     with np.errstate(all="ignore"):
         rows = [bifurcations.counted(plane, *row) for row in find(plane)]
         if plane.square.across is None:
-            missed = cycle_counts.unexplained(plane, rows, cycle_counts.on_lattice(plane))
+            counts = cycle_counts.on_lattice(plane)
+            folds = cycle_folds.found(plane, cycle_counts.lost(plane, rows, counts))
+            rows += [bifurcations.counted(plane, *row) for row in folds]
+            missed = len(cycle_counts.lost(plane, rows, counts))
         else:
             rows, missed = _on_border(plane, find, rows)
     curves = joined(

@@ -29,9 +29,9 @@ def on_lattice(plane):
     return counts.T.reshape(-1, LINES, LINES)
 
 
-def unexplained(plane, rows, counts):
-    """The number of segments of the lattice's lines along which curves do not explain the numbers
-    of cycles.
+def lost(plane, rows, counts):
+    """The segments (low, high), positions, of the lattice's lines along which curves do not explain
+    the numbers of cycles.
 
     `rows` are those of `bifurcations.found`.
     """
@@ -44,7 +44,11 @@ def unexplained(plane, rows, counts):
         ]
         explained = segments(values, own, WEIGHTS, optional=OPTIONAL)
         missed |= {segment for segment, good in explained.items() if not good}
-    return len(missed)
+    ticks = np.linspace(0.0, 1.0, LINES)
+    return [
+        ticks[np.array([[first, number], [last, number]])][:, :: 1 - 2 * axis]
+        for axis, number, first, last in sorted(missed)
+    ]
 
 
 def on_border(plane):

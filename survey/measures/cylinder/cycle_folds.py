@@ -4,7 +4,9 @@ cycles are one.
 There the change D of the map has an extremum on which it is 0: a multiplier passes +1. Extrema are
 looked for on a lattice of the map, by the signs of the map's slope less 1 among SCANNED points, and
 where the extremal D changes its sign from one node to the next a fold is followed
-(`survey.measures.tracks`). What a fold does between lines of the lattice alone, and folds whose
+(`survey.measures.tracks`). Where curves do not explain how the number of cycles changes between two
+nodes (`cycle_counts`), as between a connection and K = 0 that are close to each other, the segment
+is searched again, more finely. What a fold does between lines of the lattice alone, and folds whose
 cycles nearly touch a saddle throughout, may be missed.
 """
 
@@ -151,8 +153,10 @@ class Maps:
         return best.coordinate, best.change
 
 
-def found(plane):
-    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the folds on the map."""
+def found(plane, segments=None):
+    """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the folds on the map, or of
+    those that cross `segments` [positions (2, 2)].
+    """
     known = {}
 
     def maps(position):
@@ -178,7 +182,12 @@ def found(plane):
 
         return function, TWO_PI if kind == LIBRATION else math.inf
 
-    for (kind, _class), track in tracks.from_lattice(LINES, things, function_of, plane.square):
+    given = things, function_of, plane.square
+    for (kind, _class), track in (
+        tracks.from_lattice(LINES, *given)
+        if segments is None
+        else tracks.from_segments(segments, *given)
+    ):
         for part in track.certain():
             yield "cycle_fold", plane.square.parameters(part.x), part.error, _known(kind, part)
 

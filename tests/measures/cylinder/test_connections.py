@@ -146,9 +146,9 @@ def test_curves_run_into_each_other_and_explain_the_numbers_of_cycles(monkeypatc
     monkeypatch.setattr(cycle_counts, "LINES", 15)
     rows = bifurcations.found(PLANE)
     counts = cycle_counts.on_lattice(PLANE)
-    assert cycle_counts.unexplained(PLANE, rows, counts) == 0
+    assert not cycle_counts.lost(PLANE, rows, counts)
     long = [i for i, (kind, xy, *_) in enumerate(rows) if kind == "homoclinic" and len(xy) > 30]
-    without = [cycle_counts.unexplained(PLANE, rows[:i] + rows[i + 1 :], counts) for i in long]
+    without = [len(cycle_counts.lost(PLANE, rows[:i] + rows[i + 1 :], counts)) for i in long]
     assert len(long) > 4 and sum(number > 3 for number in without) > 2
     short = [len(xy) for kind, xy, *_ in rows if kind.endswith("clinic") and len(xy) < 6]
     assert len(short) < 4

@@ -106,3 +106,20 @@ def test_two_cycles_are_lost_at_a_fold_on_a_line():
     at, bar = (x.values[own].item() for x in (line.edge, line.edge_error))
     beside = survey.evaluate("gyrostat", question="portrait", b12=[at - 1e-5, at + 1e-5], **system)
     assert abs(np.diff(beside.rotations_minus.values)).item() == 2 and bar < 1e-9
+
+
+def test_a_fold_between_a_connection_and_the_ends_is_found_from_a_segment():
+    """K = 0 and a homoclinic connection are 0.005 of the map apart here: no node of the lattice lies
+    between, but the number of cycles does not add up beside them.
+    """
+    system = {"b12": -0.45190322, "c23": 0.43981877, "s2": 0.67113843, "s3": -0.43624435}
+    square = Square(np.full(2, -1.2), np.full(2, 1.2), np.array([False, False]))
+    plane = bifurcations.ParameterPlane(square, ("b31", "d"), system)
+    segment = np.array([[20.0, 17.0], [21.0, 17.0]]) / 32
+    ((kind, xy, error, _),) = cycle_folds.found(plane, [segment])
+    assert kind == "cycle_fold" and len(xy) > 20 and error.max() < 1e-9
+    for b31, d in xy[5:-5:10]:
+        beside = survey.evaluate(
+            "gyrostat", question="portrait", b31=[b31 - 1e-4, b31 + 1e-4], d=d, **system
+        )
+        assert abs(np.diff(beside.rotations_plus.values)).item() == 2
