@@ -22,7 +22,7 @@ each = pytest.mark.parametrize(("axes", "changes"), PLANES, ids=str)
 @pytest.fixture(autouse=True)
 def closed_forms_alone(monkeypatch):
     monkeypatch.setattr(bifurcations.connections, "found", lambda plane: [])
-    monkeypatch.setattr(bifurcations.cycle_folds, "found", lambda plane: [])
+    monkeypatch.setattr(bifurcations.cycle_folds, "found", lambda plane, segments=None: [])
     monkeypatch.setattr(bifurcations, "COUNTED", 0)
     monkeypatch.setattr(curves.cycle_counts, "LINES", 2)
 

@@ -97,7 +97,7 @@ def miss(connection, x):
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
     monkeypatch.setattr(connections, "LINES", 41)
-    monkeypatch.setattr(bifurcations.cycle_folds, "found", lambda plane: [])
+    monkeypatch.setattr(bifurcations.cycle_folds, "found", lambda plane, segments=None: [])
     monkeypatch.setattr(bifurcations, "COUNTED", 2)
     monkeypatch.setattr(cycle_counts, "LINES", 2)
 

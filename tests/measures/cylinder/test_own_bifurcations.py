@@ -62,7 +62,7 @@ def uncounted(monkeypatch):
 @pytest.mark.slow
 def test_an_equation_written_out_has_the_gyrostats_curves(monkeypatch):
     monkeypatch.setattr(connections, "found", lambda plane: [])
-    monkeypatch.setattr(cycle_folds, "found", lambda plane: [])
+    monkeypatch.setattr(cycle_folds, "found", lambda plane, segments=None: [])
     monkeypatch.setattr(bifurcations, "COUNTED", 0)
     monkeypatch.setattr(own_bifurcations, "LINES", 9)
     square = Square(np.array([-9.0, -9.0]), np.array([9.0, 9.0]), EVEN)
@@ -171,7 +171,7 @@ def test_on_a_line_there_are_none():
 def test_hopf_points_are_classified_by_the_cycle_beside_them(f1, kind, monkeypatch):
     """phi'' = (a + f1 sin^2 phi) phi' - sin phi: with f1 < 0 an attracting libration is born where a > 0."""
     monkeypatch.setattr(connections, "found", lambda plane: [])
-    monkeypatch.setattr(cycle_folds, "found", lambda plane: [])
+    monkeypatch.setattr(cycle_folds, "found", lambda plane, segments=None: [])
     monkeypatch.setattr(own_bifurcations, "LINES", 9)
 
     def f(phi, p):
