@@ -57,6 +57,20 @@ def first_rungs(p, bound, span, rate, phase, distance, ladder, out):
 
 
 @kernel
+def spread(h, ulp, ulps, out):
+    """Lengths of steps, out[r, i] near h[r], of which ulps[r] `ulp`[r] more or less, evenly spread over the
+    row, make the whole.
+    """
+    steps = out.shape[1]
+    for r in range(len(h)):
+        each, before = ulps[r] / steps, 0.0
+        for i in range(steps):
+            after = np.floor(each * (i + 1) + 0.5)
+            out[r, i] = h[r] + ulp[r] * (after - before)
+            before = after
+
+
+@kernel
 def segments(rung, top, order, rows, on_rung, starts):
     """Points with a rung in 0..top by row and rung: their flat indices in `order`; returns the
     number of segments.
@@ -97,6 +111,7 @@ def measure(
     squares,
     rule,
     wanted,
+    decides,
     rtol,
     full_period,
     overflow,
@@ -110,8 +125,8 @@ def measure(
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
     `overflow`. `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count
-    for `missed`; `full_period` as in `_squares`; `squares` (n, SQUARES, or empty) holds what it finds,
-    where more digits of it are known.
+    for `missed`, and `decides` whether an open verdict does; `full_period` as in `_squares`;
+    `squares` (n, SQUARES, or empty) holds what it finds, where more digits of it are known.
     """
     for row in range(len(results)):
         i = first + row
@@ -138,7 +153,7 @@ def measure(
                 floats[c, i] = np.nan
             continue
         verdict[i] = decided
-        wide = decided == UNDECIDED
+        wide = decides and decided == UNDECIDED
         if wanted[0]:
             floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
             wide |= not bar <= rtol * (1.0 + abs(d))

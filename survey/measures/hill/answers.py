@@ -17,13 +17,15 @@ class Asked:
     """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.answers.FLOATS`.
 
     Points of a row that come `together` share the steps of the one that needs most, and so the
-    row's samples. With `full_period` the results are those of the period, where z is not even.
+    row's samples. With `full_period` the results are those of the period, where z is not even. An
+    open verdict misses the accuracy, unless none is asked for (`decides`).
     """
 
     rtol: float
     wanted: np.ndarray
     together: bool = False
     full_period: bool = False
+    decides: bool = True
 
 
 class Answers(answers.Answers):
@@ -53,6 +55,7 @@ class Answers(answers.Answers):
             squares,
             rule,
             asked.wanted,
+            asked.decides,
             asked.rtol,
             asked.full_period,
             status.OVERFLOW,

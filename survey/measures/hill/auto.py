@@ -24,9 +24,9 @@ ILL, FEW_STEPS = 1e-11, 500
 CALL_STEPS = 20_000
 
 
-def solve(problem, asked, answers, decide=True):
-    """Answer every point of the problem, in place; `decide`: solve what stays undecided again, with
-    more digits.
+def solve(problem, asked, answers):
+    """Answer every point of the problem, in place; if asked to decide, solve what stays undecided
+    again, with more digits.
     """
     free = None
     if problem.constant is not None:
@@ -48,7 +48,7 @@ def solve(problem, asked, answers, decide=True):
         own.assess(results, None if problem.rule is None else problem.rule.reshape(-1)[points])
         answers.replace(points, own)
     ours = (answers.status == status.OK) & (True if free is None else ~free)
-    left = ours & (answers.verdict == UNDECIDED) & decide
+    left = ours & (answers.verdict == UNDECIDED) & asked.decides
     if problem.exact is not None:
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
         if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:

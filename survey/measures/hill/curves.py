@@ -28,7 +28,7 @@ from survey.measures.hill.edges import (
     of_kind,
     tongue,
 )
-from survey.measures.hill.expansion import expander
+from survey.measures.hill.expansion import expander, tangents
 from survey.measures.tasks import in_turn
 
 LONGEST, SHORTEST = 0.02, 1e-9  # steps
@@ -89,21 +89,13 @@ def trace(solve, square, seeds, each=in_turn):
     towards = np.zeros(seeds.x.shape)
 
     def task(own):
-        # on the edge itself the rotation number would ask for double-double arithmetic
-        step = np.full(own.size, LONGEST)
-        seen = expand(
-            seeds.x[own], seeds.kind[own], step, seeds.low[own], seeds.high[own], count=False
-        )
-        towards[own] = seen.course(np.ones(own.size))[0]
+        at = seeds.x[own], seeds.kind[own], np.full(own.size, LONGEST)
+        towards[own] = tangents(solve, square, *at, seeds.low[own], seeds.high[own])
 
     _in_chunks(each, task, of_seed.size, "parts of the curves' seeds")
     paths, starts = [], []
     while (of_seed < 0).any():
-        left = np.flatnonzero(of_seed < 0)
-        group = np.unique(
-            np.stack([seeds.kind[left], seeds.index[left]], axis=1), axis=0, return_index=True
-        )[1]
-        start = np.sort(left[group])  # one of each kind and index: no two on the same curve
+        start = _starts(seeds, np.flatnonzero(of_seed < 0))
         for path, seed in zip(_follow(expand, seeds, start), start, strict=True):
             on_it = (
                 (of_seed < 0)
@@ -115,7 +107,22 @@ def trace(solve, square, seeds, each=in_turn):
             of_seed[seed] = len(paths)
             paths.append(path)
             starts.append(seed)
-    return _close_all_in(solve, square, paths, np.array(starts, int), seeds, of_seed, each)
+    order = np.argsort(np.unique(of_seed, return_index=True)[1])  # as their first seeds are
+    paths, starts = [paths[i] for i in order], np.array(starts, int)[order]
+    return _close_all_in(solve, square, paths, starts, seeds, np.argsort(order)[of_seed], each)
+
+
+def _starts(seeds, left):
+    """Of the seeds `left` one of each kind and index, so that no two lie on the same curve: the
+    middle one, from which both ends are few steps away.
+    """
+    own = np.stack([seeds.kind[left], seeds.index[left]], axis=1)
+    _, first, group, number = np.unique(
+        own, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
+    before = np.cumsum(number) - number
+    middle = np.argsort(group.ravel(), kind="stable")[before + number // 2]
+    return left[middle[np.argsort(first)]]
 
 
 def _in_chunks(each, task, number, what):
@@ -147,6 +154,7 @@ def _follow(expand, seeds, start):
     side = np.repeat([1.0, -1.0], n)
     x = np.tile(seeds.x[start], (2, 1))
     step = np.full(2 * n, 0.1 * LONGEST)
+    # on the edge itself the rotation number would ask for double-double arithmetic
     along, normal, bend = expand(x, kind, step, low, high, count=False).course(side)
     home, heading, gone = x.copy(), along.copy(), np.zeros(2 * n)
     ended, closed, lost = np.zeros((3, 2 * n), bool)

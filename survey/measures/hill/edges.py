@@ -30,8 +30,9 @@ OUTPUTS = (
     Output("edge_index", "number of the tongue: twice its rotation number", "n", integer=True),
 )
 NODES = 24
-# Cells of a panel in which zeros are looked for, and steps of Newton's method in one.
-CELLS, NEWTON = 192, 5
+# Cells of a panel in which zeros are looked for, at first and where these tell too little, and steps of
+# Newton's method in one.
+CELLS, NEWTON = (32, 192), 6
 # The last coefficients of a converged series, relative to its largest.
 CONVERGED = 1e-9
 # Panels are halved DEEP times; up to DEEPEST about FEW points of a row, where edges accumulate, not
@@ -129,30 +130,35 @@ def _halves(one, other):
     return np.stack([one, other], axis=1).reshape(-1)
 
 
-def _all_zeros(series):
+def _all_zeros(series, cells=CELLS):
     """(which series, zero) of all real zeros in [-1, 1] of the series (n, NODES).
 
     In theta = arccos x a series is seen to have no zero in a cell, or to be monotonic there, from
     its value and slope in the middle and a bound of its second derivative; where that leaves a cell
-    open, eigenvalues tell.
+    open, finer `cells` tell, and at last eigenvalues.
     """
-    k, half = np.arange(NODES), 0.5 * np.pi / CELLS
-    edges = np.pi * np.arange(CELLS + 1) / CELLS
+    number, *finer = cells
+    k, half = np.arange(NODES), 0.5 * np.pi / number
+    edges = np.pi * np.arange(number + 1) / number
     at_edges = series @ np.cos(k[:, None] * edges)
     middle = series @ np.cos(k[:, None] * (edges[:-1] + half))
     slope = abs(series @ (k[:, None] * np.sin(k[:, None] * (edges[:-1] + half))))
     bend = abs(series) @ (k * k)
     none = abs(middle) > half * slope + (0.5 * half * half) * bend[:, None]
     changes = (at_edges[:, 1:] < 0) != (at_edges[:, :-1] < 0)
-    clear = (none | (slope > half * bend[:, None])).all(axis=1)
+    clear = (none | (slope > 2 * half * bend[:, None])).all(axis=1)  # it varies by half at most
     which, cell = np.nonzero(changes & ~none & clear[:, None])
-    theta, own = edges[cell] + half, series[which]
+    theta, own = edges[cell] + half, np.ascontiguousarray(series[which].T)
+    derivative = chebyshev.chebder(own)
     for _ in range(NEWTON):
-        angles = k * theta[:, None]
-        step = (own * np.cos(angles)).sum(axis=1) / (own * k * np.sin(angles)).sum(axis=1)
-        theta = np.clip(theta + step, edges[cell], edges[cell + 1])
-    found = [(which, np.cos(theta))]
-    for i in np.flatnonzero(~clear):
+        x = np.cos(theta)
+        value, slope = (chebyshev.chebval(x, of, tensor=False) for of in (own, derivative))
+        theta = np.clip(theta + value / (slope * np.sin(theta)), edges[cell], edges[cell + 1])
+    found, left = [(which, np.cos(theta))], np.flatnonzero(~clear)
+    if finer:
+        own, zeros = _all_zeros(series[left], finer)
+        found.append((left[own], zeros))
+    for i in left if not finer else ():
         zeros = _zeros(series[i])
         found.append((np.full(zeros.size, i), zeros))
     which, zeros = (np.concatenate(values) for values in zip(*found, strict=True))

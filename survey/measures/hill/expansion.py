@@ -54,15 +54,8 @@ def expander(solve, square):
         """The Expansion at positions x, from nine points that are close against a step of `length`,
         in low ... high.
         """
-        spacing = np.minimum(np.maximum(SPACING * length, LEAST)[:, None], 0.2 * (high - low))
-        middle = np.clip(x, low + spacing, high - spacing)
-        nine = square.parameters(middle[:, None] + spacing[:, None] * STENCIL[:, None])
-        q, row = np.unique(nine[..., 0], return_inverse=True)  # seeds on one row share its values
         wanted = FACTORS + COUNTS[:count]
-        p = np.repeat(nine[..., 1], 3, axis=0)
-        out = on_rows(lambda own, x, names: solve(q[own, None], x, names), row.ravel(), p, wanted)
-        f, _ = of_kind({name: values.reshape(-1, 3, 3) for name, values in out.items()}, kind)
-        h, k = spacing.T
+        f, out, middle, (h, k) = _near(solve, square, x, kind, length, low, high, STENCIL, wanted)
         gradient = np.stack(
             [(f[:, 2, 1] - f[:, 0, 1]) / (2 * h), (f[:, 1, 2] - f[:, 1, 0]) / (2 * k)], axis=1
         )
@@ -78,3 +71,26 @@ def expander(solve, square):
         return Expansion(f[:, 1, 1], gradient, second, turns).moved(x - middle)
 
     return expansion
+
+
+def tangents(solve, square, x, kind, length, low, high):
+    """Unit tangents (n, 2) at positions x of the curve F = 0, F > 0 on their right, from the four corners."""
+    f, _, _, (h, k) = _near(solve, square, x, kind, length, low, high, STENCIL[::2], FACTORS)
+    right, up = f[:, 1] - f[:, 0], f[:, :, 1] - f[:, :, 0]
+    gradient = np.stack([right.sum(axis=1) / h, up.sum(axis=1) / k], axis=1)
+    return np.stack([-gradient[:, 1], gradient[:, 0]], axis=1) / np.hypot(*gradient.T)[:, None]
+
+
+def _near(solve, square, x, kind, length, low, high, stencil, wanted):
+    """F (n, s, s) on a lattice of s by s points about positions near x, with all outputs, those
+    positions and the spacings (2, n).
+    """
+    spacing = np.minimum(np.maximum(SPACING * length, LEAST)[:, None], 0.2 * (high - low))
+    middle = np.clip(x, low + spacing, high - spacing)
+    size = stencil.size
+    lattice = square.parameters(middle[:, None] + spacing[:, None] * stencil[:, None])
+    q, row = np.unique(lattice[..., 0], return_inverse=True)  # seeds on one row share its values
+    p = np.repeat(lattice[..., 1], size, axis=0)
+    out = on_rows(lambda own, x, names: solve(q[own, None], x, names), row.ravel(), p, wanted)
+    f, _ = of_kind({name: values.reshape(-1, size, size) for name, values in out.items()}, kind)
+    return f, out, middle, spacing.T

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from survey import measures, status
-from survey.kernels.hill.answers import FLOATS, MARGINAL, STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import FLOATS, MARGINAL, STABLE, UNDECIDED, UNSTABLE, spread
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math.double import split_error
 from survey.measures.hill import auto, pointwise
@@ -134,8 +134,9 @@ class Problem:
         if self.span_low is not None:
             left += self.span_low[rows]
         ulp = np.spacing(h)
-        ulps = np.floor((np.rint(left / ulp) / steps)[:, None] * np.arange(steps + 1) + 0.5)
-        return h[:, None] + ulp[:, None] * np.diff(ulps, axis=1)
+        lengths = np.empty((rows.size, steps))
+        spread(h, ulp, np.rint(left / ulp), lengths)
+        return lengths
 
     def at(self, rows, p, rule=None):
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say
@@ -184,18 +185,20 @@ def solve(problem, method, rtol, wanted=()):
     `method` is the name of a method, or "auto" (see `auto`); points climb its ladder until
     `rtol` is met or more work is of no use.
     """
-    asked = Asked(
-        rtol,
-        np.array([name in wanted or not wanted for name in FLOATS]),
-        full_period=problem.full_period,
-    )
+    asked = _asked(rtol, wanted, problem.full_period)
     answers = Answers(problem.p.size, asked)
     if method == "auto":
-        decide = not wanted or not DECIDED.isdisjoint(wanted)
-        auto.solve(problem, asked, answers, decide)
+        auto.solve(problem, asked, answers)
     else:
         pointwise.solve(problem, measures.method(method), asked, answers)
     return _outputs(answers, asked, problem.p.shape)
+
+
+def _asked(rtol, wanted, full_period):
+    """What is asked for; factors alone need no verdict."""
+    columns = np.array([name in wanted or not wanted for name in FLOATS])
+    decides = not wanted or not DECIDED.isdisjoint(wanted)
+    return Asked(rtol, columns, full_period=full_period, decides=decides)
 
 
 def _outputs(answers, asked, shape):
@@ -219,16 +222,12 @@ def solve_scattered(box, position, p, problem_of, rtol, wanted=()):
     no series serves): from series on their `box`; `problem_of(points)` is the Problem of those that
     are left.
     """
-    asked = Asked(
-        rtol,
-        np.array([name in wanted or not wanted for name in FLOATS]),
-        full_period=box.full_period,
-    )
+    asked = _asked(rtol, wanted, box.full_period)
     answers = Answers(p.size, asked)
     left = np.flatnonzero(auto.scattered(box, asked, answers, position, p))
     if left.size:
         own = Answers(left.size, asked)
-        auto.solve(problem_of(left), asked, own, not wanted or not DECIDED.isdisjoint(wanted))
+        auto.solve(problem_of(left), asked, own)
         answers.replace(left, own)
     return _outputs(answers, asked, (p.size, 1))
 

@@ -195,6 +195,10 @@ def _by_point(rows, starts, ends):
 def _calls(rows, starts, ends, steps, nodes):
     """(rows, starts, ends) of the segments in parts, each one kernel call; long segments are cut."""
     most = max(1, CALL_WORK // steps)
+    most_rows = max(1, CALL_SAMPLES // (steps * nodes))
+    if rows.size <= most_rows and (ends - starts).sum() <= most:
+        yield rows, starts, ends
+        return
     pieces = -(-(ends - starts) // most)
     if pieces.max(initial=1) > 1:
         number = np.arange(pieces.sum()) - np.repeat(np.cumsum(pieces) - pieces, pieces)
@@ -202,7 +206,6 @@ def _calls(rows, starts, ends, steps, nodes):
         starts = np.repeat(starts, pieces) + most * number
         ends = np.minimum(ends, starts + most)
     total = np.cumsum(ends - starts)
-    most_rows = max(1, CALL_SAMPLES // (steps * nodes))
     first = 0
     while first < rows.size:
         done = total[first - 1] if first else 0

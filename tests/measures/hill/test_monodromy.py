@@ -56,6 +56,21 @@ def test_discriminants_lie_within_the_bars(method, rtol):
     assert max(ratios) > 1e-3, "bars a thousand times the errors"
 
 
+FAST = [row for row in STANDARD if row["q"] >= 25]
+
+
+@pytest.mark.parametrize("row", FAST, ids=lambda row: f"{row['kind']}{row['n']}-q{row['q']}")
+def test_factors_alone_are_not_solved_again_for_a_verdict(row):
+    """On an edge no accuracy decides: factors keep the bars that were asked for, which hold the zero."""
+    name = {"a": ("dy1", "y1"), "b": ("y2", "dy2")}[row["kind"]][row["n"] % 2]
+    problem, rtol = mathieu([[float(row["value"])]], [row["q"]]), 1e-6
+    alone = monodromy.solve(problem, "taylor16", rtol, {name})
+    decided = monodromy.solve(problem, "taylor16", rtol, {name, "verdict"})
+    bar = alone[f"{name}_error"].item()
+    assert abs(alone[name].item()) <= bar <= rtol
+    assert decided[f"{name}_error"].item() < bar
+
+
 def test_no_modulation_is_marginal_at_squares_only():
     out = solve([[1.0, 4.0, 2.0, 9.000001]], [0.0])
     assert list(out["verdict"][0]) == [
