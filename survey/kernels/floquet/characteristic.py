@@ -196,7 +196,7 @@ def answer_lanes(
     c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
 ):
     """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to
-    within `bars`, and roots z + i y (d, LANES), nearly.
+    within `bars`, and roots z + i y (d, LANES), nearly (of no use where d < 3).
     """
     K, d = len(c), len(z)
     if n == 2 and not (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
@@ -301,8 +301,23 @@ def _radius_of_two(trace, det, trace_bar, det_bar):
 
 @kernel
 def _roots(c, d, z, y, parts):
-    """Weierstrass's iteration from z + i y, in lanes."""
-    for _ in range(ITERATIONS):
+    """The roots z + i y in lanes: in closed form, or by Weierstrass's iteration from those given."""
+    if d == 1:
+        for lane in range(LANES):
+            z[0, lane], y[0, lane] = -c[0, lane], 0.0
+        return
+    if d == 2:
+        for lane in range(LANES):
+            half = -0.5 * c[0, lane]
+            inner = half * half - c[1, lane]
+            root = math.sqrt(abs(inner))
+            if inner < 0.0:
+                z[0, lane], y[0, lane], z[1, lane], y[1, lane] = half, root, half, -root
+            else:
+                far = half + (root if half >= 0.0 else -root)
+                z[0, lane], y[0, lane], y[1, lane] = far, 0.0, 0.0
+                z[1, lane] = c[1, lane] / far if far != 0.0 else 0.0
+    for _ in range(1 if d == 2 else ITERATIONS):
         improve(c, d, z, y, parts)
 
 

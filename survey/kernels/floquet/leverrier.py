@@ -63,7 +63,8 @@ def answer_matrices(
         for lane in range(count, LANES):
             for k in range(K):
                 c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
-        _near_roots(c, d, z, y, parts)
+        if d > 2:
+            _from_circle(c, d, z, y, parts)
         answer_lanes(
             c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
         )  # fmt: skip
@@ -138,27 +139,6 @@ def _in_sums(c, c_bars, m, change, out, out_bars, first, lane):
             total += c[m - j] * change[j, power]
             bound += (c_bars[m - j] + (m + 4) * EPS * abs(c[m - j])) * abs(change[j, power])
         out[first + i, lane], out_bars[first + i, lane] = total, bound
-
-
-@kernel
-def _near_roots(c, d, z, y, parts):
-    """Fill z + i y with roots, roughly."""
-    if d == 1:
-        for lane in range(LANES):
-            z[0, lane], y[0, lane] = -c[0, lane], 0.0
-    elif d == 2:
-        for lane in range(LANES):
-            half = -0.5 * c[0, lane]
-            inner = half * half - c[1, lane]
-            root = math.sqrt(abs(inner))
-            if inner < 0.0:
-                z[0, lane], y[0, lane], z[1, lane], y[1, lane] = half, root, half, -root
-            else:
-                far = half + (root if half >= 0.0 else -root)
-                z[0, lane], y[0, lane], y[1, lane] = far, 0.0, 0.0
-                z[1, lane] = c[1, lane] / far if far != 0.0 else 0.0
-    else:
-        _from_circle(c, d, z, y, parts)
 
 
 @kernel
