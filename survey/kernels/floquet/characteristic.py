@@ -156,10 +156,15 @@ def answer_points(
             sums[:] = 0.0
             for j in range(m - 1, -1, -1):
                 part[:] = 0.0
-                for i in range(terms[k, j] - 1, -1, -1):
+                for i in range(terms[k, j] - 1, 0, -2):  # two at a time: half the stores
                     weight, one = series[i, k * m + j], across[i]
+                    other, two = series[i - 1, k * m + j], across[i - 1]
                     for lane in range(LANES):
-                        part[lane] += weight * one[lane]
+                        part[lane] += weight * one[lane] + other * two[lane]
+                if terms[k, j] % 2:
+                    weight = series[0, k * m + j]
+                    for lane in range(LANES):
+                        part[lane] += weight
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
