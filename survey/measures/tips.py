@@ -18,6 +18,7 @@ MOST = 60  # steps
 ENDS = 64  # that are followed, those of the longest pieces: where tongues crowd there are hundreds
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 SAME = 1e-8  # how near one point is found again, besides the brackets
+BESIDE = 1e-4  # of the map: a step that ends so near a piece of the same sense is on its curve
 
 
 class _End:
@@ -25,7 +26,8 @@ class _End:
     length of a step.
     """
 
-    def __init__(self, x, error):
+    def __init__(self, x, error, sense):
+        self.sense = sense  # 1 if pieces are positive on the same side as it, on its way out
         self.x = [*x]
         self.error = [*error]
         self.own = len(x)
@@ -50,11 +52,13 @@ def followed(function, pieces, grain):
     """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends inside
     the map.
 
-    Those that meet end to end are one.
+    Those that meet end to end are one. All pieces are positive on one side, as those of marching
+    squares are, so that none is followed along another one.
     """
     if not pieces:
         return []
-    ends = [_End(x[::sense], error[::sense]) for x, error in pieces for sense in (-1, 1)]
+    ends = [_End(x[::sense], error[::sense], sense) for x, error in pieces for sense in (-1, 1)]
+    chords = np.concatenate([np.stack([x[:-1], x[1:]], axis=1) for x, _error in pieces])
     for end in ends:
         tip = end.x[-1]
         end.going = bool(((tip > 0.0) & (tip < 1.0)).all())
@@ -69,7 +73,7 @@ def followed(function, pieces, grain):
         ]
         if not going:
             break
-        _steps(function, going, ends, grain)
+        chords = _steps(function, going, ends, chords, grain)
     longer = []
     for i, (x, error) in enumerate(pieces):
         (first, first_error), (last, last_error) = (end.new for end in ends[2 * i : 2 * i + 2])
@@ -135,8 +139,11 @@ def _sides(function, ends):
         end.going = end.side != 0.0
 
 
-def _steps(function, going, ends, grain):
-    """One step of all ends that are going; those that cannot take it try a shorter one next, or stop."""
+def _steps(function, going, ends, chords, grain):
+    """One step of all ends that are going; those that cannot take it try a shorter one next, or stop.
+
+    `chords` (m, 2, 2): ends of those of the curves so far, in one sense; returned with the new ones.
+    """
     goals, met = zip(*(_goal(end, ends) for end in going), strict=True)
     ahead, goals = np.array([end.ahead for end in going]), np.array(goals)
     axis = np.argmin(abs(ahead), axis=1)
@@ -170,6 +177,7 @@ def _steps(function, going, ends, grain):
         sure[some] = certain & right & (error[some] < SURE)
     inside = (t >= 0.0) & (t <= 1.0)
     off = abs(t - goals[rows, axis])
+    known = [chords]
     for k, end in enumerate(going):
         if not end.going:  # another one has met it
             continue
@@ -182,10 +190,12 @@ def _steps(function, going, ends, grain):
             or not inside[k]
             or bend > 8.0 * FLAT + 0.1 * LEAST
             or off[k] > 0.5 * length[k]
+            or _runs_along(end, point, np.concatenate(known))
         ):
             end.step *= 0.5
             end.going = end.step >= LEAST
             continue
+        known.append(np.array([[end.x[-1], point][:: end.sense]]))
         end.x.append(point)
         end.error.append(error[k] + grain)
         if other is not None and off[k] <= SAME + error[k] + other.error[-1]:
@@ -194,6 +204,7 @@ def _steps(function, going, ends, grain):
             end.going = False
         elif bend < 2.0 * FLAT:
             end.step = min(1.5 * end.step, LONGEST)
+    return np.concatenate(known)
 
 
 def _meets(end, other, reach):
@@ -207,6 +218,15 @@ def _meets(end, other, reach):
         and np.hypot(*(run - along * ahead)) <= 0.2 * along
         and ahead @ other.ahead < 0.0
     )
+
+
+def _runs_along(end, point, chords):
+    """Does the step to the point end beside chords (m, 2, 2) that are taken in the same sense?"""
+    run, chord = point - chords[:, 0], chords[:, 1] - chords[:, 0]
+    square, share = (chord * chord).sum(axis=1), (run * chord).sum(axis=1)
+    off = abs(run[:, 0] * chord[:, 1] - run[:, 1] * chord[:, 0])
+    beside = (share > 0.0) & (share < square) & (off <= BESIDE * np.sqrt(square))
+    return bool((beside & (end.sense * (chord @ (point - end.x[-1])) > 0.0)).any())
 
 
 def _faces(end, other):

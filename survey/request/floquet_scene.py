@@ -333,10 +333,9 @@ class FloquetScene(TracedScene):
     def _check_reversible(self, programs, point, edges, size):
         """Refuse A unless signs r of the states exist with r_i r_j A_ij(-t) = -A_ij(t)."""
         times = edges[-1] * (0.013 + 0.97 * TRIED)
-        there, back = (
-            np.array([self._at(programs, point, edges, t) for t in some])
-            for some in (times, edges[-1] - times)
-        )
+        there, back = self._at(
+            programs, point, edges, np.concatenate([times, edges[-1] - times])
+        ).reshape(2, times.size, len(self.states), -1)
         odd, even = (abs(back + sign * there).max(axis=0) <= SAME * size for sign in (1, -1))
         if alike_or_opposite(odd, even) is None:
             self._refuse(
@@ -345,8 +344,14 @@ class FloquetScene(TracedScene):
             )
 
     def _at(self, programs, point, edges, t):
-        k = min(int(np.searchsorted(edges, t, side="right")) - 1, len(programs) - 1)
-        return programs[k].at(point[None], np.array([[t]]), len(self.states))[0][0, 0]
+        """A (m, n, n) at times t (m) of the point, from the recorded operations."""
+        n = len(self.states)
+        piece = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, len(programs) - 1)
+        A = np.empty((t.size, n, n))
+        for k in np.unique(piece):
+            own = piece == k
+            A[own] = programs[k].at(point[None], t[None, own], n)[0][0]
+        return A
 
     def _check_period(self, point, period, size):
         for name in self.matrices:

@@ -44,6 +44,19 @@ def test_a_hole_on_the_curve_ends_it():
     assert 0.33 < inner[0] <= 0.35 and 0.45 <= inner[1] < 0.47
 
 
+def test_round_a_corner_two_arms_meet_and_none_is_followed_along_the_other():
+    """Of (x0 - 1/2) (x1 - 1/2) = c, which turns within 2e-3: two arms of length 1 / 2."""
+
+    def hyperbola(x):
+        return (x[:, 0] - 0.5) * (x[:, 1] - 0.5) - 1e-6, np.full(len(x), 1e-15)
+
+    far = np.geomspace(1e-2, 0.5, 20)
+    up = np.stack([0.5 + 1e-6 / far, 0.5 + far], axis=1)
+    pieces = [(x, np.full(20, 1e-15)) for x in (up[::-1], up[:, ::-1])]
+    ((x, _error),) = tips.followed(hyperbola, pieces, 1e-16)
+    assert 0.998 < np.hypot(*np.diff(x, axis=0).T).sum() < 1.0
+
+
 def test_where_three_pieces_meet_none_is_joined():
     three = [
         piece(0.1, 0.3),

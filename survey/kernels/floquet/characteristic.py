@@ -156,10 +156,15 @@ def answer_points(
             sums[:] = 0.0
             for j in range(m - 1, -1, -1):
                 part[:] = 0.0
-                for i in range(terms[k, j] - 1, -1, -1):
+                for i in range(terms[k, j] - 1, 0, -2):  # two at a time: half the stores
                     weight, one = series[i, k * m + j], across[i]
+                    other, two = series[i - 1, k * m + j], across[i - 1]
                     for lane in range(LANES):
-                        part[lane] += weight * one[lane]
+                        part[lane] += weight * one[lane] + other * two[lane]
+                if terms[k, j] % 2:
+                    weight = series[0, k * m + j]
+                    for lane in range(LANES):
+                        part[lane] += weight
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
@@ -196,7 +201,7 @@ def answer_lanes(
     c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
 ):
     """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to
-    within `bars`, and roots z + i y (d, LANES), nearly.
+    within `bars`, and roots z + i y (d, LANES), nearly (of no use where d < 3).
     """
     K, d = len(c), len(z)
     if n == 2 and not (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
@@ -205,7 +210,7 @@ def answer_lanes(
     w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
     rho, lane_z = np.empty(d), np.empty((d, 2))
     re, im, bar, sign = np.empty(n), np.empty(n), np.empty(n), np.zeros(n, np.int8)
-    angle, order = np.empty(n), np.empty(n, np.int64)
+    size, angle, order = np.empty(n), np.empty(n), np.empty(n, np.int64)
     form = np.empty((2, d))
     _roots(c, d, z, y, parts)
     _corrections(c, d, bars, z, y, w, gap, parts)
@@ -234,10 +239,10 @@ def answer_lanes(
                 if abs(im[i]) <= bar[i]:
                     im[i] = 0.0  # its mirror image would be in the same disc
             decided = UNDECIDED
-        _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed)
+        _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed)
         if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
-            _sort(re, im, bar, sign, floats[4 * n, p], p, floats, signs, angle, order)
-            crossing[p] = _crossing(re, im, bar, angle, sign, verdict[p], paired, K > d)
+            _sort(re, im, bar, size, sign, floats[4 * n, p], p, floats, signs, angle, order)
+            crossing[p] = _crossing(re, im, bar, size, angle, sign, verdict[p], paired, K > d)
             missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
                 open_signs and (asked[KREIN] or asked[CROSSING])
             )
@@ -301,8 +306,23 @@ def _radius_of_two(trace, det, trace_bar, det_bar):
 
 @kernel
 def _roots(c, d, z, y, parts):
-    """Weierstrass's iteration from z + i y, in lanes."""
-    for _ in range(ITERATIONS):
+    """The roots z + i y in lanes: in closed form, or by Weierstrass's iteration from those given."""
+    if d == 1:
+        for lane in range(LANES):
+            z[0, lane], y[0, lane] = -c[0, lane], 0.0
+        return
+    if d == 2:
+        for lane in range(LANES):
+            half = -0.5 * c[0, lane]
+            inner = half * half - c[1, lane]
+            root = math.sqrt(abs(inner))
+            if inner < 0.0:
+                z[0, lane], y[0, lane], z[1, lane], y[1, lane] = half, root, half, -root
+            else:
+                far = half + (root if half >= 0.0 else -root)
+                z[0, lane], y[0, lane], y[1, lane] = far, 0.0, 0.0
+                z[1, lane] = c[1, lane] / far if far != 0.0 else 0.0
+    for _ in range(1 if d == 2 else ITERATIONS):
         improve(c, d, z, y, parts)
 
 
@@ -458,12 +478,14 @@ def _slope(form, d):
 
 
 @kernel
-def _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, missed):
-    """Write the spectral radius and the verdict of the point p, and whether it has missed what is asked."""
+def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed):
+    """Write the spectral radius and the verdict of the point p, and whether it has missed what is
+    asked; fill `size` with the moduli.
+    """
     n, value, top, least, wide = len(re), 0.0, 0.0, 0.0, False
     for i in range(n):
-        size = math.sqrt(re[i] * re[i] + im[i] * im[i])
-        value, top, least = max(value, size), max(top, size + bar[i]), max(least, size - bar[i])
+        size[i] = own = math.sqrt(re[i] * re[i] + im[i] * im[i])
+        value, top, least = max(value, own), max(top, own + bar[i]), max(least, own - bar[i])
         least_part = abs(re[i]) if im[i] == 0.0 else min(abs(re[i]), abs(im[i]))
         wide = wide or not bar[i] <= rtol * (1.0 + least_part)
     top, least = top * (1.0 + 4.0 * EPS), least * (1.0 - 4.0 * EPS)
@@ -481,14 +503,18 @@ def _write(re, im, bar, sign, decided, paired, asked, rtol, p, floats, verdict, 
 
 
 @kernel
-def _sort(re, im, bar, sign, most, p, floats, signs, angle, order):
+def _sort(re, im, bar, size, sign, most, p, floats, signs, angle, order):
     """Write the multipliers of the point p in order, and fill `angle` with their arguments."""
     n, unit = len(re), TIE * (1.0 + most)
     for i in range(n):
-        angle[i], order[i] = math.atan2(im[i], re[i]), i
+        order[i] = i
+        if i > 0 and im[i] != 0.0 and im[i] == -im[i - 1] and re[i] == re[i - 1]:
+            angle[i] = -angle[i - 1]
+        else:
+            angle[i] = math.atan2(im[i], re[i])
     for i in range(1, n):
         own, k = order[i], i
-        while k > 0 and _before(own, order[k - 1], re, im, angle, unit):
+        while k > 0 and _before(own, order[k - 1], size, angle, unit):
             order[k] = order[k - 1]
             k -= 1
         order[k] = own
@@ -500,15 +526,14 @@ def _sort(re, im, bar, sign, most, p, floats, signs, angle, order):
 
 
 @kernel
-def _before(i, j, re, im, angle, unit):
+def _before(i, j, size, angle, unit):
     """Does the multiplier i come before j: by descending modulus, then angle?"""
-    one = round(math.sqrt(re[i] * re[i] + im[i] * im[i]) / unit)
-    two = round(math.sqrt(re[j] * re[j] + im[j] * im[j]) / unit)
+    one, two = round(size[i] / unit), round(size[j] / unit)
     return one > two or (one == two and angle[i] < angle[j])
 
 
 @kernel
-def _crossing(re, im, bar, angle, sign, decided, paired, of_signs):
+def _crossing(re, im, bar, size, angle, sign, decided, paired, of_signs):
     """See `measures.floquet.multipliers.crossing`."""
     n, lead = len(re), 0
     if paired and decided == STABLE:
@@ -536,13 +561,13 @@ def _crossing(re, im, bar, angle, sign, decided, paired, of_signs):
             return MINUS_ONE
         return COLLISION if between + doubt < min(to_plus, to_minus) else UNDECIDED
     for i in range(n):
-        if math.hypot(re[i], im[i]) > math.hypot(re[lead], im[lead]):
+        if size[i] > size[lead]:
             lead = i
-    least = math.hypot(re[lead], im[lead]) - bar[lead]
+    least = size[lead] - bar[lead]
     for i in range(n):
         if i == lead or math.hypot(re[i] - re[lead], im[i] + im[lead]) <= bar[i] + bar[lead]:
             continue
-        if math.hypot(re[i], im[i]) + bar[i] >= least:
+        if size[i] + bar[i] >= least:
             return UNDECIDED
     if abs(im[lead]) > bar[lead]:
         return COLLISION if paired else NEIMARK_SACKER

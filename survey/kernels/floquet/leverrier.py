@@ -37,7 +37,8 @@ def answer_matrices(
     m, of_forms = n // 2, len(forms) > 0
     d = m if paired else n
     K = 2 * d if of_forms else d
-    squares, sums = np.empty((7, n, n)), np.empty((4, n + 1))
+    squares, sums, powers = np.empty((7, n, n)), np.empty((5, n + 1)), np.empty((0, n, n))
+    ones, others, other_bars = np.ones(n), np.zeros(n + 1), np.full(n + 1, math.inf)
     c, bars = np.empty((K, LANES)), np.empty((K, LANES))
     z, y, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
     outputs = np.empty(LANES, np.int64)
@@ -46,47 +47,65 @@ def answer_matrices(
         for lane in range(count):
             p = first + lane
             outputs[lane] = p
-            _leverrier(M[p], E[p], squares, sums)
+            _leverrier(M[p], E[p], ones, others, other_bars, 0.0, powers, squares, sums)
             if paired:
-                _in_sums(sums[0], sums[1], m, change, c, bars, 0, lane)
+                _in_sums(sums[0], sums[2], m, change, c, bars, 0, lane)
                 if of_forms:
-                    _in_sums(sums[2], sums[3], m, forms, c, bars, d, lane)
-                if not _palindromic(sums[0], sums[1]):
+                    _in_sums(sums[3], sums[4], m, forms, c, bars, d, lane)
+                if not _palindromic(sums[0], sums[2]):
                     for k in range(K):
                         bars[k, lane] = math.inf
             else:
                 for k in range(n):
-                    c[k, lane], bars[k, lane] = sums[0, k + 1], sums[1, k + 1]
+                    c[k, lane], bars[k, lane] = sums[0, k + 1], sums[2, k + 1]
                 if det.shape[1] and det[1, p] < bars[n - 1, lane]:
                     c[n - 1, lane] = -det[0, p] if n % 2 else det[0, p]
                     bars[n - 1, lane] = det[1, p]
         for lane in range(count, LANES):
             for k in range(K):
                 c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
-        _near_roots(c, d, z, y, parts)
+        if d > 2:
+            _from_circle(c, d, z, y, parts)
         answer_lanes(
             c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
         )  # fmt: skip
 
 
 @kernel
-def _leverrier(M, E, squares, sums):
-    """Fill sums (4, n + 1) with c_k and their bounds, and tr(B_k J), J = (0 1; -1 0), and theirs, k = 0
-    to n.
+def coefficients(M, E, units, others, other_bars, near, powers, sums):
+    """Fill powers (N, K, n, n) with B_0 to B_(K-1) and sums (N, 5, n + 1): see `_leverrier`, whose
+    other arguments these are, of N points.
+    """
+    squares = np.empty((7, M.shape[1], M.shape[1]))
+    for p in range(len(M)):
+        _leverrier(
+            M[p], E[p], units[p], others[p], other_bars[p], near[p], powers[p], squares, sums[p]
+        )
+
+
+@kernel
+def _leverrier(M, E, units, others, other_bars, near, powers, squares, sums):
+    """Fill sums (5, n + 1) with c_k, bounds of what rounding does to them and of all their errors, and
+    tr(B_k J), J = (0 1; -1 0), and bounds of theirs, k = 0 to n; powers (K, n, n) with B_0 to B_(K-1).
+
+    M is known within E, in the `units` (n) of the states, J without. `others` (n + 1): c_k known
+    otherwise, within `other_bars` and `near` times the sum of |B_(k-1)|, infinite where it is not.
     """
     # off: what rounding does to B, wide: what all errors do; X, offs, wides: the same of M B
     B, X, size, off = squares[0], squares[1], squares[2], squares[3]
     offs, wide, wides = squares[4], squares[5], squares[6]
-    c, bars, form, form_bars = sums[0], sums[1], sums[2], sums[3]
+    c, rounded, bars, form, form_bars = sums[0], sums[1], sums[2], sums[3], sums[4]
     n = len(M)
     m = n // 2
     for i in range(n):
         for j in range(n):
             B[i, j], off[i, j], wide[i, j] = 1.0 if i == j else 0.0, 0.0, 0.0
             size[i, j] = abs(M[i, j]) + E[i, j]
-    c[0], bars[0], form[0], form_bars[0] = 1.0, 0.0, 0.0, 0.0
+    c[0], rounded[0], bars[0], form[0], form_bars[0] = 1.0, 0.0, 0.0, 0.0, 0.0
     for k in range(1, n + 1):
-        shift = trace = rounded = 0.0
+        if k <= len(powers):
+            powers[k - 1] = B
+        shift = trace = doubt = moduli = 0.0
         for i in range(n):
             for j in range(n):
                 total = tall = one = two = 0.0
@@ -98,22 +117,28 @@ def _leverrier(M, E, squares, sums):
                 X[i, j] = total
                 offs[i, j], wides[i, j] = one + n * EPS * tall, two + n * EPS * tall
                 shift += (abs(B[i, j]) + wide[i, j]) * E[j, i]
+                moduli += abs(B[i, j])
             trace += X[i, i]
-            rounded += offs[i, i] + n * EPS * abs(X[i, i])
-        c[k] = -trace / k
-        here = rounded / k + EPS * abs(c[k])
-        bars[k] = (here + shift) * (1.0 + n * n * EPS)
+            doubt += offs[i, i] + n * EPS * abs(X[i, i])
+        c[k], rounded[k] = -trace / k, doubt / k
+        other_bar = other_bars[k] + near * moduli
+        if not rounded[k] < other_bar:
+            c[k], rounded[k] = others[k], other_bar
+        rounded[k] += EPS * abs(c[k])
+        bars[k] = (rounded[k] + shift) * (1.0 + n * n * EPS)
         form[k] = form_bars[k] = 0.0
         for i in range(n):
             for j in range(n):
                 B[i, j], off[i, j], wide[i, j] = X[i, j], offs[i, j], wides[i, j]
             B[i, i] += c[k]
-            off[i, i] += here + EPS * abs(B[i, i])
+            off[i, i] += rounded[k] + EPS * abs(B[i, i])
             wide[i, i] += bars[k] + EPS * abs(B[i, i])
         for i in range(m):
-            low, high = B[m + i, i], B[i, m + i]
+            up = units[m + i] / units[i]
+            low, high = up * B[m + i, i], B[i, m + i] / up
             form[k] += low - high
-            form_bars[k] += wide[m + i, i] + wide[i, m + i] + n * EPS * (abs(low) + abs(high))
+            form_bars[k] += up * wide[m + i, i] + wide[i, m + i] / up
+            form_bars[k] += n * EPS * (abs(low) + abs(high))
 
 
 @kernel
@@ -138,27 +163,6 @@ def _in_sums(c, c_bars, m, change, out, out_bars, first, lane):
             total += c[m - j] * change[j, power]
             bound += (c_bars[m - j] + (m + 4) * EPS * abs(c[m - j])) * abs(change[j, power])
         out[first + i, lane], out_bars[first + i, lane] = total, bound
-
-
-@kernel
-def _near_roots(c, d, z, y, parts):
-    """Fill z + i y with roots, roughly."""
-    if d == 1:
-        for lane in range(LANES):
-            z[0, lane], y[0, lane] = -c[0, lane], 0.0
-    elif d == 2:
-        for lane in range(LANES):
-            half = -0.5 * c[0, lane]
-            inner = half * half - c[1, lane]
-            root = math.sqrt(abs(inner))
-            if inner < 0.0:
-                z[0, lane], y[0, lane], z[1, lane], y[1, lane] = half, root, half, -root
-            else:
-                far = half + (root if half >= 0.0 else -root)
-                z[0, lane], y[0, lane], y[1, lane] = far, 0.0, 0.0
-                z[1, lane] = c[1, lane] / far if far != 0.0 else 0.0
-    else:
-        _from_circle(c, d, z, y, parts)
 
 
 @kernel

@@ -47,6 +47,7 @@ BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 # one after another: times NEAR, along the best axis or the other
 TRIED = ((1.0, 0), (2.3, 0), (1.0, 1), (2.3, 1))
 TRIED_OF_ORBITS = TRIED[::2]  # which take long
+CORNER = 0.7  # cosine of the turn at a point beyond which it is a corner
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 BEST = 1e-12  # the position error above which M may differ along it by more than its bounds
 RTOL, ROUGH = 1e-13, 1e-9  # of M for points of curves, and to see where these are
@@ -346,9 +347,34 @@ def _lines(function, grain, values, tried=TRIED):
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
     along = np.argmax(np.where(border, -1.0, slope), axis=1)
-    return tips.followed(
-        function, _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried), grain
-    )
+    # marching squares have higher values on the right, as the axes are here
+    run = np.concatenate([np.gradient(part, axis=0) for part in parts])
+    signs = np.sign(run[:, ::-1]) * [1.0, -1.0]
+    signs[abs(run[:, ::-1]) < 0.1 * np.hypot(*run.T)[:, None]] = 0.0
+    pieces = _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried, signs=signs)
+    return tips.followed(function, [part for one in pieces for part in _smooth(*one)], grain)
+
+
+def _smooth(x, error):
+    """The parts of a piece (positions (m, 2), errors (m)) between its corners: marching squares
+    join both edges of a tongue, and the branches of two curves that cross.
+    """
+    bent = _cosines(x)
+    # two points that have moved past each other along the curve
+    for i in np.flatnonzero((bent[:-1] < 0.0) & (bent[1:] < 0.0)):
+        x[[i, i + 1]], error[[i, i + 1]] = x[[i + 1, i]], error[[i + 1, i]]
+    bent = _cosines(x)
+    # of the chords at a corner the one that turns more at its other end leaves the curve
+    last = {i - (bent[i - 1] < bent[i + 1]) for i in np.flatnonzero(bent < CORNER)}
+    own = np.split(np.arange(len(x)), 1 + np.array(sorted(last), int))
+    return [(x[part], error[part]) for part in own if part.size > 1]
+
+
+def _cosines(x):
+    """Of the turn at each of the points (m, 2); 1 at the ends."""
+    run = np.diff(x, axis=0)
+    run /= np.maximum(np.hypot(*run.T), 1e-300)[:, None]
+    return np.concatenate([[1.0], (run[1:] * run[:-1]).sum(axis=1), [1.0]])
 
 
 def _crossings(function, grain, values, tried=TRIED, *, across):
@@ -420,9 +446,10 @@ def _sharpened(function, pieces, grain):
     return _closed_in(function, parts, np.concatenate(along), grain, SURE, TRIED[:1], BESIDE)
 
 
-def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR):
+def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR, signs=None):
     """The curves near positions, moved along the axis `along` of each, by `widest` at most; cut
-    where one is not certain. Brackets are `near` wide at first.
+    where one is not certain. Brackets are `near` wide at first. `signs` (m, 2): of the slopes of
+    the function, 0 where any will do: a narrow tongue has edges of both.
     """
     x = np.concatenate(parts)
 
@@ -441,6 +468,9 @@ def _closed_in(function, parts, along, grain, widest, tried=TRIED, near=NEAR):
             partial(at, left, axis), start, times * near * same, grain * same, widest
         )
         sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0) & (abs(t - start) < widest)
+        if signs is not None and left.size:
+            beyond = at(left, axis, np.arange(left.size), (t + width)[:, None])[0][:, 0]
+            sure &= ~(beyond * signs[left, axis] < 0.0)
         found[left[sure], axis[sure]], error[left[sure]] = t[sure], width[sure] + grain
     firsts = np.cumsum([0, *map(len, parts)])
     own = [

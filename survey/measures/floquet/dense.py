@@ -23,13 +23,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from survey.kernels.floquet import characteristic, steps
+from survey.kernels.floquet import characteristic, leverrier, steps
 from survey.kernels.floquet.characteristic import PARTS
 from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
 from survey.measures.floquet.answers import Answers
-from survey.measures.floquet.multipliers import not_symplectic, symplectic_form
+from survey.measures.floquet.multipliers import not_symplectic
 
 DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40])
 PROBED = 48  # nodes of the lines that show the degrees that are needed
@@ -409,8 +409,8 @@ def coefficients(M, E, scale, structure, steps_of=None):
     where rounding asks for it, from the computed eigenvalues, which are those of a matrix within 8 n EPS |M| of M.
     """
     N, n = M.shape[:2]
-    m, one = n // 2, np.eye(n)
-    size = abs(M)
+    m = n // 2
+    kept = n if structure == "none" else m
     near = 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
     own = np.linalg.eigvals(M).astype(complex)
     c, moduli = np.zeros((N, n + 1), complex), np.zeros((N, n + 1))
@@ -418,45 +418,22 @@ def coefficients(M, E, scale, structure, steps_of=None):
     for i in range(n):
         c[:, 1 : i + 2] -= own[:, i, None] * c[:, : i + 1]
         moduli[:, 1 : i + 2] += abs(own[:, i, None]) * moduli[:, : i + 1]
-    c, bars, kept = c.real.copy(), 4 * n * EPS * moduli, n if structure == "none" else m
-    B = np.broadcast_to(one, M.shape).copy()
-    off = np.zeros_like(M)
-    wide = np.zeros_like(M)
-    found, form = np.empty((N, kept, n, n)), np.zeros((2, N, n))  # form: tr(B_k J)
-    J = symplectic_form(n) * (scale[:, None, :] / scale[:, :, None])
-    for k in range(1, n + 1):
-        # off: rounding of B; wide: the same, and what the error of M does to it
-        MB, tall = M @ B, size @ abs(B)
-        off, wide = size @ off + n * EPS * tall, size @ wide + E @ abs(B) + n * EPS * tall
-        direct = -np.trace(MB, axis1=1, axis2=2) / k
-        doubt = np.trace(off, axis1=1, axis2=2) / k + n * EPS * abs(np.trace(MB, axis1=1, axis2=2))
-        bars[:, k] += near * abs(B).sum(axis=(1, 2))
-        sharper = doubt < bars[:, k]
-        c[:, k], bars[:, k] = (
-            np.where(sharper, direct, c[:, k]),
-            np.where(sharper, doubt, bars[:, k]),
-        )
-        if k <= kept:
-            found[:, k - 1] = B
-        shift = 1.001 * (abs(B) * np.swapaxes(E, 1, 2)).sum(axis=(1, 2))
-        B = MB + c[:, k, None, None] * one
-        off = off + (bars[:, k] + EPS * abs(c[:, k]))[:, None, None] * one
-        wide = wide + (bars[:, k] + shift + EPS * abs(c[:, k]))[:, None, None] * one
-        if structure == "symplectic" and k < n:
-            form[0, :, k] = (B * np.swapaxes(J, 1, 2)).sum(axis=(1, 2))
-            form[1, :, k] = (wide * abs(np.swapaxes(J, 1, 2))).sum(axis=(1, 2))
-    more = np.empty((N, kept))
-    if steps_of is None:
-        more[:] = (abs(found) * np.swapaxes(E, 1, 2)[:, None]).sum(axis=(2, 3))
-    else:
-        steps.gradients(*steps_of, np.ascontiguousarray(found), more)
+    powers, sums = np.empty((N, kept, n, n)), np.empty((N, 5, n + 1))
+    M, E, units = (np.ascontiguousarray(values) for values in (M, E, scale))
+    others = np.ascontiguousarray(c.real), 4 * n * EPS * moduli
+    leverrier.coefficients(M, E, units, *others, near, powers, sums)
+    c, rounded, bars, *form = np.moveaxis(sums, 1, 0)
     c, bars = c[:, : kept + 1], bars[:, : kept + 1]
-    bars[:, 1:] += 1.001 * more
+    if steps_of is not None:
+        more = np.empty((N, kept))
+        steps.gradients(*steps_of, powers, more)
+        bars = rounded[:, : kept + 1].copy()
+        bars[:, 1:] += 1.001 * more
     if structure == "none":
         return c[:, 1:], bars[:, 1:]
     values, doubts = _in_sums(c[:, ::-1], bars[:, ::-1], m)
     if structure == "symplectic":
-        forms = _in_sums(form[0, :, m:0:-1], form[1, :, m:0:-1], m - 1)
+        forms = _in_sums(*(part[:, m:0:-1] for part in form), m - 1)
         return np.concatenate([values[:, 1:], forms[0]], axis=1), np.concatenate(
             [doubts[:, 1:], forms[1]], axis=1
         )

@@ -2,12 +2,15 @@
 matrix within them are in the error bars, and verdict, signs and crossing are those of discs.
 """
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+from mpmath import mp
 from scipy.linalg import expm
 from scipy.optimize import linear_sum_assignment
 
-from survey.measures.floquet import stability
+from survey.measures.floquet import dense, stability
 from survey.measures.floquet.monodromy import Matrices
 from survey.measures.floquet.multipliers import UNDECIDED, symplectic_form
 
@@ -75,6 +78,28 @@ def test_multipliers_of_all_matrices_within_the_bounds(n, structure):
     assert (found.signs[:, served] == discs.signs[:, served])[both].all()
     if structure == "symplectic":
         assert both.any()
+
+
+@pytest.mark.parametrize("wide", [1.0, 1e4])
+@pytest.mark.parametrize("n", [2, 3, 5])
+def test_coefficients_are_sums_of_principal_minors(n, wide):
+    """Of matrices within the bounds, wide ones too, in 50 digits."""
+    M, E, back = matrices(n, "none", 40, n)
+    E, rng, scale = wide * E, np.random.default_rng(n), back[:, :, 0] / back[:, :1, 0]
+    for own in (M, M + rng.choice([-1.0, 1.0], M.shape) * E):
+        value, bar = dense.coefficients(M / back, E / back, scale, "none")
+        for p in range(len(M)):
+            with mp.workdps(50):
+                exact = mp.matrix(own[p].tolist())
+                for k in range(1, n + 1):
+                    minors = (
+                        mp.det(mp.matrix([[exact[i, j] for j in rows] for i in rows]))
+                        for rows in combinations(range(n), k)
+                    )
+                    off = abs((-1) ** k * mp.fsum(minors) - value[p, k - 1])
+                    assert off <= bar[p, k - 1] * (1 + 1e-9)
+    narrow = dense.coefficients(M / back, 0.0 * E, scale, "none")[1]
+    assert np.median(narrow / (1e-16 + abs(value))) < 1e-13
 
 
 @pytest.mark.parametrize("n", [2, 4])

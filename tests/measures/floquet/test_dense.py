@@ -151,6 +151,16 @@ def test_one_axis_and_third_axes(solved):
     ).all()
 
 
+def test_multipliers_of_two_states_come_from_series_past_double_ones(solved):
+    """Where a pair meets and parts, roots at the nodes are complex and those of points real, or the
+    other way round: no iteration leads from the ones to the others.
+    """
+    ds = survey.evaluate(mathieu("none"), a=np.linspace(-1.0, 8.0, 10_000), q=0.7)
+    real = (ds.multiplier_im == 0.0).all("multiplier")
+    assert 0.1 < real.mean() < 0.9 and (ds.status == 0).all()
+    assert solved[0] < 120
+
+
 def test_bits_do_not_depend_on_the_block():
     scene, _ends = MAPS["damped"]
     W, e = np.linspace(1.0, 2.6, 80), np.linspace(0.0, 0.6, 50)
