@@ -102,9 +102,12 @@ class Survey:
 
     def counts(self):
         """{"verdict" (if there is one), "status": {kind: number of points}}; a point without an
-        answer counts, among the verdicts, by its status."""
+        answer counts, among the verdicts, by its status. A warning says where values of an axis
+        repeat, as after `xr.concat`: their points count each time."""
         from survey.file import labels
 
+        if again := labels.repeated(self._ds):
+            warnings.warn(f"counts: {again}", stacklevel=2)
         return labels.counts(self._ds)
 
     def where(self, name):
