@@ -40,7 +40,8 @@ ALONG = (
            applies="where the error bounds allow one number alone"),
 )  # fmt: skip
 LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
-ALONE = 769  # points along one axis
+# points along one axis; with damping, tongues are wide or none
+ALONE, ALONE_DAMPED = 769, 193
 NEAR = 3e-5  # of the map: how near curves of splines are
 BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 # one after another: times NEAR, along the best axis or the other
@@ -89,7 +90,8 @@ def searched(scene, square, axes, fixed, options):
         on_lattice = orbits.on_lattice()
     else:
         structure, roughly = scene.structure, None
-        number = LINES if square.across is None else ALONE
+        alone = ALONE_DAMPED if structure == "none" else ALONE
+        number = LINES if square.across is None else alone
         matrices = matrices_of(scene, square, axes, fixed, options)
         on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
     n = on_lattice[0].shape[1]
