@@ -52,13 +52,13 @@ class Survey:
         """Draw the stability map, or the variable `var`; along one axis, its curve and error band.
 
         `var`: a name, or booleans at the points, such as `a.survey.where("stable") &
-        b.survey.where("stable")`. `x` and `y`: which axes are drawn, by default the first two, or
-        those in whose planes [boundaries] found curves (where they lie in other planes than the one
-        that is drawn, a warning says so); other axes at their first value, unless a `slice` fixes
-        them. `cmap`, `vmin`, `vmax`: colours of a variable of numbers; by default they span its
-        values except 1 % at either end, where the colour bar has arrows (`robust=False`: all of
-        them), and diverge about 0 where values have both signs; for a curve `vmin` and `vmax` are
-        the ends of its axis.
+        b.survey.where("stable")`. `x` and `y`: which axes are drawn, by default those in whose
+        planes [boundaries] found curves (where they lie in other planes than the one that is drawn,
+        a warning says so), or the first two with several values; other axes at their first value, the
+        angle of Abel's equation at its last, unless a `slice` fixes them. `cmap`, `vmin`, `vmax`:
+        colours of a variable of numbers; by default they span its values except 1 % at either end,
+        where the colour bar has arrows (`robust=False`: all of them), and diverge about 0 where values
+        have both signs; for a curve `vmin` and `vmax` are the ends of its axis.
 
         Solutions of Abel's equation at several angles are curves, one for each value of the first
         parameter, up to their turning points; at one angle
@@ -102,9 +102,12 @@ class Survey:
 
     def counts(self):
         """{"verdict" (if there is one), "status": {kind: number of points}}; a point without an
-        answer counts, among the verdicts, by its status."""
+        answer counts, among the verdicts, by its status. A warning says where values of an axis
+        repeat, as after `xr.concat`: their points count each time."""
         from survey.file import labels
 
+        if again := labels.repeated(self._ds):
+            warnings.warn(f"counts: {again}", stacklevel=2)
         return labels.counts(self._ds)
 
     def where(self, name):

@@ -447,7 +447,7 @@ def info(path, as_json):
     "--at",
     metavar="NAME=VALUE",
     multiple=True,
-    help="Draw this plane, row or well instead of the first.",
+    help="Draw this plane, row or well instead of the first (the last angle of Abel's equation).",
 )
 def plot(path, output, var, style, width, at):
     """Draw the stability map, or the named variable."""

@@ -5,7 +5,6 @@ import tempfile
 import tomllib
 import warnings
 from collections.abc import Iterable
-from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from survey.analysis.point import of_points
 from survey.analysis.zoom import unchanged
 from survey.errors import BadInput
 from survey.file import disk, reading, schema
-from survey.file.labels import FILL, as_stored, command, fill_of, now, tally
+from survey.file.labels import FILL, as_stored, command, fill_of, flag_codes, now, tally
 from survey.file.map_file import TILE_POINTS, MapFile
 from survey.grid import halved
 from survey.request.output_path import check_path
@@ -41,22 +40,30 @@ def concat(datasets: Iterable[xr.Dataset | str | os.PathLike[str]]) -> xr.Datase
     Returns
     -------
     xarray.Dataset, sorted along that axis if it is one of numbers, with counts of the whole. Points that several
-    contain are kept once. Edges, curves, surfaces and cells are left out, with a warning: they belong to the parts.
+    contain are kept once; where they differ within their error bars, as on dense maps, which are solved as wholes,
+    those of the part that is given first are kept, and a warning and `history` say so. Edges, curves, surfaces and
+    cells are left out, with a warning: they belong to the parts.
 
     Raises
     ------
     survey.BadInput where the parts do not belong together: different scenes, options, methods, rtol
-    or sets of outputs, more than one axis that differs, or different values at a common point.
+    or sets of outputs, more than one axis that differs, or values at a common point that differ beyond
+    their error bars.
     """
-    joined, left_out = _together(datasets)
-    if left_out:
-        warnings.warn(f"concat: {left_out}", stacklevel=2)
+    joined, notes = _together(datasets)
+    if notes:
+        warnings.warn(f"concat: {notes}", stacklevel=2)
     return joined
 
 
 def _together(datasets):
-    """(The joined survey, what of the parts is left out, in words; "" if nothing is.)"""
-    given = [_part(part) for part in _as_list(datasets)]
+    """(The joined survey, what of the parts is left out or chosen, in words; "" if nothing is.)"""
+    datasets = _as_list(datasets)
+    given = [_part(part) for part in datasets]
+    names = [
+        f"survey {i + 1} of the list" if isinstance(part, xr.Dataset) else str(part)
+        for i, part in enumerate(datasets)
+    ]
     tables = dict.fromkeys(
         OF_PARTS[name] for name in OF_PARTS if any(name in part.attrs for part in given)
     )
@@ -65,13 +72,14 @@ def _together(datasets):
         if tables
         else ""
     )
-    joined = _concat([of_points(part) for part in given])
+    joined, chosen = _concat([of_points(part) for part in given], names)
     if all(part.attrs.get("complete") == 1 for part in given):
         joined.attrs["complete"] = 1  # also when it is saved
-    return joined, left_out
+    return joined, "; ".join(filter(None, (left_out, *chosen)))
 
 
-def _concat(parts):
+def _concat(parts, names):
+    """(The joined survey, lines about values that were chosen); `names` (of each part): what it is called."""
     if len(parts) < 2:
         raise BadInput(f"concat: give two or more surveys, not {len(parts)}")
     for part in parts[1:]:
@@ -79,8 +87,26 @@ def _concat(parts):
     axis, beside = _axis(parts)
     about = parts[0][axis].attrs
     parts = [_along(part, axis, beside) for part in parts]
-    joined = reduce(lambda one, other: _joined(one, other, axis), parts)
-    return _described(joined.assign_coords({axis: (axis, joined[axis].values, about)}), parts, axis)
+    joined, chosen = parts[0], []
+    for i, part in enumerate(parts[1:], start=1):
+        joined, differ = _joined(joined, part, axis)
+        chosen += _chosen(differ, axis, parts[:i], part, names)
+    joined = joined.assign_coords({axis: (axis, joined[axis].values, about)})
+    return _described(joined, parts, axis, chosen), chosen
+
+
+def _chosen(differ, axis, before, part, names):
+    """Lines that say which of the parts `before` has the values that are kept where those of `part` differ."""
+    lines = []
+    for i, other in enumerate(before):
+        own = differ[np.isin(differ, other[axis].values)]
+        differ = differ[~np.isin(differ, own)]
+        if own.size:
+            lines.append(
+                f"at {counted(own.size, 'common value')} of {axis}, {shown(own.min())} to {shown(own.max())}, the "
+                f"values of {names[i]} are kept; those of {names[len(before)]} differ within the error bars"
+            )
+    return lines
 
 
 def _along(part, axis, beside):
@@ -95,7 +121,7 @@ def _along(part, axis, beside):
 
 def merge(paths, output):
     """Write the `concat` of the files to the netCDF file `output`; returns the Dataset, and what of
-    the parts is left out, in words. Nothing is replaced.
+    the parts is left out or chosen, in words. Nothing is replaced.
     """
     output = check_path(output)
     if output.exists():
@@ -180,22 +206,65 @@ def _axis(parts):
 
 
 def _joined(one, other, axis):
-    """Both, in ascending order; raises BadInput where they contradict each other."""
+    """(Both, in ascending order, the values of the axis at which they differ within their error
+    bars); raises BadInput where they contradict each other.
+    """
     _, at, there = np.intersect1d(one[axis].values, other[axis].values, return_indices=True)
-    common = one.isel({axis: at}).equals(other.transpose(*one.status.dims, ...).isel({axis: there}))
-    if at.size and not common:
-        value = shown(one[axis].values[at[0]])
-        raise BadInput(f"concat: the surveys have different values at common points, such as {axis} = {value}; "
-                       "leave these out of one of them")  # fmt: skip
+    common = one.isel({axis: at})
+    differ = _differ(common, other.transpose(*one.status.dims, ...).isel({axis: there}), axis)
     rest = np.setdiff1d(np.arange(other.sizes[axis]), there)
     joined = xr.concat(
         [one, other.isel({axis: rest})], axis, combine_attrs="override", join="exact"
     )
     joined = joined.transpose(*one.status.dims, ...)
-    return joined.sortby(axis) if joined[axis].dtype.kind in "iuf" else joined
+    joined = joined.sortby(axis) if joined[axis].dtype.kind in "iuf" else joined
+    return joined, common[axis].values[differ]
 
 
-def _described(joined, parts, axis):
+def _differ(one, other, axis):
+    """Where along the axis two surveys of the same points differ, but within their error bars, or
+    where one alone is undecided; raises BadInput where they differ otherwise.
+    """
+    differ = np.zeros(one.sizes[axis], bool)
+    if not differ.size or one.equals(other):
+        return differ
+    for name, variable in one.data_vars.items():
+        a, b = variable.values, other[name].transpose(*variable.dims).values
+        same = a == b
+        if a.dtype.kind == "f":
+            same |= np.isnan(a) & np.isnan(b)
+        if same.all():
+            continue
+        across = tuple(i for i, dim in enumerate(variable.dims) if dim != axis)
+        differ |= ~same.all(axis=across)
+        if (own := str(name).removesuffix("_error")) != name and own in one:
+            continue  # which bar belongs to which value
+        agree = same | _within(one, other, name, a, b)
+        if not agree.all():
+            i = tuple(int(k) for k in np.argwhere(~agree)[0])
+            value = shown(one[axis].values[i[variable.dims.index(axis)]])
+            bars = f"{name}_error" in one
+            raise BadInput(
+                f"concat: the surveys have different values at common points, such as {axis} = {value}, where {name} "
+                f"is {shown(a[i])} and {shown(b[i])}{', beyond the error bars' if bars else ''}; leave these points "
+                "out of one of the surveys, with ds.sel, or solve both again with one version"
+            )
+    return differ
+
+
+def _within(one, other, name, a, b):
+    """Where values a and b of an output differ within their error bars, or one alone is undecided."""
+    if f"{name}_error" in one:
+        dims = one[name].dims
+        bars = [ds[f"{name}_error"].transpose(*dims).values.astype(float) for ds in (one, other)]
+        with np.errstate(invalid="ignore"):
+            return abs(a - b) <= bars[0] + bars[1]
+    known = one[name].attrs
+    undecided = flag_codes(known).get("undecided") if "flag_values" in known else None
+    return np.zeros(a.shape, bool) if undecided is None else (a == undecided) | (b == undecided)
+
+
+def _described(joined, parts, axis, chosen):
     """With the counts and attributes of the whole."""
     attributes = {key: value for key, value in parts[0].attrs.items() if key not in OF_RUN}
     for key in attributes:
@@ -210,7 +279,7 @@ def _described(joined, parts, axis):
         attributes["workflow"] = _workflow(attributes["workflow"], joined[axis])
     attributes["history"] = (
         f"{now()}: {command()}: {counted(len(parts), 'survey')} joined along {axis}"
-    )
+    ) + "".join(f"; {line}" for line in chosen)
     joined = joined.copy()
     joined.attrs = attributes  # in place of those of the first part
     total = tally(joined)

@@ -319,6 +319,28 @@ def counts(ds):
     return {name: total.kinds[name] for name in ("verdict", "status") if name in total.codes}
 
 
+def repeated(ds):
+    """One line where an axis has values more than once, or none at all, so that points count as often
+    as they are there; else "".
+    """
+    for dim in ds.status.dims:
+        if dim not in ds.coords:
+            # samples have their parameters along such a dimension; what xr.concat has stacked has none
+            if ds.status.ndim > 1 and not any(dim in c.dims for c in ds.coords.values()):
+                return (
+                    f"the axis {dim} has no values, so that the same points may count {ds.sizes[dim]} times: "
+                    "survey.concat joins surveys, and keeps points that several contain once"
+                )
+            continue
+        again = ds.sizes[dim] - np.unique(ds[dim].values).size
+        if again:
+            return (
+                f"{again} of the {ds.sizes[dim]} values of {dim} repeat others, and their points count each time: "
+                "survey.concat, in place of xr.concat, joins surveys and keeps common points once"
+            )
+    return ""
+
+
 def scene_statuses(ds):
     """{name: code} of the scene's own statuses: why the outputs are undefined at a point."""
     codes = flag_codes(ds.status.attrs) if "flag_values" in ds.status.attrs else {}

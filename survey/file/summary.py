@@ -1,7 +1,7 @@
 """What a survey's file contains, as `survey info` prints it."""
 
 from survey.file import schema
-from survey.file.labels import counts, flag_codes, percent
+from survey.file.labels import counts, flag_codes, percent, repeated
 from survey.wording import counted
 
 
@@ -26,7 +26,7 @@ def summary(ds):
             if not str(name).endswith("_error")
         },
         **({"areas": areas(ds)} if "area" in ds else {}),
-        "counts": counts(ds),
+        "counts": counts(ds) | ({"note": again} if (again := repeated(ds)) else {}),
         "provenance": {
             k: v
             for k, v in ds.attrs.items()

@@ -37,21 +37,22 @@ def segments(values, curves, weights_of, border=1, optional=()):
     return found
 
 
-def along(values, ticks, met, weights_of, optional=()):
+def along(values, ticks, met, weights_of, optional=(), near=NEAR):
     """{(first, last point): do the curves explain the change of `values`?}, of integers at the
-    `ticks` of a line, or UNKNOWN, which meets curves at `met` [(kind, position)]; `weights_of` and
-    `optional` as in `segments`. What is perhaps drawn twice may count or not.
+    `ticks` of a line, or UNKNOWN, which meets curves at `met` [(kind, position)], known to within
+    `near`; `weights_of` and `optional` as in `segments`. What is perhaps drawn twice may count or
+    not.
     """
     positions = np.array([position for _, position in met])
     found = {}
     weights = np.array([weights_of.get(kind, 1) for kind, _ in met], int)
     _, kinds = np.unique([kind for kind, _ in met], return_inverse=True)
-    near = (abs(positions[:, None] - positions) < NEAR) & (kinds[:, None] == kinds)
-    free = (near.sum(axis=1) > 1) | np.array([kind in optional for kind, _ in met], bool)
+    twice = (abs(positions[:, None] - positions) < near) & (kinds[:, None] == kinds)
+    free = (twice.sum(axis=1) > 1) | np.array([kind in optional for kind, _ in met], bool)
     for first, last in pairwise(np.flatnonzero(values != UNKNOWN)):
         low, high = ticks[first], ticks[last]
-        inside = (positions > low - NEAR) & (positions < high + NEAR)
-        sure = (positions > low + NEAR) & (positions < high - NEAR) & ~free
+        inside = (positions > low - near) & (positions < high + near)
+        sure = (positions > low + near) & (positions < high - near) & ~free
         change = values[last] - values[first]
         found[first, last] = _explained(change, weights[inside & sure], weights[inside & ~sure])
     return found

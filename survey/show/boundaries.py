@@ -6,6 +6,7 @@ from matplotlib.patheffects import withStroke
 
 from survey.file import schema
 from survey.file.labels import flag_codes
+from survey.show import family
 from survey.show.marks import widened
 from survey.show.text import spaced
 
@@ -111,18 +112,28 @@ def planes_of(ds):
 
 
 def plane_of(ds):
-    """The two axes that are drawn unless others are asked for, those of curves where more axes have
-    them; None for the first two.
+    """The two axes that pictures and the viewer draw unless others are asked for; None for the first two.
+
+    Of three or more they are those of curves that the file has, else the first two with several
+    values, of Abel solutions other than the angle.
     """
     known = list(ds.status.dims)
-    drawn = [
-        pair
-        for pair in planes_of(ds)
-        if set(pair) <= set(known) and min(ds.sizes[n] for n in pair) > 1
-    ]
-    if len(known) < 3 or not drawn or any(set(pair) == set(known[:2]) for pair in drawn):
+    several = [name for name in known if ds.sizes[name] > 1]
+    drawn = [list(pair) for pair in planes_of(ds) if set(pair) <= set(several)]
+    if len(known) < 3 or any(set(pair) == set(known[:2]) for pair in drawn):
         return None
-    return list(drawn[0])
+    if family.over_angles(ds):
+        others = [name for name in several if name != family.ANGLE]
+        several = [*others, family.ANGLE]
+    first = (drawn or [several])[0][:2]
+    return first if len(first) == 2 and first != known[:2] else None
+
+
+def position_of(ds, dim):
+    """The index along a further axis at which pictures and the viewer begin: the first, of Abel
+    solutions the last angle, up to which they are solved.
+    """
+    return ds.sizes[dim] - 1 if dim == family.ANGLE and family.over_angles(ds) else 0
 
 
 def elsewhere(ds, drawn):

@@ -14,7 +14,7 @@ from survey import modules
 from survey.errors import BadInput
 from survey.file.labels import masked
 from survey.show import family, surfaces
-from survey.show.boundaries import elsewhere, plane_of
+from survey.show.boundaries import elsewhere, plane_of, position_of
 from survey.show.ensemble import draw_ensemble, is_ensemble, over_parameters, points_of
 from survey.show.layout import alone, fit
 from survey.show.maps import draw_map
@@ -173,24 +173,22 @@ def _chosen(ds, across):
         x = next((name for name in known if name != y), None) if x is None else x
         return [x, y] if x is not None else None
     if x is None:
-        return plane_of(ds)
+        # of Abel solutions it depends on what is drawn
+        return None if family.over_angles(ds) else plane_of(ds)
     return [x, *[name for name in known if name != x][:1]]
 
 
 def _flat(ds, name, chosen=None):
-    """The survey, the variable and the status on at most two of the survey's dimensions.
-
-    The first position along any other, but the last angle of Abel solutions, of which w and t are
-    curves over it.
+    """The survey, the variable and the status on at most two of the survey's dimensions; along any
+    other at `position_of`. Of Abel solutions w and t are curves over the angle.
     """
     keep = list(ds.status.dims)[:2]
-    at = {}
     if family.over_angles(ds):
-        others, at = [dim for dim in ds.status.dims if dim != family.ANGLE], {family.ANGLE: -1}
+        others = [dim for dim in ds.status.dims if dim != family.ANGLE]
         keep = [others[0], family.ANGLE] if name in family.AT_TURNING else others[:2]
     keep = chosen or keep
     part = ds.isel(
-        {dim: at.get(dim, 0) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep}
+        {dim: position_of(ds, dim) for dim in (*ds.status.dims, *ds[name].dims) if dim not in keep}
     )
     unsorted = [dim for dim in keep if not _is_monotonic(part[dim].values)]
     part = part.sortby(unsorted) if unsorted else part

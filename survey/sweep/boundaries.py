@@ -28,7 +28,7 @@ from survey.sweep.line import OnLine, on_line
 
 # of the time of a map, measured: of one axis, of which most are short or have few boundaries; and
 # the exponent with which the time of a part of a map grows with the part
-ALONE, ALONE_OWN, GROWTH = 1 / 35, 1 / 15, 0.7
+ALONE, ALONE_OWN, GROWTH = 1 / 28, 1 / 15, 0.7
 PARTS = 10.0  # width of a domain of which a map is a part
 ROWS = 128  # solved together
 COLUMNS = 9  # searched for curves that meet no row

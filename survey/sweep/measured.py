@@ -24,6 +24,9 @@ MOST = 400  # records that are kept
 SHORT = 1.0
 MOST_UNANSWERED = 0.5
 LITTLE = 1e-3  # seconds of an estimate: beside the beginning of a run they cannot be measured
+# a run of fewer seconds that took more times its estimate has spent them on beginning, as a window does
+LONG, SLOWEST = 10.0, 10.0
+KERNEL_OPTIONS = ("question", "motion", "order", "case")  # which select what is compiled
 # [seconds estimated, measured] of the points; of edges, curves and cells
 PARTS = ("kernels", "further")
 
@@ -69,8 +72,13 @@ def factor(workflow, part, estimated):
         ]
         if like and estimated > 0.0:
             like.sort(key=lambda pair: abs(log(pair[0] / estimated)))
-            return median(taken / expected for expected, taken in like[:3])
+            return median(_rate(*pair) for pair in like[:3])
     return 1.0
+
+
+def _rate(expected, taken):
+    """How many times the expected seconds a run has taken, as far as that tells of longer ones."""
+    return taken / expected if taken > LONG else min(taken / expected, SLOWEST)
 
 
 def knows(workflow):
@@ -84,20 +92,35 @@ def knows(workflow):
 
 def compiling(workflow):
     """(seconds of compiling at the last run like this one that had to, or None; is what this run
-    needs compiled?)
+    needs compiled, by whatever runs?)
     """
     about = _about(workflow)
-    keys = ("kernels_of", "options", "method", "tables")
-    like = [
+    records = [{"kernels_of": one.get("scene")} | one for one in _records()]
+    same = [
         one
-        for one in ({"kernels_of": one.get("scene")} | one for one in _records())
-        if all(one.get(key) == about[key] for key in keys)
+        for one in records
+        if all(one.get(key) == about[key] for key in ("kernels_of", "method"))
     ]
-    known = any(one["hash"] == jit.KERNEL_HASH for one in like) and not always_compiled(
-        workflow.scene
-    )
-    spent = [one["compiling"] for one in like if one["compiling"] > 1.0]
+    like = [one for one in same if _selecting(one) == _selecting(about)]
+    tables = {name for one in like if one["hash"] == jit.KERNEL_HASH for name in _tables(one)}
+    known = {"", *_tables(about)} <= tables and not always_compiled(workflow.scene)
+    spent = [
+        one["compiling"]
+        for one in like
+        if one["compiling"] > 1.0 and one.get("tables") == about["tables"]
+    ]
     return (spent[-1] if spent else None), known
+
+
+def _selecting(record):
+    """The options of a record that select what is compiled."""
+    pairs = str(record.get("options", "")).split(",")
+    return [pair for pair in pairs if pair.split("=")[0] in KERNEL_OPTIONS]
+
+
+def _tables(record):
+    """The tables of a record, "" for the points, which every run has."""
+    return {"", *str(record.get("tables", "")).split(",")}
 
 
 def _about(workflow):

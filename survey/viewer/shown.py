@@ -15,7 +15,7 @@ from survey.errors import BadInput, Damaged
 from survey.file import schema
 from survey.file.labels import flag_codes, percent
 from survey.file.reading import load
-from survey.show.boundaries import plane_of
+from survey.show.boundaries import plane_of, position_of
 from survey.show.text import options_in_words
 from survey.viewer import raster
 from survey.wording import plain
@@ -121,7 +121,8 @@ class ShownMap:
                     f"point = {given['point']}: it lies outside the map, {' by '.join(a.range for a in self.axes)}"
                 )
         for dim in self.others:
-            (value,) = _numbers(f"at_{dim}", given.get(f"at_{dim}", "0"), 1)
+            usual = str(position_of(self.ds, dim))
+            (value,) = _numbers(f"at_{dim}", given.get(f"at_{dim}", usual), 1)
             if value not in range(self.ds.sizes[dim]):
                 raise BadInput(
                     f"at_{dim} = {value:g}: it must be an index of that axis, 0 to {self.ds.sizes[dim] - 1}"
@@ -137,7 +138,9 @@ class ShownMap:
             for at, ends in zip("xy", view.window, strict=True)
         }
         query |= {} if view.boundaries else {"boundaries": 0}
-        query |= {f"at_{dim}": at for dim, at in view.others.items() if at}
+        query |= {
+            f"at_{dim}": at for dim, at in view.others.items() if at != position_of(self.ds, dim)
+        }
         if view.point is not None:
             query["point"] = ",".join(repr(value) for value in view.point)
         return urlencode(query, safe=",")

@@ -10,6 +10,7 @@ import survey
 from survey.analysis import join
 from survey.errors import BadInput
 from survey.file import reading
+from survey.file.summary import summary
 
 
 @pytest.fixture
@@ -145,3 +146,54 @@ def test_bodies_are_joined_with_their_parameters():
             and joined.attrs["points"] == 3
         )
         xr.testing.assert_equal(joined.isel(body=[1, 2, 0]), whole)
+
+
+def test_dense_maps_join_within_their_error_bars(tmp_path):
+    """Each is solved as a whole, by series on its own box: shared points differ in their last digits."""
+    k = np.linspace(0.0, 0.9, 100)
+    low, high = (
+        survey.evaluate("satellite", k=k, rho=np.round(np.linspace(a, a + 0.9, 91), 6), body="oblate")
+        for a in (0.6, 1.4)
+    )  # fmt: skip
+    with pytest.warns(
+        UserWarning, match="11 common values of rho, 1.4 to 1.5, the values of survey 1"
+    ):
+        joined = survey.concat([low, high])
+    assert joined.sizes["rho"] == 171 and "survey 2 of the list differ" in joined.attrs["history"]
+    one, other = (ds.sel(rho=joined.rho[80:91]) for ds in (low, high))
+    assert (one.discriminant != other.discriminant).any()  # or nothing is tested
+    xr.testing.assert_equal(joined.sel(rho=one.rho), one)
+    xr.testing.assert_equal(joined.sel(rho=high.rho[11:]), high.isel(rho=slice(11, None)))
+    low.to_netcdf(tmp_path / "low.nc")
+    high.to_netcdf(tmp_path / "high.nc")
+    _, said = join.merge([tmp_path / "high.nc", tmp_path / "low.nc"], tmp_path / "both.nc")
+    assert said.count("high.nc are kept") == 1
+    xr.testing.assert_equal(survey.open(tmp_path / "both.nc").sel(rho=other.rho), other)
+    beyond = high.assign(discriminant=high.discriminant + 3 * high.discriminant_error + 1e-13)
+    with pytest.raises(
+        BadInput, match=r"such as rho = 1.4, where discriminant is .* beyond the error bars"
+    ):
+        survey.concat([low, beyond])
+    flipped = high.assign(verdict=high.verdict.copy(data=1 - high.verdict.values))
+    with pytest.raises(BadInput, match="where verdict is"):
+        survey.concat([low, flipped])
+
+
+def test_points_that_xarray_has_joined_twice_are_counted_with_a_word(recwarn):
+    parts = (np.linspace(start, start + 1.25, 11) for start in (0.0, 0.5))
+    one, other = (survey.evaluate("mathieu", a=a, q=[0.1, 0.2]) for a in parts)
+    assert sum(one.survey.counts()["status"].values()) == 22 and not recwarn.list
+    both = xr.concat([one, other], dim="a")
+    with pytest.warns(
+        UserWarning, match=r"counts: 7 of the 22 values of a repeat others.*survey.concat"
+    ):
+        both.survey.counts()
+    assert "7 of the 22" in summary(both)["counts"]["note"]
+    with pytest.warns(UserWarning, match=r"the axis run has no values.* may count 2 times"):
+        xr.concat([one, one], dim="run").survey.counts()
+    samples = survey.evaluate(
+        "mathieu", a=xr.DataArray([0.1, 0.1, 0.3], dims="p"), q=xr.DataArray([0.1] * 3, dims="p")
+    )
+    recwarn.clear()
+    samples.survey.counts()
+    assert not recwarn.list and "note" not in summary(samples)["counts"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from mpmath import mp, mpf
+from scipy import special
 
 import survey
 from survey.truth.brun_digits import (
@@ -150,3 +151,17 @@ def test_what_an_attack_found_is_within_its_bars(point, method):
     with mp.workdps(80):
         for name, true in zip(OUTPUTS, truth(point)[0], strict=True):
             assert abs(mpf(float(ds[name])) - true) <= float(ds[f"{name}_error"]), name
+
+
+@pytest.mark.parametrize("alpha, beta", [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)])
+def test_where_four_turning_points_meet_the_answer_says_so(alpha, beta):
+    """u'^2 = -u^4 at l = 1; just above, u'^2 = d - u^4 but for terms of order d^(1/2), whose period is
+    4 d^(-1/4) times the lemniscate's quarter.
+    """
+    here = survey.evaluate("brun", alpha=alpha, beta=beta, l=1.0).survey.point()
+    assert here.status == "no_convergence" and "exactly a cusp" in here.why
+    d = 2.0**-40
+    above = survey.evaluate("brun", alpha=alpha, beta=beta, l=1.0 + d)
+    known = 4.0 * d**-0.25 * special.gamma(0.25) ** 2 / (4.0 * np.sqrt(2.0 * np.pi))
+    assert abs(above.period[0] / known - 1.0) < 1e-4
+    assert f"{known * d**0.25:.4f}" == "5.2441"

@@ -66,7 +66,8 @@ CURVES = {  # seconds of the processor that curves of the triaxial satellite hav
     "window": ({"yaw_ratio": (0.3, 0.32), "roll_ratio": (0.6, 0.62)}, 4.5),
     "tenth": ({"yaw_ratio": (0.1, 0.3), "roll_ratio": (0.4, 0.6)}, 17.9),
     "quarter": ({"yaw_ratio": (-0.25, 0.25), "roll_ratio": (0.3, 0.8)}, 22.2),
-    "line": ({"yaw_ratio": (-0.99, 0.59)}, 4.2),
+    "amplitudes": ({"yaw_ratio": (-0.1, 0.74), "amplitude": (0.0, 1.45)}, 144.0),
+    "line": ({"yaw_ratio": (-0.99, 0.59)}, 5.3),
 }
 
 

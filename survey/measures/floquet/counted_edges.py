@@ -3,35 +3,43 @@ the multipliers outside the unit circle and, of symplectic systems, the Maslov i
 
 Where two multipliers, or two pairs, pass the circle together, as those of two equal oscillators do,
 the functions touch zero without a change of sign; so they do not at an edge that they pass twice
-between two points of the lattice. Between points at which a number is certain and the edges found
-do not explain its change, the axis is halved until the number is certain no nearer: an edge lies in
-what is left.
+between two points of the lattice. Between points at which a number is certain, on the lattice and
+beside the edges found, and these do not explain its change, the axis is halved until the number is
+certain no nearer: an edge lies in what is left.
 """
 
 import numpy as np
 
 from survey.measures.floquet import row_count
+from survey.measures.floquet.monodromy import Matrices
 from survey.measures.floquet.multipliers import (
     COLLISION,
     MINUS_ONE,
     NEIMARK_SACKER,
     PLUS_ONE,
     UNDECIDED,
+    Discs,
+    krein,
 )
 from survey.measures.segments import UNKNOWN, along, cut, halves
 
 HALVINGS = 60
+SAME = 1e-9  # of the axis: edges of one kind so near may be one that is found twice
+# how far beside an edge the number is asked for, in SAME or in the edge's error; how that is widened
+ASIDE, WIDER, WIDENED = 4.0, 16.0, 5
 REAL = 1e-3  # rad: arguments of multipliers that count as real
 
 
 def edges(count, kinds_of, values, ticks, found, grain):
-    """[(kind, position, its error)] of edges that are missing among those `found` [(kind,
-    position)], and along how many parts of the axis the number is still unexplained.
+    """[(kind, position, its error)] of edges that are missing among those `found` [(kind, position,
+    its error)], and along how many parts of the axis the number is still unexplained.
 
     `count(positions (N))` is the number (N), or UNKNOWN, `values` that at the `ticks`,
     `kinds_of(positions)` the kind of edges, or UNDECIDED, where there is none; no position is known
     better than to within `grain`.
     """
+    ticks, values = _beside(count, values, ticks, found)
+    found = [one[:2] for one in found]
     lost = np.array(_lost(values, ticks, found), int).reshape(-1, 2)
     ends, numbers, between = _halved(count, ticks[lost], values[lost], grain)
     order = np.argsort(between)
@@ -47,9 +55,64 @@ def edges(count, kinds_of, values, ticks, found, grain):
     return missing, len(_lost(values, ticks, found + passed))
 
 
+def crossings(order, values, ticks, found):
+    """Positions between two points at which the `order` of Krein signs differs, `values` that at the
+    `ticks`, and no edge was `found`: where multipliers of unlike signs pass each other they leave
+    the circle, as a rule, and a narrow tongue lies there.
+    """
+    known = np.flatnonzero(values != UNKNOWN)
+    ends = np.stack([known[:-1], known[1:]], axis=1)
+    edges = np.sort([x for _, x, _ in found])
+    met = np.diff(np.searchsorted(edges, ticks[ends]))[:, 0] > 0
+    ends = ends[~met & (np.diff(values[ends])[:, 0] != 0)]
+    return _halved(order, ticks[ends], values[ends], SAME)[2]
+
+
+def order(M, E):
+    """The order of the Krein signs along the upper half of the unit circle, as an integer (N), of
+    matrices (N, n, n) known to within E; UNKNOWN where not all multipliers are certainly simple and
+    on it.
+    """
+    discs = Discs(Matrices.plain(M, E))
+    signs, m = krein(discs), M.shape[1] // 2
+    upper = discs.centre.imag > discs.bars
+    found = np.full(len(M), UNKNOWN)
+    some = np.flatnonzero((signs != 0).all(axis=1) & (upper.sum(axis=1) == m))
+    angle = np.where(upper, np.angle(discs.centre), np.inf)[some]
+    ranked = np.take_along_axis(signs[some], angle.argsort(axis=1)[:, :m], axis=1)
+    found[some] = ranked @ (2 * np.arange(m) - m + 1)
+    return found
+
+
+def _beside(count, values, ticks, found):
+    """The ticks and the numbers there, with those on both sides of the edges: a change across two
+    edges could be explained by one of them and another that is missing.
+    """
+    position = np.array([x for _, x, _ in found])
+    error = np.array([bar for *_, bar in found])
+    width = np.maximum(ASIDE * SAME, ASIDE * error)
+    at, number = [ticks], [values]
+    left = np.arange(2 * len(found))  # the lower sides, then the upper ones
+    for _ in range(WIDENED):
+        edge, side = left % max(1, len(found)), np.where(left < len(found), -1.0, 1.0)
+        x = position[edge] + side * width[edge]
+        gap = abs(x[:, None] - position)
+        some = (x > 0.0) & (x < 1.0) & (gap.min(axis=1, initial=np.inf) >= 0.5 * width[edge])
+        left, x = left[some], x[some]
+        if not left.size:
+            break
+        there = count(x)
+        at.append(x)
+        number.append(there)
+        left = left[there == UNKNOWN]
+        width *= WIDER
+    at, first = np.unique(np.concatenate(at), return_index=True)
+    return at, np.concatenate(number)[first]
+
+
 def _lost(values, ticks, found):
     """The segments (first, last) whose change the edges do not explain."""
-    explained = along(values, ticks, found, row_count.WEIGHTS)
+    explained = along(values, ticks, found, row_count.WEIGHTS, near=SAME)
     return [segment for segment, good in explained.items() if not good]
 
 
@@ -88,16 +151,20 @@ def _shrunk(count, numbers, known, unknown):
 
 
 def kinds(M, structure):
-    """How the multipliers nearest to the unit circle, of matrices (N, n, n), pass it (N); UNDECIDED
-    where a matrix is not finite, as at a pole, past which they jump.
+    """How multipliers of matrices (N, n, n), known to reach the unit circle there, pass it (N);
+    UNDECIDED where a matrix is not finite, as at a pole, past which they jump.
     """
     found = np.full(len(M), UNDECIDED)
     finite = np.flatnonzero(np.isfinite(M).all(axis=(1, 2)))
     multipliers = np.linalg.eigvals(M[finite])
-    nearest = abs(abs(multipliers) - 1.0).argmin(axis=1)
-    angle = abs(np.angle(multipliers[np.arange(finite.size), nearest]))
-    pair = NEIMARK_SACKER if structure == "none" else COLLISION
-    found[finite] = np.where(
-        angle < REAL, PLUS_ONE, np.where(angle > np.pi - REAL, MINUS_ONE, pair)
-    )
+    angle = abs(np.angle(multipliers))
+    if structure == "none":
+        near = abs(abs(multipliers) - 1.0).argmin(axis=1)[:, None]
+        angle, pair = np.take_along_axis(angle, near, axis=1), NEIMARK_SACKER
+    else:  # all may be on the circle: the one at 1 or -1 passes, else two that have met elsewhere
+        angle = np.where(abs(abs(multipliers) - 1.0) < REAL, angle, 0.5 * np.pi)
+        pair = COLLISION
+    plus, minus = angle.min(axis=1), np.pi - angle.max(axis=1)
+    kind = np.where(plus < minus, PLUS_ONE, MINUS_ONE)
+    found[finite] = np.where(np.minimum(plus, minus) < REAL, kind, pair)
     return found

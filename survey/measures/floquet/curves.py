@@ -11,7 +11,7 @@ tongue that is narrower everywhere than the distance of two of the dense lines m
 one that the splines do not show. Curves are drawn wherever a multiplier passes, also where another
 one is outside the circle already: `outside` counts those. `row_count` tells where they do not
 explain how many multipliers are outside, or, by the Maslov index, how often some have passed 1 or
--1.
+-1. Along one axis, ALONE points are searched, and `counted_edges` finds what is missing.
 """
 
 from functools import partial
@@ -40,7 +40,8 @@ ALONG = (
            applies="where the error bounds allow one number alone"),
 )  # fmt: skip
 LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
-TICKS = 8 * (LINES - 1) + 1  # of a line that alone is asked for
+# points along one axis; with damping, tongues are wide or none
+ALONE, ALONE_DAMPED = 769, 193
 DIPS, PARTS = 12, 8  # how often, and into how many parts, the surroundings of an extremum are cut
 NEAR = 3e-5  # of the map: how near curves of splines are
 BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
@@ -90,8 +91,9 @@ def searched(scene, square, axes, fixed, options):
         roughly = orbits.rough
         on_lattice = orbits.on_lattice()
     else:
-        number = LINES if square.across is None else TICKS
         structure, roughly = scene.structure, None
+        alone = ALONE_DAMPED if structure == "none" else ALONE
+        number = LINES if square.across is None else alone
         matrices = matrices_of(scene, square, axes, fixed, options)
         on_lattice = matrices(contours.lattice(number, square.across), ROUGH)
     n = on_lattice[0].shape[1]
@@ -228,13 +230,25 @@ def _on_border(drawing, on_lattice, solved, indices):
 
     found = drawing.found
     own = [
-        (kind, x)
-        for kind, parameters, _error, _known in found
-        for x in square.positions(parameters)[:, 0]
+        (kind, *one)
+        for kind, parameters, error, _known in found
+        for one in zip(square.positions(parameters)[:, 0], error, strict=True)
     ]
     number = row_count.known(row_count.outside(*on_lattice[:2], structure))
     ticks = np.linspace(0.0, 1.0, number.size)
-    counted = [(outside, kinds_of, number, CLASSES.values())]
+    counted = [(outside, kinds_of, number, ticks, CLASSES.values())]
+    if structure == "symplectic" and on_lattice[0].shape[1] > 2:
+
+        def order(x):
+            return counted_edges.order(*matrices(on_line(x), RTOL)[:2])
+
+        signs = counted_edges.order(*on_lattice[:2])
+        inside = counted_edges.crossings(order, signs, ticks, own)
+        if inside.size:
+            at = np.concatenate([ticks, inside])
+            sorts = np.argsort(at)
+            number = np.concatenate([number, outside(inside)])[sorts]
+            counted = [(outside, kinds_of, number, at[sorts], CLASSES.values())]
     on_ticks = solved(on_line(ticks)) if indices else {}
     for kind, name in indices.items():
 
@@ -244,15 +258,15 @@ def _on_border(drawing, on_lattice, solved, indices):
         def own_kind(x, kind=kind):
             return np.full(x.size, kind)
 
-        counted.append((index, own_kind, on_ticks[name], (kind,)))
+        counted.append((index, own_kind, on_ticks[name], ticks, (kind,)))
     unknown = {output.name: (np.array([np.nan]), np.array([np.nan])) for output in ALONG}
     lost = 0
-    for count, kinds_at, values, kinds in counted:
+    for count, kinds_at, values, at, kinds in counted:
         some = [one for one in own if one[0] in kinds]
-        missing, left = counted_edges.edges(count, kinds_at, values, ticks, some, square.grain)
+        missing, left = counted_edges.edges(count, kinds_at, values, at, some, square.grain)
         lost += left
         for name, x, error in missing:
-            own.append((name, x))
+            own.append((name, x, error))
             found.append(
                 (name, square.parameters(on_line(np.array([x]))), np.array([error]), unknown)
             )

@@ -172,3 +172,27 @@ def test_past_a_pole_two_multipliers_jump_and_do_not_pass():
         a=(-1.0, 1.5),
     )
     assert found.edge.size == 0 and found.attrs["complete"] == 0
+
+
+@pytest.mark.parametrize(
+    "along, ends, given, narrow",
+    [  # a collision beside another edge of the same cell; a tongue of collisions in a cell
+        ("k", (0.02, 0.97), {"A": 0.45243163108538553, "B": 0.5827159089463423, "C": 1.0}, 0.96044774),
+        ("yaw_ratio", (-0.95, 0.8388771442043984), {"roll_ratio": 0.8488771442043984, "k": 0.3426454444677417},
+         0.81588),
+    ],
+)  # fmt: skip
+def test_every_change_of_verdict_along_a_line_has_its_edge(along, ends, given, narrow):
+    found = survey.edge("satellite_triaxial", along=along, **{along: ends}, **given)
+    x = np.linspace(*ends, 6001)
+    row = survey.evaluate("satellite_triaxial", **{along: x}, **given, variables=["verdict"])
+    decided = np.flatnonzero(row.verdict.values >= 0)
+    verdict, x = row.verdict.values[decided], x[decided]
+    changes = np.flatnonzero(np.diff(verdict))
+    assert changes.size >= 4
+    edge, error = found.edge.values, found.edge_error.values
+    for i in changes:
+        assert ((edge + error >= x[i]) & (edge - error <= x[i + 1])).any(), x[i]
+    near = abs(edge - narrow).argmin()
+    assert abs(edge[near] - narrow) < 5e-5 and found.edge_class.values[near] == 4  # collision
+    assert (np.diff(edge) > error[1:] + error[:-1]).all()  # none is there twice
