@@ -292,15 +292,24 @@ def from_lattice(number, things, function_of, square):
 
 def from_segments(segments, things, function_of, square):
     """As `from_lattice`, of the curves that cross `segments` [positions (2, 2) of their ends], each cut
-    into CUT parts.
+    into CUT parts; where nothing changes its sign, from where something is there last.
     """
     found = []
     for low, high in segments:
         x = low + np.linspace(0.0, 1.0, CUT + 1)[:, None] * (high - low)
-        nodes = [(position, things(position)) for position in x]
-        for (here, some), (there, others) in pairwise(nodes):
-            for label, start in _changes(some, others, here, there):
-                _add(found, label, *function_of(label), square.grain, start)
+        pairs = list(pairwise([(position, things(position)) for position in x]))
+        starts = [
+            start
+            for (here, some), (there, others) in pairs
+            for start in _changes(some, others, here, there)
+        ]
+        starts = starts or [
+            start
+            for (here, some), (there, others) in pairs
+            for start in (*_lost(some, others, here), *_lost(others, some, there))
+        ]
+        for label, start in starts:
+            _add(found, label, *function_of(label), square.grain, start)
     return _alone(found, function_of)
 
 
@@ -350,3 +359,11 @@ def _changes(some, others, here, there):
             if a * c < 0.0 and off < 1.0:
                 share = a / (a - c)
                 yield label, np.array([x + share * (y - x), *(here + share * (there - here))])
+
+
+def _lost(some, others, here):
+    """(label, (coordinate, position)) of things at a position `here` that are not at the next one."""
+    there = {(label, side) for label, side, *_ in others}
+    for label, side, x, _a in some:
+        if (label, side) not in there:
+            yield label, np.array([x, *here])

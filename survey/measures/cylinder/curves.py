@@ -117,9 +117,11 @@ def _of_parameters(plane, find):
         rows = [bifurcations.counted(plane, *row) for row in find(plane)]
         if plane.square.across is None:
             counts = cycle_counts.on_lattice(plane)
-            folds = cycle_folds.found(plane, cycle_counts.lost(plane, rows, counts))
-            rows += [bifurcations.counted(plane, *row) for row in folds]
-            missed = len(cycle_counts.lost(plane, rows, counts))
+            lost = cycle_counts.lost(plane, rows, counts)
+            folds = cycle_folds.found(plane, lost) if lost else ()
+            more = rows + [bifurcations.counted(plane, *row) for row in folds]
+            left = cycle_counts.lost(plane, more, counts)
+            rows, missed = (more, len(left)) if len(left) < len(lost) else (rows, len(lost))
         else:
             rows, missed = _on_border(plane, find, rows)
     curves = joined(
