@@ -28,6 +28,7 @@ _COUNTED = (
     "to some points of each curve on a map of two parameters, where the return maps are conclusive"
 )
 STATE = ("phi0", "w0")
+SEARCHES = 3  # of parts of a line
 ALONG = (
     Output("equilibrium_phi", "angle of the equilibrium, or of the saddle of a stable manifold", r"\varphi_e",
            units="rad",
@@ -136,12 +137,18 @@ def _on_border(plane, find, rows):
     """The rows, and along how many parts of the border that is asked for alone they do not explain
     the numbers of cycles; such parts are searched again, each as a map of its own.
     """
-    counts = cycle_counts.on_border(plane)
-    for low, high in cycle_counts.lost_on_border(plane, rows, *counts):
-        part = plane.part(low, high)
-        recounted = (bifurcations.counted(part, *row) for row in find(part))
-        rows += [(kind, xy, error * (high - low), known) for kind, xy, error, known in recounted]
-    return rows, len(cycle_counts.lost_on_border(plane, rows, *counts))
+    for _ in range(SEARCHES):
+        parts = cycle_counts.lost_on_border(plane, rows, *cycle_counts.on_border(plane, rows))
+        known = len(rows)
+        for low, high in parts:
+            part = plane.part(low, high)
+            recounted = (bifurcations.counted(part, *row) for row in find(part))
+            rows += [
+                (kind, xy, error * (high - low), known) for kind, xy, error, known in recounted
+            ]
+        if len(rows) == known:
+            break
+    return rows, len(cycle_counts.lost_on_border(plane, rows, *cycle_counts.on_border(plane, rows)))
 
 
 def seconds(axes):

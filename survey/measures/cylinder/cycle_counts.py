@@ -12,10 +12,12 @@ from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.program import COLUMNS
 from survey.measures import contours
 from survey.measures.cylinder.fate import KINDS, LIBRATIONS, MINUS, PLUS, G, remembered
-from survey.measures.segments import NEAR, UNKNOWN, along, segments
+from survey.measures.segments import UNKNOWN, along, segments
 from survey.methods import taylor
 
 LINES = 33
+WITHIN = 1e-8  # of the map: what positions on a border may be off
+BESIDE = (0.2, 0.02, 0.002)  # of the gap to the next point of a curve
 HOPF = ("supercritical_hopf", "subcritical_hopf")
 OPTIONAL = ("homoclinic", "heteroclinic", "fold", "ends")
 WEIGHTS = {"cycle_fold": 2}
@@ -51,13 +53,29 @@ def lost(plane, rows, counts):
     ]
 
 
-def on_border(plane):
-    """The ticks of the border that is asked for alone (LINES), and the numbers of cycles of each kind
-    (3, LINES) there, or UNKNOWN.
+def on_border(plane, rows):
+    """Ticks of the border that is asked for alone (m), of which some lie beside each point of the
+    curves on it, and the numbers of cycles of each kind (3, m) there, or UNKNOWN.
+
+    `rows` are those of `bifurcations.found`.
     """
-    ticks = np.linspace(0.0, 1.0, LINES)
-    x = np.column_stack([ticks, np.full(LINES, plane.square.across)])
+    met = np.unique([position for _name, position, _known in _met(plane, rows)])
+    gaps = np.diff(np.concatenate([[0.0], met, [1.0]]))
+    shares = np.array(BESIDE)[:, None]
+    beside = np.concatenate([met - shares * gaps[:-1], met + shares * gaps[1:]]).ravel()
+    ticks = np.unique(np.concatenate([np.linspace(0.0, 1.0, LINES), beside]))
+    x = np.column_stack([ticks, np.full(ticks.size, plane.square.across)])
     return ticks, np.array([_count(row) for row in plane.flows(x)]).T
+
+
+def _met(plane, rows):
+    """[(name, position, known)] of the points on the border that is asked for alone."""
+    value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
+    return [
+        (name, plane.positions(point[None])[0, 0], known)
+        for name, xy, _error, known in rows
+        for point in xy[xy[:, 1] == value]
+    ]
 
 
 def lost_on_border(plane, rows, ticks, counts):
@@ -65,19 +83,14 @@ def lost_on_border(plane, rows, ticks, counts):
     it do not explain the numbers of cycles, from `on_border`; `rows` are those of
     `bifurcations.found`.
     """
-    value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
-    met = [
-        (name, plane.positions(point[None])[0, 0], known)
-        for name, xy, _error, known in rows
-        for point in xy[xy[:, 1] == value]
-    ]
+    met = _met(plane, rows)
     parts = set()
     for kind, values in zip(KINDS, counts, strict=True):
         own = [(name, position) for name, position, known in met if _counts_for(kind, name, known)]
-        explained = along(values, ticks, own, WEIGHTS, OPTIONAL)
+        explained = along(values, ticks, own, WEIGHTS, OPTIONAL, WITHIN)
         parts |= {segment for segment, good in explained.items() if not good}
     return [
-        (max(0.0, ticks[first] - NEAR), min(1.0, ticks[last] + NEAR))
+        (max(0.0, ticks[first] - WITHIN), min(1.0, ticks[last] + WITHIN))
         for first, last in sorted(parts)
     ]
 
