@@ -35,7 +35,8 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ROTATION, LIBRATION = 0, 1
 NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
-# a node of a scan: x, class, D, map', bar of D, time, left
+# a node of a scan: x, class, D, map' (of a libration without an image, as it goes beyond the end of its
+# interval, minus the number of equilibria that it has passed), bar of D, time, left
 X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)
 NODE_SIZE = 7
 (
@@ -131,7 +132,7 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
     phi, w, saa, sab, sbb, e, t, right = x0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False
     far, slow = np.empty(PASSAGE), False
     doubt = 0.0
-    node[X], node[CLASS] = x0, UNKNOWN
+    node[X], node[CLASS], node[SLOPE] = x0, UNKNOWN, 0.0
     for n in range(1, LIMIT):
         h = expand(begin, p, phi, w, how, T)
         x1, w1, de, _dy = at(p, T, h)
@@ -146,6 +147,7 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
         phi, w, e, t = x1, w1, e + de, t + h
         if phi < x0 - TWO_PI or phi > high:
             node[CLASS] = NO_IMAGE
+            node[SLOPE] = -float(between(eqs, count, node[LEFT], x0)) if phi > high else 0.0
             return
         if slow:
             f, g, _dg = values(p, phi)
@@ -232,7 +234,17 @@ def fixed_points(
         edges[UNANSWERED] += b[CLASS] == UNKNOWN
         if b[CLASS] == 1.0 and a[CLASS] != 1.0:
             edges[BORDER], edges[IMAGE] = b[X], b[X] + b[CHANGE]
-        if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS] or found + 2 > len(cycles) or b[X] <= a[X]:
+        if found + 2 > len(cycles) or b[X] <= a[X]:
+            continue
+        if jumps(a, b) or jumps(b, a):  # of the cycle there its place is known, and no more
+            inner, side = (a, 1.0) if a[CLASS] > 0.0 else (b, -1.0)
+            write_cycle(a, b, inner, interval, 0.0, cycles[found])
+            cycles[found, CYCLE_BAR] = b[X] - a[X] + 4e-16 * abs(b[X])
+            cycles[found, MULTIPLIER_BAR] = math.inf
+            cycles[found, CYCLE_CLASS] = -inner[CLASS]
+            cycles[found, BELOW], cycles[found, ABOVE] = -side, side
+            found += 1
+        if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS]:
             continue
         copy(m, b)
         if differ(a, b) or followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
@@ -304,6 +316,14 @@ def scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes):
             step *= 10.0
             i += not near
     return size
+
+
+@inline
+def jumps(a, b):
+    """Does D, negative at the node a, become positive before b? As librations begin to go beyond the
+    end of their interval, the image becomes that end.
+    """
+    return a[CLASS] > 0.0 and a[CHANGE] < 0.0 and b[CLASS] == NO_IMAGE and b[SLOPE] == -a[CLASS]
 
 
 @inline

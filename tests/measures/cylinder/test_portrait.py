@@ -397,3 +397,15 @@ def test_beside_a_connection_a_repelling_cycle_may_be_lost_and_then_the_verdict_
         assert int(ds.verdict) == -1 or (int(ds.verdict) == 1 and int(ds.librations) == 1)
     far = survey.evaluate("gyrostat", question="portrait", d=1.996611983589767 - 1e-4, **system)
     assert int(far.verdict) == 1 and int(far.librations) == 1
+
+
+def test_a_cycle_that_float64_does_not_resolve_is_counted_and_left_open():
+    """Its multiplier is above 1e12: from one number to the next the return map leaps over the identity.
+    Of librations that begin 0.01 apart one comes to rest, and the other goes beyond the saddle.
+    """
+    system = {"b12": 1.134521, "b31": -0.557416, "d": -0.577292, "c23": -0.185902, "s2": -0.2289,
+              "s3": 0.362648}  # fmt: skip
+    ds = survey.evaluate("gyrostat", question="portrait", **system)
+    assert ds.librations == 1 and ds.verdict == -1
+    fates = survey.evaluate("gyrostat", phi0=[7.38, 7.39], w0=0.0, question="fate", **system)
+    assert fates.survey.names().values.tolist() == ["focus_or_node", "spin_up_plus"]
