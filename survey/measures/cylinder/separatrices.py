@@ -306,76 +306,75 @@ def _free_on_line(line, six):
             yield _crossing(line, phi, w(phi), slope, 1.0, across, {})
 
 
-def _levels(window, s):
-    """b = 0: H = V(saddle) from each saddle to both sides, up to where it turns or to another saddle."""
+def _levels_of(s):
+    """(saddle, its Level, far, turns) of the level curves from all saddles; the last two as in
+    `far_end`.
+    """
     for row in s.equilibria:
         if row[eq.KIND] != eq.SADDLE:
             continue
         level = Level(s.p, row)
-        known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
         for side in (1.0, -1.0):
             far, turns = far_end(level, s, side)
-            if not turns and side < 0.0 and abs(far) >= TWO_PI:
-                continue  # the same as to the other side
-            for branch in (0.0,) if turns else (1.0, -1.0):
+            if turns or side > 0.0 or abs(far) < TWO_PI:  # else the same as to the other side
+                yield row, level, far, turns
 
-                def point(t, far=far, branch=branch, level=level):
-                    x = 0.5 * far * (1.0 - np.cos(math.pi * t))
-                    return x, (branch or np.sign(1.0 - t)) * level.velocity(x)
 
-                for k in window.copies(level.angle + min(far, 0.0), level.angle + max(far, 0.0)):
+def _levels(window, s):
+    """b = 0: H = V(saddle) from each saddle to both sides, up to where it turns or to another saddle."""
+    for row, level, far, turns in _levels_of(s):
+        known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
+        for branch in (0.0,) if turns else (1.0, -1.0):
 
-                    def position(t, point=point, k=k, level=level):
-                        x, w = point(t)
-                        return window.positions(level.angle + x + TWO_PI * k, w)
+            def point(t, far=far, branch=branch, level=level):
+                x = 0.5 * far * (1.0 - np.cos(math.pi * t))
+                return x, (branch or np.sign(1.0 - t)) * level.velocity(x)
 
-                    for t in runs(position, 0.0, 1.0 if branch else 2.0):
-                        x, w = point(t)
-                        phi = level.angle + x + TWO_PI * k
-                        across = (
-                            level.error(x)
-                            + 4.0 * ROUNDOFF * w * w
-                            + abs(level.slope(x)) * ROUNDOFF * abs(phi)
+            for k in window.copies(level.angle + min(far, 0.0), level.angle + max(far, 0.0)):
+
+                def position(t, point=point, k=k, level=level):
+                    x, w = point(t)
+                    return window.positions(level.angle + x + TWO_PI * k, w)
+
+                for t in runs(position, 0.0, 1.0 if branch else 2.0):
+                    x, w = point(t)
+                    phi = level.angle + x + TWO_PI * k
+                    across = (
+                        level.error(x)
+                        + 4.0 * ROUNDOFF * w * w
+                        + abs(level.slope(x)) * ROUNDOFF * abs(phi)
+                    )
+                    error = window.error(phi, w, level.slope(x), w, across)
+                    error[x == 0.0] = row[eq.BAR] / window.size[0] + ROUNDOFF
+                    if not turns:  # a saddle of the same level, within rounding
+                        error[x == far] = math.hypot(
+                            *(np.sqrt(level.error(far) * level.reach()) / window.size)
                         )
-                        error = window.error(phi, w, level.slope(x), w, across)
-                        error[x == 0.0] = row[eq.BAR] / window.size[0] + ROUNDOFF
-                        if not turns:  # a saddle of the same level, within rounding
-                            error[x == far] = math.hypot(
-                                *(np.sqrt(level.error(far) * level.reach()) / window.size)
-                            )
-                        yield "stable_manifold", window.parameters(phi, w), error, known
+                    yield "stable_manifold", window.parameters(phi, w), error, known
 
 
 def _levels_on_line(line, s):
     """As `_levels`, where H = V(saddle) crosses the line."""
-    for row in s.equilibria:
-        if row[eq.KIND] != eq.SADDLE:
-            continue
-        level = Level(s.p, row)
+    for row, level, far, _turns in _levels_of(s):
         known = {"equilibrium_phi": (row[eq.ANGLE], row[eq.BAR])}
-        for side in (1.0, -1.0):
-            far, turns = far_end(level, s, side)
-            if not turns and side < 0.0 and abs(far) >= TWO_PI:
-                continue  # the same as to the other side
-            # V is extreme at the equilibria
-            between = [
-                side * ((side * (y - level.angle)) % TWO_PI) for y in s.equilibria[:, eq.ANGLE]
-            ]
-            nodes = level.angle + np.unique([0.0, far, *(y for y in between if abs(y) < abs(far))])
-            for sign in (1.0, -1.0):
+        side = math.copysign(1.0, far)
+        # V is extreme at the equilibria
+        between = [side * ((side * (y - level.angle)) % TWO_PI) for y in s.equilibria[:, eq.ANGLE]]
+        nodes = level.angle + np.unique([0.0, far, *(y for y in between if abs(y) < abs(far))])
+        for sign in (1.0, -1.0):
 
-                def w(phi, level=level, sign=sign):
-                    return sign * level.velocity(phi - level.angle)
+            def w(phi, level=level, sign=sign):
+                return sign * level.velocity(phi - level.angle)
 
-                for phi in _crossings(line, w, nodes):
-                    x, v = phi - level.angle, w(phi)
-                    across = level.error(x) + 4.0 * ROUNDOFF * v * v
-                    across += abs(level.slope(x)) * ROUNDOFF * abs(phi)
-                    if x == 0.0:
-                        across = abs(row[eq.DG]) * (row[eq.BAR] + ROUNDOFF) ** 2
-                    least = math.sqrt(across * abs(row[eq.DG])), math.sqrt(across)
-                    by_phi, by_w = max(abs(level.slope(x)), least[0]), max(abs(v), least[1])
-                    yield _crossing(line, phi, v, by_phi, by_w, across, known)
+            for phi in _crossings(line, w, nodes):
+                x, v = phi - level.angle, w(phi)
+                across = level.error(x) + 4.0 * ROUNDOFF * v * v
+                across += abs(level.slope(x)) * ROUNDOFF * abs(phi)
+                if x == 0.0:
+                    across = abs(row[eq.DG]) * (row[eq.BAR] + ROUNDOFF) ** 2
+                least = math.sqrt(across * abs(row[eq.DG])), math.sqrt(across)
+                by_phi, by_w = max(abs(level.slope(x)), least[0]), max(abs(v), least[1])
+                yield _crossing(line, phi, v, by_phi, by_w, across, known)
 
 
 def _crossings(line, w, nodes):
