@@ -12,6 +12,7 @@ from scipy.ndimage import distance_transform_edt
 from survey.measures.hill.edges import close_in
 
 HALVINGS = 30
+DENSER = 8  # times the nodes of a line, where one line alone is searched
 SURE = 1e-9  # half the width of what brackets a point
 
 
@@ -46,6 +47,8 @@ def lines(function, square, number, values=None, halvings=HALVINGS):
     function(positions (m, 2)) -> (values, error bounds), NaN where there is none; `values`: those
     on the `lattice`, where they are known.
     """
+    if square.across is not None and values is None:
+        number = (number - 1) * DENSER + 1
     x = lattice(number, square.across)
     values = function(x)[0] if values is None else values
     if square.across is not None:
@@ -62,16 +65,37 @@ def lines(function, square, number, values=None, halvings=HALVINGS):
 
 
 def _crossings(function, square, x, values, halvings):
-    """The points on the line through positions x (number, 2) at which the sign of the function changes."""
-    with np.errstate(invalid="ignore"):
-        changes = np.isfinite(values[1:] + values[:-1]) & (
-            (values[1:] > 0.0) != (values[:-1] > 0.0)
+    """The points on the line through positions x (number, 2) at which the sign of the function changes,
+    also between a node and where the function ends before the next one.
+    """
+
+    def at(which, t):
+        value, bar = function(np.stack([t, np.full(t.shape, square.across)], -1).reshape(-1, 2))
+        return value.reshape(t.shape), bar.reshape(t.shape)
+
+    t, known = x[:, 0], np.isfinite(values)
+    ends = np.flatnonzero(known[1:] != known[:-1])
+    inner, outer = ends + known[ends + 1], ends + known[ends]
+    last, beyond, value = t[inner], t[outer].copy(), values[inner].copy()
+    for _ in range(halvings if ends.size else 0):
+        middle = 0.5 * (last + beyond)
+        here = at(None, middle)[0]
+        on = np.isfinite(here)
+        last, beyond, value = (
+            np.where(on, middle, last),
+            np.where(on, beyond, middle),
+            np.where(on, here, value),
         )
-    if not changes.any():
+    both = np.flatnonzero(known[1:] & known[:-1])
+    low, high = np.append(t[both], t[inner]), np.append(t[both + 1], last)
+    below, above = np.append(values[both], values[inner]), np.append(values[both + 1], value)
+    some = np.flatnonzero((below > 0.0) != (above > 0.0))
+    if not some.size:
         return []
-    start = 0.5 * (x[1:] + x[:-1])[changes]
-    found, error, sure = _closed_in(function, start, square.grain, len(x), halvings)
-    return [(found[[i]], error[[i]]) for i in np.flatnonzero(sure)]
+    found, error, sure = _halved(at, low[some], high[some], square.grain, halvings)
+    order = np.argsort(found[sure])
+    points = np.stack([found, np.full(found.shape, square.across)], axis=1)[sure][order]
+    return list(zip(points[:, None], error[sure][order, None], strict=True))
 
 
 def _closed_in(function, x, grain, number, halvings):
@@ -90,15 +114,22 @@ def _closed_in(function, x, grain, number, halvings):
         value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 
+    x[rows, along], error, sure = _halved(at, low, high, grain, halvings)
+    return x, error, sure
+
+
+def _halved(at, low, high, grain, halvings):
+    """(positions, errors, are signs certain?) of zeros between low and high (n); at(which, t) as
+    the function of `close_in`.
+    """
+    rows = np.arange(low.size)
     sign = np.sign(at(rows, low[:, None])[0][:, 0])
     for _ in range(halvings):
         middle = 0.5 * (low + high)
         same = np.sign(at(rows, middle[:, None])[0][:, 0]) == sign
         low, high = np.where(same, middle, low), np.where(same, high, middle)
-    t, width, sure = close_in(at, 0.5 * (low + high), high - low, np.full(len(x), grain))
-    sure &= (width < SURE) & (t >= 0.0) & (t <= 1.0)
-    x[rows, along] = t
-    return x, width + grain, sure
+    t, width, sure = close_in(at, 0.5 * (low + high), abs(high - low), np.full(low.size, grain))
+    return t, width + grain, sure & (width < SURE) & (t >= 0.0) & (t <= 1.0)
 
 
 def runs(good):

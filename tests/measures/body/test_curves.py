@@ -78,6 +78,31 @@ def test_stability_of_critical_motions_has_its_boundary():
     ) == [0, 1]
 
 
+def test_boundaries_next_to_the_ends_of_the_critical_motions_are_found():
+    """Of motions on a short part of the line: where the product in (12) vanishes, in multiprecision."""
+    moments, epsilon, p = (1.0770838, 1.4884492, 1.2128309), -2.2038222, 0.0363895
+    given = dict(zip("ABC", moments, strict=True)) | {"epsilon": epsilon, "p_psi": p}
+    found = survey.edge(
+        "brun_triaxial", along="sigma", sigma=(-3.0, 3.0), question="critical", **given
+    )
+    assert found.edge.values == pytest.approx([-0.81781, -0.68189], abs=1e-4)
+    for edge, error in zip(found.edge.values, found.edge_error.values, strict=True):
+        with mp.workdps(30):
+            low, high = (
+                certificate(mp.mpf(edge) + side * error, moments, epsilon, p) for side in (-1, 1)
+            )
+        assert low * high < 0 and error < 1e-10
+
+
+def certificate(sigma, moments, epsilon, p):
+    """The bracket in (12)."""
+    factors = [1 + sigma * mp.mpf(A) for A in moments]
+    one, two, three = (A / factor for A, factor in zip(moments, factors, strict=True))
+    y = p / mp.sqrt(mp.mpf(epsilon) * mp.fprod(factors))
+    half, second = (one + two + three) / 2, one * two + one * three + two * three
+    return (half * half - second) * y + one * two * three
+
+
 @pytest.mark.parametrize(
     ("scene", "given", "words"),
     [

@@ -7,6 +7,7 @@ import pytest
 from measures.nutation.test_curves import discriminant, quartic, roots, runs
 from mpmath import mp, mpf
 
+import survey
 from survey.measures.nutation import curves as nc
 from survey.request.workflow import check
 from survey.sweep import boundaries
@@ -146,3 +147,38 @@ def test_no_crossing_of_a_row_is_missed(axes, fixed):
             at = np.flatnonzero((q[1:] > value) != (q[:-1] > value))
             crossed += [*(p[at] + (value - q[at]) / (q[at + 1] - q[at]) * (p[at + 1] - p[at]))]
         np.testing.assert_allclose(np.sort(crossed), expected, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("along", "ends", "near", "state"),
+    [
+        ("A", (1.0, 2.0), (1.022, 1.0225), {"C": 1.1775, "epsilon": -1.96057, "theta0": 1.946753, "p_theta0": 0.0,
+                                            "p_psi": -0.297336, "p_phi": -0.138831}),
+        ("p_phi", (-1.3, 1.3), (-0.1342, -0.1338), {"A": 1.473651, "C": 1.263467, "epsilon": 2.39206,
+                                                  "theta0": 1.928244, "p_theta0": 0.0, "p_psi": -0.56386}),
+        ("epsilon", (-4.0, -0.1), (-0.1965, -0.1955), {"A": 1.300481, "C": 2.112953, "theta0": 2.367427,
+                                                       "p_theta0": -0.353956, "p_psi": 0.124743, "p_phi": -0.226211}),
+    ],
+)  # fmt: skip
+def test_separatrices_next_to_the_end_of_their_saddle_are_found(along, ends, near, state):
+    """Where L on the separatrix is the potential's local maximum, in multiprecision."""
+    ds = survey.edge("brun", along=along, **{along: ends}, **state)
+    positions, errors = (one.values[ds.edge_class == nc.SADDLE] for one in (ds.edge, ds.edge_error))
+    (position,), (error,) = positions, errors
+    assert near[0] < position < near[1] and error < 1e-10
+    with mp.workdps(30):
+        sides = [
+            above_the_saddle(state | {along: mpf(position) + side * mpf(error)}) for side in (-1, 1)
+        ]
+    assert sides[0] * sides[1] < 0
+
+
+def above_the_saddle(point):
+    """L less the local maximum of the potential, (b - a u)^2 / (1 - u^2) - k u^2."""
+    size, c, epsilon, theta, p, b, a = (mpf(point[name]) for name in BODY)
+    k = epsilon * size * (size - c)
+    slope = [-k, 0, 2 * k, -a * b, a * a + b * b - k, -a * b]  # times (1 - u^2)^2 / 2
+    found = mp.polyroots(slope, maxsteps=500, extraprec=300)
+    _, u, _ = sorted(mp.re(u) for u in found if abs(mp.im(u)) < 1e-20 and abs(u) < 1)
+    levels = [(b - a * x) ** 2 / (1 - x * x) - k * x * x for x in (mp.cos(theta), u)]
+    return p * p + levels[0] - levels[1]
