@@ -6,6 +6,8 @@ Hopf bifurcation; at a saddle connection, at a fold of equilibria, which may lie
 where the ends change, by 1 or not at all (see `segments`).
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
@@ -16,6 +18,7 @@ from survey.measures.segments import NEAR, UNKNOWN, along, segments
 from survey.methods import taylor
 
 LINES = 33
+BESIDE = 0.02  # of the way from one point of a curve to the next
 HOPF = ("supercritical_hopf", "subcritical_hopf")
 OPTIONAL = ("homoclinic", "heteroclinic", "fold", "ends")
 WEIGHTS = {"cycle_fold": 2}
@@ -51,13 +54,27 @@ def lost(plane, rows, counts):
     ]
 
 
-def on_border(plane):
-    """The ticks of the border that is asked for alone (LINES), and the numbers of cycles of each kind
-    (3, LINES) there, or UNKNOWN.
+def on_border(plane, rows):
+    """Ticks (m) of the border that is asked for alone, LINES and beside the points of the curves on
+    it, and the numbers of cycles of each kind (3, m) there, or UNKNOWN.
     """
-    ticks = np.linspace(0.0, 1.0, LINES)
-    x = np.column_stack([ticks, np.full(LINES, plane.square.across)])
+    met = [0.0, 1.0, *(position for _name, position, _known in _met(plane, rows))]
+    # so that none of the points explains what another curve does between two of LINES
+    between = [np.array(ends) @ [1.0 - BESIDE, BESIDE] for ends in pairwise(sorted(met))]
+    between += [np.array(ends) @ [BESIDE, 1.0 - BESIDE] for ends in pairwise(sorted(met))]
+    ticks = np.unique([*np.linspace(0.0, 1.0, LINES), *between])
+    x = np.column_stack([ticks, np.full(ticks.size, plane.square.across)])
     return ticks, np.array([_count(row) for row in plane.flows(x)]).T
+
+
+def _met(plane, rows):
+    """[(name, position, known)] of the points of the curves on the border that is asked for alone."""
+    value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
+    return [
+        (name, plane.positions(point[None])[0, 0], known)
+        for name, xy, _error, known in rows
+        for point in xy[xy[:, 1] == value]
+    ]
 
 
 def lost_on_border(plane, rows, ticks, counts):
@@ -65,13 +82,7 @@ def lost_on_border(plane, rows, ticks, counts):
     it do not explain the numbers of cycles, from `on_border`; `rows` are those of
     `bifurcations.found`.
     """
-    value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
-    met = [
-        (name, plane.positions(point[None])[0, 0], known)
-        for name, xy, _error, known in rows
-        for point in xy[xy[:, 1] == value]
-    ]
-    parts = set()
+    met, parts = _met(plane, rows), set()
     for kind, values in zip(KINDS, counts, strict=True):
         own = [(name, position) for name, position, known in met if _counts_for(kind, name, known)]
         explained = along(values, ticks, own, WEIGHTS, OPTIONAL)
