@@ -70,9 +70,9 @@ STATUS = {
     "must equal p_phi at theta0 = 0; all conditions: `survey scenes brun`",
     "no_motion": "no motion has these integrals: l lies below the least effective potential",
     "overflow": "a value leaves the range of binary64: theta0 is too near to 0 or pi for these momenta",
-    "no_convergence": "the iteration did not converge: try another method or a larger rtol. By the method auto, "
-    "this is exactly a cusp, where a well begins and the motion has no period, as at l = 1, (alpha, beta) = (0, 1), "
-    "where the axis rests at u = 0, and beside it T grows as 5.2441 (l - 1)^(-1/4): take a point beside it",
+    "no_convergence": "the iteration did not converge: try another method or a larger rtol. With the method auto, "
+    "the point is exactly a cusp, where a well begins and the motion has no period, as at l = 1, (alpha, beta) = "
+    "(0, 1), where the axis rests at u = 0; T grows as 5.2441 (l - 1)^(-1/4) towards it: take a point beside it",
 }
 _STATE, _SCALED, _MOTION = {"sign": ("",)}, {"sign": ("1", "-1")}, {"motion": ("at_t",)}
 _LARGEST = 1e290

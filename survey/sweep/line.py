@@ -54,14 +54,13 @@ def on_line(scene, options, along, ends, fixed):
     here = np.flatnonzero(curves.parameters[:, 1] == value)
     position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]
     error = np.asarray(curves.error)[here] * (ends[1] - ends[0]) + np.spacing(abs(position))
-    order = np.lexsort((kind, position))
+    order = np.lexsort((position, kind))
     position, error, kind = position[order], error[order], kind[order]
     near = np.diff(position) <= SAME * (error[1:] + error[:-1])
-    keep = (
-        np.concatenate([[True], ~(near & (np.diff(kind) == 0))])
-        if position.size
-        else np.zeros(0, bool)
-    )
+    keep = np.ones(position.size, bool)
+    keep[1:] = ~(near & (np.diff(kind) == 0))
+    keep = np.flatnonzero(keep)
+    keep = keep[np.lexsort((kind[keep], position[keep]))]
     return OnLine(position[keep], error[keep], kind[keep], curves.complete)
 
 

@@ -536,7 +536,10 @@ def test_a_line_meets_both_edges_of_narrow_tongues():
     codes = dict(zip(about["flag_meanings"].split(), about["flag_values"], strict=True))
     collisions = found.edge.values[found.edge_class.values == codes["collision"]]
     low, high = collisions.reshape(-1, 2)[:2].T
-    assert (high - low < [2e-4, 6e-3]).all() and (found.edge_error < 1e-8).all()
+    assert (high - low < [2e-4, 6e-3]).all()
+    # those at -1 are passed at once, out and back: bracketed by an index, not by a change of sign
+    touched = found.edge_class.values == codes["minus_one"]
+    assert (found.edge_error[~touched] < 1e-8).all() and (found.edge_error < 1e-7).all()
     off = 1e-6
     omega = np.stack([low - off, low + off, high - off, high + off])
     verdicts = survey.evaluate(scene, Omega=omega.ravel(), epsilon=epsilon).survey.names()

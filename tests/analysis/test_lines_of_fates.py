@@ -88,6 +88,38 @@ def test_closed_separatrices_cross_a_line(system, line):
     assert (off <= 1.01 * abs(slope) * found.edge_error.values + (0.0 if b12 else 1e-9)).all()
 
 
+def test_a_line_through_a_focus_is_not_complete():
+    """A branch that winds round it crosses the line w = 0 at every half turn; at a node at most once."""
+    system = {"b12": 0.7, "b31": -0.4, "d": 0.0, "c23": 0.0, "s2": 0.5, "s3": -0.2}
+    for b12, complete in ((0.7, 0), (12.0, None)):
+        b31 = -0.4 / 0.7 * b12
+        found = survey.edge(
+            "gyrostat", along="phi0", question="fate", **system | {"b12": b12, "b31": b31},
+            w0=0.0, phi0=(0.0, 6.28),
+        )  # fmt: skip
+        assert found.attrs.get("complete") == complete
+
+
+def test_lines_that_touch_a_separatrix():
+    """w = F - |F|, F = 0.3 sin phi + 0.4 cos phi, is 0 where F is greatest; -w where it is least."""
+    system = {"b12": 0.3, "b31": 0.4, "d": 0.0, "c23": 0.0, "s2": 0.0, "s3": 0.0}
+    found = survey.edge(
+        "gyrostat", along="phi0", question="fate", **system, w0=0.0, phi0=(0.0, 6.28)
+    )
+    off = abs(found.edge.values - np.arctan2(0.3, 0.4) - [0.0, np.pi])
+    assert (off <= found.edge_error.values).all() and (found.edge_error < 1e-7).all()
+
+
+def test_a_separatrix_that_begins_on_the_line_is_one_edge():
+    """Along w = 0 without friction: both branches of a saddle begin at its angle."""
+    system = {"b12": 0.0, "b31": 0.0, "d": 0.7, "c23": 0.2, "s2": 0.3, "s3": 0.1}
+    found = survey.edge(
+        "gyrostat", along="phi0", question="fate", **system, w0=0.0, phi0=(0.0, 6.28)
+    )
+    own = found.edge.values[found.edge_class.values == 0]
+    assert own.size == 2 and np.diff(own)[0] > 1.0
+
+
 @pytest.mark.parametrize("off", [0.0, 1e-12, -1e-9, 3e-9, 1e-7, -1e-5])
 def test_lines_beside_a_saddle_meet_its_branch(off):
     """There w = slope (phi - phi_s), to first order."""

@@ -144,7 +144,8 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
     """Fill `out` (m, POINT) with the points of a line from `start` (START_PHI to START_W_BAR).
 
     Returns their number, and whether the line was followed to its end: not where its windings come
-    closer than NEAREST, or its error or its length end it. Rows of NaN part what lies in the window.
+    closer than NEAREST to one another or to an equilibrium on the window, a line, or where its error
+    or its length ends it. Rows of NaN part what lies in the window.
     `section`: an angle that rotations pass.
     """
     T = table()
@@ -256,19 +257,40 @@ def line(setting, begin, at, p, start, window, eqs, count, section, kind, tolera
         turns += k
         target -= k * TWO_PI
         old_x -= k * TWO_PI
-        if kind == BRANCH and settled_beside(p, window, eqs, count, phi, w):
-            to_its_end = True
-            break
+        if kind == BRANCH:
+            settled, to_its_end = settled_beside(p, window, eqs, count, phi, w)
+            if settled:
+                break
     return size, to_its_end and not lost
 
 
 @kernel
 def settled_beside(p, window, eqs, count, phi, w):
-    """Is (phi, w) closer than NEAREST to an attracting equilibrium?"""
+    """Is (phi, w) closer than NEAREST to an attracting equilibrium? And is the window met no more
+    from there, if it is a line?
+    """
     a, c = scales(window, phi, w)
     for i in range(count):
         x, _turns = offset(phi, eqs[i, ANGLE])
-        near = math.hypot(a * x, c * w) < window[NEAREST]
-        if eqs[i, KIND] != SADDLE and near and values(p, phi)[0] < 0.0:
-            return True
-    return False
+        f, _g, dg = values(p, phi)
+        if eqs[i, KIND] != SADDLE and math.hypot(a * x, c * w) < window[NEAREST] and f < 0.0:
+            return True, has_area(window) or passes(window, eqs[i, ANGLE], x, w, f, dg)
+    return False, False
+
+
+@kernel
+def passes(window, angle, x, w, f, dg):
+    """Does the window, a line, pass all that is left of an orbit of w' = f w + dg x, x' = w, from x and
+    w on, about that angle?
+    """
+    if window[W_LOW] < window[W_HIGH]:
+        off = abs(offset(window[PHI_LOW], angle)[0])
+        size = math.sqrt(max(x * x - w * w / dg, 0.0))
+    else:
+        off, size = abs(window[W_LOW]), math.sqrt(max(w * w - dg * x * x, 0.0))
+    if off > 2.0 * size:  # w^2 - dg x^2 does not grow
+        return True
+    # a node is reached without a turn from between w = 0 and its steeper direction
+    square = f * f + 4.0 * dg
+    steep = 0.5 * (math.sqrt(max(square, 0.0)) - f)
+    return off == 0.0 and square > 0.0 and x * w <= 0.0 and abs(w) <= steep * abs(x)

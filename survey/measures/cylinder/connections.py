@@ -3,7 +3,7 @@ branch of a saddle.
 
 Three kinds are looked for: those on which w keeps its sign, over at most a turn; those with one
 turning point (a loop, or a way back to another saddle); and loops with two, one to either side of
-the saddle, which surround both equilibria beside it. Other loops there are none: a closed curve
+the saddle, which surround both equilibria beside it. There are no other loops: a closed curve
 that is not wound round the cylinder has two turning points, and does not meet its copies a turn
 away. Ways from one saddle to the other with more turning points are not looked for; no cycle is
 born in them.

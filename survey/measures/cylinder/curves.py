@@ -4,6 +4,8 @@ On a map of initial states they part the fates: see `separatrices`. On a map of 
 part the portraits: see `bifurcations`.
 """
 
+import math
+
 import numpy as np
 
 from survey.measures.cylinder import (
@@ -15,6 +17,7 @@ from survey.measures.cylinder import (
 )
 from survey.measures.cylinder.separatrices import SYSTEM
 from survey.measures.sampled import joined
+from survey.measures.tracks import Track
 from survey.scene import Output
 
 CLASSES = {
@@ -119,8 +122,10 @@ def _of_parameters(plane, find):
         if plane.square.across is None:
             counts = cycle_counts.on_lattice(plane)
             lost = cycle_counts.lost(plane, rows, counts)
-            folds = cycle_folds.found(plane, lost) if lost else ()
-            more = rows + [bifurcations.counted(plane, *row) for row in folds]
+            more = list(rows)
+            for fold in cycle_folds.found(plane, lost) if lost else ():
+                if not _is_there(plane, fold, rows):
+                    more.append(bifurcations.counted(plane, *fold))
             left = cycle_counts.lost(plane, more, counts)
             rows, missed = (more, len(left)) if len(left) < len(lost) else (rows, len(lost))
         else:
@@ -131,6 +136,17 @@ def _of_parameters(plane, find):
     curves.unexplained = missed
     curves.complete = False if missed and plane.square.across is not None else None
     return curves
+
+
+def _is_there(plane, fold, rows):
+    """Does the fold (a row) lie on one of the rows? Drawn twice it could count as often or not, and
+    so explain a segment that it does not.
+    """
+    own, *others = (
+        Track(x, *np.zeros((4, len(x))))
+        for x in (plane.square.positions(xy) for kind, xy, *_ in (fold, *rows) if kind == fold[0])
+    )
+    return any(own.within(other, math.inf) for other in others)
 
 
 def _on_border(plane, find, rows):

@@ -301,9 +301,9 @@ def _free_on_line(line, six):
             return b12 * np.sin(phi) + b31 * np.cos(phi) + side * b
 
         for phi in _crossings(line, w, extreme):
-            slope = b12 * np.cos(phi) - b31 * np.sin(phi)
+            slope, bend = b12 * np.cos(phi) - b31 * np.sin(phi), w(phi) - side * b
             across = 4.0 * ROUNDOFF * b * (2.0 + abs(phi))
-            yield _crossing(line, phi, w(phi), slope, 1.0, across, {})
+            yield _crossing(line, phi, w(phi), (slope, bend), (1.0, 0.0), across, {})
 
 
 def _levels_of(s):
@@ -372,9 +372,8 @@ def _levels_on_line(line, s):
                 across += abs(level.slope(x)) * ROUNDOFF * abs(phi)
                 if x == 0.0:
                     across = abs(row[eq.DG]) * (row[eq.BAR] + ROUNDOFF) ** 2
-                least = math.sqrt(across * abs(row[eq.DG])), math.sqrt(across)
-                by_phi, by_w = max(abs(level.slope(x)), least[0]), max(abs(v), least[1])
-                yield _crossing(line, phi, v, by_phi, by_w, across, known)
+                by_phi = level.slope(x), level.bend(x)
+                yield _crossing(line, phi, v, by_phi, (v, 1.0), across, known)
 
 
 def _crossings(line, w, nodes):
@@ -393,13 +392,24 @@ def _crossings(line, w, nodes):
 
 
 def _crossing(line, phi, w, by_phi, by_w, across, known):
-    """A row of `found`: the point of a curve of that gradient on the line; see `Window.error`."""
+    """A row of `found`: the point of a curve on the line, of that slope and bend along either axis;
+    see `Window.error`.
+    """
     if line.flat == 0:
-        xs, w, error = line.low[:1], np.array([w]), across / abs(by_w) / line.size[1]
+        xs, w, error = line.low[:1], np.array([w]), _farthest(across, *by_w) / line.size[1]
     else:
         xs = phi + TWO_PI * np.array(line.copies(phi, phi))
-        w, error = line.low[1], across / abs(by_phi) / line.size[0]
+        w, error = line.low[1], _farthest(across, *by_phi) / line.size[0]
     return "stable_manifold", line.parameters(xs, w), np.full(len(xs), error), known
+
+
+def _farthest(across, slope, bend):
+    """How far slope x + bend x^2 / 2 = +-across is from 0, next to it; where no x is, how far the
+    extremum may be.
+    """
+    least = math.sqrt(2.0 * across * abs(bend))
+    steep = max(abs(slope), least)
+    return 2.0 * across / max(steep + math.sqrt(max(steep * steep - least * least, 0.0)), TINY)
 
 
 class Level:
@@ -434,6 +444,17 @@ class Level:
             + c23 * np.cos(2.0 * phi)
             - s2 * np.cos(phi)
             + s3 * np.sin(phi)
+        )
+
+    def bend(self, x):
+        """V'' there."""
+        phi = self.angle + x
+        d, c23, s2, s3 = self.p[OF_G]
+        return (
+            d * np.cos(2.0 * phi)
+            - 2.0 * c23 * np.sin(2.0 * phi)
+            + s2 * np.sin(phi)
+            + s3 * np.cos(phi)
         )
 
     def reach(self):

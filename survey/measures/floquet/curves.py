@@ -407,7 +407,7 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
     if not start.size:
         return []
     parts = [np.array([[t, across]]) for t in start]
-    return _closed_in(
+    found = _closed_in(
         function,
         parts,
         np.zeros(len(parts), int),
@@ -415,6 +415,11 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
         0.5 / (lines - 1),
         tried[: len(tried) // 2],
     )
+    # one that the spline and a dip both show is found twice
+    found.sort(key=lambda one: one[0][0, 0])
+    position, error = (np.array([one[i].flat[0] for one in found]) for i in (0, 1))
+    keep = np.diff(position, prepend=-1.0) > error + np.append(0.0, error)[:-1]
+    return [one for one, good in zip(found, keep, strict=True) if good]
 
 
 def _dips(function, ticks, values, across):
@@ -438,7 +443,7 @@ def _dips(function, ticks, values, across):
         value[np.isnan(value)] = np.inf
         crossed = (value < 0.0).any(axis=1)
         for own, v in zip(t[crossed], value[crossed], strict=True):
-            k = np.flatnonzero((v[1:] < 0.0) != (v[:-1] < 0.0))
+            k = np.flatnonzero(((v[1:] < 0.0) != (v[:-1] < 0.0)) & np.isfinite(v[1:] + v[:-1]))
             found += list(own[k] + (own[k + 1] - own[k]) * v[k] / (v[k] - v[k + 1]))
         t, value, signs = t[~crossed], value[~crossed], signs[~crossed]
         rows, k = np.arange(len(t)), np.clip(value.argmin(axis=1), 1, PARTS - 1)

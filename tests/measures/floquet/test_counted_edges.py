@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import survey
+from survey.measures.floquet import curves
 from survey.request.workflow import check
 from survey.sweep import boundaries
 
@@ -196,3 +197,18 @@ def test_every_change_of_verdict_along_a_line_has_its_edge(along, ends, given, n
     near = abs(edge - narrow).argmin()
     assert abs(edge[near] - narrow) < 5e-5 and found.edge_class.values[near] == 4  # collision
     assert (np.diff(edge) > error[1:] + error[:-1]).all()  # none is there twice
+
+
+@pytest.mark.parametrize("hole", [0.0, 2e-4])
+def test_both_edges_of_a_narrow_tongue_are_found_once(hole):
+    """That a spline and a dip show alike; where the function is not finite none of them fails."""
+
+    def parabola(x):
+        value = (x[:, 0] - 0.5006) ** 2 - (4e-4) ** 2
+        return np.where(abs(x[:, 0] - 0.5006) < hole, np.nan, value), np.full(len(x), 1e-16)
+
+    x = np.stack([np.linspace(0.0, 1.0, 769), np.zeros(769)], axis=1)
+    found = curves._crossings(parabola, 1e-16, parabola(x)[0][:, None], across=0.0)
+    assert len(found) == 2 if hole == 0.0 else len(found) <= 2
+    for x, error in found:
+        assert min(abs(x[0, 0] - 0.5002), abs(x[0, 0] - 0.5010)) <= error[0] < 1e-9
