@@ -172,4 +172,4 @@ def seconds(axes):
     own = set(axes[:2])
     if own <= set(STATE):
         return 0.1
-    return 1.2 if len(axes) == 1 else 20.0 if own <= set(SYSTEM) else 30.0
+    return 1.4 if len(axes) == 1 else 20.0 if own <= set(SYSTEM) else 30.0

@@ -17,7 +17,7 @@ from survey.methods import taylor
 
 LINES = 33
 WITHIN = 1e-8  # of the map: what positions on a border may be off
-BESIDE = (0.2, 0.02, 0.002)  # of the gap to the next point of a curve
+BESIDE = (0.2, 0.02, 2e-3, 2e-4)  # of the gap to the next point of a curve
 HOPF = ("supercritical_hopf", "subcritical_hopf")
 OPTIONAL = ("homoclinic", "heteroclinic", "fold", "ends")
 WEIGHTS = {"cycle_fold": 2}
