@@ -320,7 +320,7 @@ def answered(call, markup=False):
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", "zoom:|concat:")
+            warnings.filterwarnings("ignore", "zoom:|concat:|counts:")
             warnings.filterwarnings("ignore", **OLDER)
             text = call()
     except SurveyError as refusal:

@@ -73,6 +73,7 @@ def test_dimensions_without_coordinates(samples):
         samples.survey.point(sample=3)
 
 
+@pytest.mark.filterwarnings("ignore:counts")  # that stacked points count twice: a line too
 @pytest.mark.parametrize("name", ["bodies", "samples", "grid"])
 @pytest.mark.parametrize(
     "ask",
