@@ -122,12 +122,14 @@ def _of_parameters(plane, find):
         if plane.square.across is None:
             counts = cycle_counts.on_lattice(plane)
             lost = cycle_counts.lost(plane, rows, counts)
-            more = list(rows)
-            for fold in cycle_folds.found(plane, lost) if lost else ():
-                if not _is_there(plane, fold, rows):
-                    more.append(bifurcations.counted(plane, *fold))
-            left = cycle_counts.lost(plane, more, counts)
-            rows, missed = (more, len(left)) if len(left) < len(lost) else (rows, len(lost))
+            folds = [
+                bifurcations.counted(plane, *fold)
+                for fold in cycle_folds.found(plane, lost)
+                if not _is_there(plane, fold, rows)
+            ]
+            if folds and len(left := cycle_counts.lost(plane, rows + folds, counts)) < len(lost):
+                rows, lost = rows + folds, left
+            missed = len(lost)
         else:
             rows, missed = _on_border(plane, find, rows)
     curves = joined(
@@ -153,18 +155,19 @@ def _on_border(plane, find, rows):
     """The rows, and along how many parts of the border that is asked for alone they do not explain
     the numbers of cycles; such parts are searched again, each as a map of its own.
     """
+    parts = cycle_counts.lost_on_border(plane, rows)
     for _ in range(SEARCHES):
-        parts = cycle_counts.lost_on_border(plane, rows, *cycle_counts.on_border(plane, rows))
-        known = len(rows)
+        before = len(rows)
         for low, high in parts:
             part = plane.part(low, high)
             recounted = (bifurcations.counted(part, *row) for row in find(part))
             rows += [
                 (kind, xy, error * (high - low), known) for kind, xy, error, known in recounted
             ]
-        if len(rows) == known:
+        if len(rows) == before:
             break
-    return rows, len(cycle_counts.lost_on_border(plane, rows, *cycle_counts.on_border(plane, rows)))
+        parts = cycle_counts.lost_on_border(plane, rows)
+    return rows, len(parts)
 
 
 def seconds(axes):

@@ -53,21 +53,6 @@ def lost(plane, rows, counts):
     ]
 
 
-def on_border(plane, rows):
-    """Ticks of the border that is asked for alone (m), of which some lie beside each point of the
-    curves on it, and the numbers of cycles of each kind (3, m) there, or UNKNOWN.
-
-    `rows` are those of `bifurcations.found`.
-    """
-    met = np.unique([position for _name, position, _known in _met(plane, rows)])
-    gaps = np.diff(np.concatenate([[0.0], met, [1.0]]))
-    shares = np.array(BESIDE)[:, None]
-    beside = np.concatenate([met - shares * gaps[:-1], met + shares * gaps[1:]]).ravel()
-    ticks = np.unique(np.concatenate([np.linspace(0.0, 1.0, LINES), beside]))
-    x = np.column_stack([ticks, np.full(ticks.size, plane.square.across)])
-    return ticks, np.array([_count(row) for row in plane.flows(x)]).T
-
-
 def _met(plane, rows):
     """[(name, position, known)] of the points on the border that is asked for alone."""
     value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
@@ -78,12 +63,12 @@ def _met(plane, rows):
     ]
 
 
-def lost_on_border(plane, rows, ticks, counts):
+def lost_on_border(plane, rows):
     """Parts (low, high) of the border that is asked for alone, along which points of the curves on
-    it do not explain the numbers of cycles, from `on_border`; `rows` are those of
-    `bifurcations.found`.
+    it do not explain the numbers of cycles; `rows` are those of `bifurcations.found`.
     """
     met = _met(plane, rows)
+    ticks, counts = _on_border(plane, met)
     parts = set()
     for kind, values in zip(KINDS, counts, strict=True):
         own = [(name, position) for name, position, known in met if _counts_for(kind, name, known)]
@@ -93,6 +78,19 @@ def lost_on_border(plane, rows, ticks, counts):
         (max(0.0, ticks[first] - WITHIN), min(1.0, ticks[last] + WITHIN))
         for first, last in sorted(parts)
     ]
+
+
+def _on_border(plane, met):
+    """Ticks of the border that is asked for alone (m), of which some lie beside each point of the
+    curves on it, `met` as by `_met`, and the numbers of cycles of each kind (3, m) there, or UNKNOWN.
+    """
+    met = np.unique([position for _name, position, _known in met])
+    gaps = np.diff(np.concatenate([[0.0], met, [1.0]]))
+    shares = np.array(BESIDE)[:, None]
+    beside = np.concatenate([met - shares * gaps[:-1], met + shares * gaps[1:]]).ravel()
+    ticks = np.unique(np.concatenate([np.linspace(0.0, 1.0, LINES), beside]))
+    x = np.column_stack([ticks, np.full(ticks.size, plane.square.across)])
+    return ticks, np.array([_count(row) for row in plane.flows(x)]).T
 
 
 def _count(row):
