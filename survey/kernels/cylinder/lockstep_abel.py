@@ -82,8 +82,8 @@ from survey.kernels.cylinder.steps import (
     conclude,
     crossing,
     finite,
+    node_possible,
     runs_into_node,
-    to_rest,
     to_target,
     trusted,
     unturned,
@@ -121,6 +121,33 @@ def _nearer(c, rise, dt, reach):
 
 
 @inline
+def _coast(w, change, distance):
+    """How long a distance takes from w on at a constant w' = `change`, if it is reached."""
+    square = w * w + 2.0 * change * distance
+    return 2.0 * distance / (w + math.sqrt(max(square, 0.0)) + 1e-300)
+
+
+@inline
+def _sine_cosine(x):
+    """`lockstep.sine_cosine` of any x."""
+    k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
+    return sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
+
+
+@inline
+def _functions(fixed, i, sine, cosine):
+    """f, g and g' of lane i."""
+    f = fixed[P12, i] * cosine - fixed[P31, i] * sine
+    g = fixed[P2, i] * cosine - fixed[P3, i] * sine - fixed[PD, i] * (sine * cosine)
+    dg = (
+        -fixed[PD, i] * ((cosine - sine) * (cosine + sine))
+        - fixed[P2, i] * sine
+        - fixed[P3, i] * cosine
+    )
+    return f, g, dg
+
+
+@inline
 def _at(_p, given, dt):
     """(psi, w, 0, 0) at dt of a step: stands for a method's `flow_at`."""
     psi, c = given
@@ -128,10 +155,26 @@ def _at(_p, given, dt):
     return psi + x, v, 0.0, 0.0
 
 
+@unroll
+def _slowing(c, dt):
+    """w and w' at dt."""
+    slope = [c[n] * float(n) for n in range(1, ORDER + 1)]
+    square = dt * dt
+    v, a = (polynomial(x[0::2], square) + polynomial(x[1::2], square) * dt for x in (c, slope))
+    return v, a
+
+
+@inline
+def _to_rest(_at, c, dt):
+    """The residual of w = 0, which is positive before."""
+    v, slope = _slowing(c, dt)
+    return v, slope, v > 0.0
+
+
 @kernel
-def _cross(T, state, before, fixed, i, reach, end, block, size):
+def _cross(T, state, before, fixed, i, reach, total, end, block, size):
     """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step;
-    there w = `end`.
+    there psi has risen by `total`, and w = `end`.
     """
     c, vary = coefficients(T, i), variations(T, i)
     psi, w, n, t, t_low = (
@@ -146,10 +189,14 @@ def _cross(T, state, before, fixed, i, reach, end, block, size):
         fixed[P12, i], fixed[P31, i], fixed[P2, i], fixed[P3, i], fixed[PD, i], fixed[PF, i], fixed[PG, i]
     )  # fmt: skip
     ends = last_terms(T, i)
-    bend = (end - w) / reach
+    # psi is nearly the cubic with these w, and these w', at both ends
+    bulge = 6.0 * total / reach - 3.0 * (w + end)
+    first, last = ((end - w) + bulge) / reach, ((end - w) - bulge) / reach
     for j in range(BLOCK):
         rise = max(block[GOAL + j] - psi, 0.0)
-        dt = min(2.0 * rise / (w + math.sqrt(max(w * w + 2.0 * bend * rise, 0.0)) + 1e-300), reach)
+        rest = max(total - rise, 0.0)
+        since, left = _coast(w, first, rise), _coast(end, -last, rest)
+        dt = max(min(since if rise < rest else reach - left, reach), 0.0)
         block[DT + j] = _nearer(c, rise, dt, reach)[0]
     for _ in range(NEWTON):
         for j in range(BLOCK):
@@ -160,7 +207,7 @@ def _cross(T, state, before, fixed, i, reach, end, block, size):
     for j in range(size):
         if not block[MISS + j] <= 0.0:
             given = (0.0, (psi, c), block[GOAL + j], True)
-            block[DT + j] = bracketed(to_target, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0),
+            block[DT + j] = bracketed(to_target, _at, given, block[DT + j], (0.0, reach), (1e-17 + 2e-16 * reach, 0.0),
                                      60)[1]  # fmt: skip
     for j in range(BLOCK):
         dt = block[DT + j]
@@ -168,8 +215,7 @@ def _cross(T, state, before, fixed, i, reach, end, block, size):
         x += psi
         a, b, d = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
         a += block[SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
-        k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
-        sine, cosine = sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
+        sine, cosine = _sine_cosine(x)
         f, g = p12 * cosine - p31 * sine, p2 * cosine - p3 * sine - pd * (sine * cosine)
         more = min(max((block[GOAL + j] - x) / max(v, 1e-300), -dt), reach - dt)
         v, dt = v + more * (f * v + g), dt + more
@@ -192,9 +238,14 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     turned = v1 <= 0.0
     if turned:
         c = coefficients(T, i)
-        given = (constant(q), (before[PSI, i], c), True)
         reach = bracketed(
-            to_rest, _at, given, 0.5 * reach, (0.0, reach), (1e-17 + 1e-16 * reach, 0.0), 60
+            _to_rest,
+            _at,
+            c,
+            reach * before[V, i] / (before[V, i] - v1),
+            (0.0, reach),
+            (1e-17 + 4e-16 * reach, 0.0),
+            60,
         )[1]
         x, v1 = _moved(c, reach)
         x1 = before[PSI, i] + x
@@ -214,7 +265,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
             count += 1
         for k in range(count, BLOCK):
             block[GOAL + k], block[SQUARE + k] = block[GOAL + count - 1], 0.0
-        _cross(T, state, before, fixed, i, reach, v1, block, count)
+        _cross(T, state, before, fixed, i, reach, x1 - before[PSI, i], v1, block, count)
         for k in range(count):
             row = floats[j]
             row[rc.VALUE], row[rc.TIME] = block[VALUE + k], block[TIMES + k]
@@ -333,15 +384,15 @@ def _calm(state, fixed, goal, doubt, started, calm):
     that w has risen.
     """
     for i in range(LANES):
-        v, square = state[V, i], state[SBB, i]
-        x = state[PSI, i] + state[TURNS, i] * TWO_PI
-        quiet = x + 1e-9 * (1.0 + abs(x)) < goal[i]
-        quiet = (
-            quiet
-            & (v * fixed[PF, i] > 0.3 * fixed[PG, i])
-            & (v * v > 9.0 * state[STEPS, i] * square)
-            & (v > 0.0)
+        psi, v, square = state[PSI, i], state[V, i], state[SBB, i]
+        x = psi + state[TURNS, i] * TWO_PI
+        sine, cosine = _sine_cosine(psi)
+        f, g, dg = _functions(fixed, i, sine, cosine)
+        no_node = (v * fixed[PF, i] > 0.3 * fixed[PG, i]) | (
+            not node_possible(f, g, dg, fixed[PF, i])
         )
+        quiet = x + 1e-9 * (1.0 + abs(x)) < goal[i]
+        quiet = quiet & no_node & (v * v > 9.0 * state[STEPS, i] * square) & (v > 0.0)
         calm[i] = (
             quiet & (doubt[i] < 0) & (state[SAA, i] < TRUST) & (square < (1.0 + v) * (1.0 + v))
         )

@@ -15,6 +15,7 @@ import math
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import settled
 from survey.kernels.cylinder.flow import (
+    BOUND_DDG,
     BOUND_DG,
     BOUND_F,
     BOUND_G,
@@ -279,11 +280,25 @@ def clean_turning(p, phi, bar_phi, bar_w):
     return g > 0.0 and 10.0 * (p[BOUND_DG] * bar_phi + p[BOUND_F] * bar_w) < g
 
 
+@inline
+def node_possible(f, g, dg, bend):
+    """Is what f, g and g' have to be where `node_ahead` finds a node true here? bend: a bound of
+    |f'| + |g''|, or less.
+
+    With the node at a distance x < 0.3, `settled` has bend x < |g'|/8 there, and less than 0.1 |f|: so up to it f, g
+    and g' keep their signs, g' changes by 1/8 and g/|g'| is x to a fifth.
+    """
+    return (f < 0.0) & (dg < 0.0) & (g > 0.0) & (g < -0.4 * dg) & (g * bend < 0.2 * dg * dg)
+
+
 @kernel
 def node_ahead(p, phi, w):
     """Distance to a stable node ahead that the solution at (phi, w > 0) certainly runs into without
     turning, or -1.
     """
+    f, g, dg = values(p, phi)
+    if not node_possible(f, g, dg, p[BOUND_F] + p[BOUND_DDG]):
+        return -1.0
     x = phi
     for _ in range(40):
         _f, g, dg = values(p, x)

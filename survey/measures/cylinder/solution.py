@@ -15,6 +15,7 @@ from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
 SHARE = 1e-3  # of the requested accuracy, for the truncation error of one step
+ABEL_SHARE = 1e-4  # the same over phi: errors grow as 1 / w before a turning point
 # the same for trajectories: most of what misses the accuracy misses it by little
 ATTEMPTS = (3e-4, 1e-5, 1e-7)
 FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
@@ -41,10 +42,10 @@ def rows(flows, phi0, w0):
     return np.column_stack([flows[:, : rc.SIX], phi0, w0, flows[:, rc.SIX :]])
 
 
-def tolerances(method, rtol):
+def tolerances(method, rtol, share=SHARE):
     """Truncation per step, for the first attempt and for the second."""
-    first = min(max(SHARE * rtol, method.FLOW_FINEST), 1e-6)
-    return first, max(1e-4 * first, method.FLOW_FINEST)
+    first = min(max(share * rtol, method.FLOW_FINEST), 1e-6)
+    return first, min(max(1e-7 * rtol, method.FLOW_FINEST), 1e-10)
 
 
 def attempts(method, rtol):
@@ -208,7 +209,7 @@ def _in_phi(method, rows, targets, rtol, by_row):
         solve(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return back(_repeated(run, np.isfinite(targets), tolerances(method, rtol), rtol))
+    return back(_repeated(run, np.isfinite(targets), tolerances(method, rtol, ABEL_SHARE), rtol))
 
 
 def _repeated(run, asked, ladder, rtol):
