@@ -10,9 +10,9 @@ with S = sin psi, C = cos psi,
 three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-Steps never depend on the requested times: those within a step are evaluated from its series, BLOCK
-at a time. Nor does any solution depend on its neighbours. A lane that has finished takes the next
-row.
+Steps never depend on the requested times: those within a step are evaluated from its series, the
+first of BLOCK lanes, then the second and so on. Nor does any solution depend on its neighbours. A
+lane that has finished takes the next row.
 """
 
 import math
@@ -64,13 +64,15 @@ STATE = 13
 # ... and of what it does not: the coefficients, their bounds, the next requested time, a.
 (P12, P31, PD, P2, P3, PF, PG, PDG, NEXT, TURN) = range(10)
 FIXED = 10
-ROWS = TABLE + 2 * STATE + FIXED + 1
+# Rows of what is found at a time in the step: is there one, when, and there psi, w and the squares of
+# their errors.
+(DUE, AFTER, PSI_AT, V_AT, SAA_AT, SBB_AT) = range(6)
+FOUND = 6
+ROWS = TABLE + 2 * STATE + FIXED + FOUND + 1
 
 # what a step has made of a lane, or the sum of both: it has passed its next time
 _PASSED, _LOST = 1.0, 2.0
-BLOCK = 8
-# Where the columns of a block begin; one flat array: LLVM sees that they do not overlap.
-_DT, _PSI, _V, _SAA, _SBB, _SIZE = range(0, 6 * BLOCK, BLOCK)
+BLOCK = 8  # lanes whose times are served together
 # Shorter steps have only a share of the tolerance, so that many short ones add up to what a few
 # long ones do.
 _SHORT = 1.0 / 8.0
@@ -193,16 +195,18 @@ def series(T, state, fixed):
 
 @inline
 def split(work):
-    """The parts of the work array: series, state, state before the step, what stays fixed, what
-    became of lanes.
+    """The parts of the work array: series, state, state before the step, what stays fixed, what is
+    found at a time, what became of lanes.
     """
     first, second = TABLE + STATE, TABLE + 2 * STATE
+    third = second + FIXED
     return (
         work[:TABLE],
         work[TABLE:first],
         work[first:second],
-        work[second : second + FIXED],
-        work[second + FIXED],
+        work[second:third],
+        work[third : third + FOUND],
+        work[third + FOUND],
     )
 
 
@@ -368,49 +372,63 @@ def _moved(c, dt):
     return (x * dt + c[0]) * dt, c[0] + v * dt
 
 
-@kernel
-def _evaluate(T, before, fixed, i, block):
-    """Fill the block: psi, w and the squares of their errors at its times DT in the step of lane i."""
-    c, vary, ends = coefficients(T, i), variations(T, i), last_terms(T, i)
-    psi, most_f, most_g = before[PSI, i], fixed[PF, i], fixed[PG, i]
-    carried = before[SAA, i], before[SAB, i], before[SBB, i]
-    for j in range(BLOCK):
-        dt = block[_DT + j]
-        x, v = _moved(c, dt)
-        saa, _sab, sbb = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
-        block[_PSI + j], block[_V + j], block[_SAA + j], block[_SBB + j] = psi + x, v, saa, sbb
+@inline
+def _passed(fate):
+    return fate == _PASSED or fate == _PASSED + _LOST
 
 
 @kernel
-def _record(T, state, before, fixed, i, block, times, first, floats, turnings):
-    """Record lane i at its times, from the `first` on, within the step; returns the next, or -1: a
-    bar is too wide.
+def _due(times, state, before, found, fate, row, column, first):
+    """Set DUE and AFTER of BLOCK lanes, from the `first` on, by whether their next time lies in the
+    step; does any?
     """
-    h, t, t_low, size = 1.0 / state[RATE, i], before[TIME, i], before[TIME_LOW, i], len(times)
-    n, turns, angle = state[STEPS, i], state[TURNS, i], fixed[TURN, i]
-    # then w is 0 at the start and nowhere else
-    from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0
-    known = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0
-    while first < size and (times[first] - t) - t_low < h:
-        count = 0
-        while count < BLOCK and first + count < size and (times[first + count] - t) - t_low < h:
-            block[_DT + count] = (times[first + count] - t) - t_low
-            count += 1
-        for j in range(count, BLOCK):
-            block[_DT + j] = 0.0
-        _evaluate(T, before, fixed, i, block)
-        for j in range(count):
-            v, wide, high = block[_V + j], bar(n, block[_SAA + j]), bar(n, block[_SBB + j])
-            if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
-                return -1
-            row = floats[first + j]
-            row[rc.PHI], row[rc.W] = (block[_PSI + j] + angle) + turns * TWO_PI, v
-            row[rc.PHI_BAR], row[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
-            sure = known and (abs(v) > high or from_rest)
-            passed = before[SIGN, i] * v < 0.0 and not from_rest
-            turnings[first + j] = int(before[COUNT, i]) + passed if sure else UNDETERMINED
-        first += count
-    return first
+    some = False
+    for i in range(first, first + BLOCK):
+        found[DUE, i] = found[AFTER, i] = 0.0
+        if row[i] >= 0 and _passed(fate[i]) and column[i] < times.shape[1]:
+            after = (times[row[i], column[i]] - before[TIME, i]) - before[TIME_LOW, i]
+            if after < 1.0 / state[RATE, i]:
+                found[DUE, i], found[AFTER, i], some = 1.0, after, True
+    return some
+
+
+@inline
+def _evaluate(T, before, fixed, found, first):
+    """Find psi, w and the squares of their errors AFTER the start of the step in BLOCK lanes."""
+    for j in range(BLOCK):
+        i = np.uint64(first + j)  # no index that may count from the end: else no vector code
+        dt = found[AFTER, i]
+        x, v = _moved(coefficients(T, i), dt)
+        carried = before[SAA, i], before[SAB, i], before[SBB, i]
+        jacobian = varied(variations(T, i), dt)
+        saa, _sab, sbb = ellipse(
+            carried, jacobian, dt, v, last_terms(T, i), fixed[PF, i], fixed[PG, i]
+        )
+        found[PSI_AT, i], found[V_AT, i] = before[PSI, i] + x, v
+        found[SAA_AT, i], found[SBB_AT, i] = saa, sbb
+
+
+@kernel
+def _note(state, before, fixed, found, fate, row, column, first, floats, turnings):
+    """Note what BLOCK lanes have found for their next times; those whose bars are too wide are lost."""
+    for i in range(first, first + BLOCK):
+        if found[DUE, i] == 0.0:
+            continue
+        n, turns, angle, v = state[STEPS, i], state[TURNS, i], fixed[TURN, i], found[V_AT, i]
+        wide, high = bar(n, found[SAA_AT, i]), bar(n, found[SBB_AT, i])
+        if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
+            fate[i] = _LOST
+            continue
+        # then w is 0 at the start and nowhere else
+        from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0
+        known = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0
+        sure = known and (abs(v) > high or from_rest)
+        passed = before[SIGN, i] * v < 0.0 and not from_rest
+        own = floats[row[i], column[i]]
+        own[rc.PHI], own[rc.W] = (found[PSI_AT, i] + angle) + turns * TWO_PI, v
+        own[rc.PHI_BAR], own[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
+        turnings[row[i], column[i]] = int(before[COUNT, i]) + passed if sure else UNDETERMINED
+        column[i] += 1
 
 
 @kernel
@@ -435,25 +453,18 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
 
 
 @kernel
-def _collect(
-    T, times, limit, state, before, fixed, fate, block, row, column, floats, turnings, status
-):
-    """Record what the lanes have passed and free those that have ended; returns whether any has."""
+def _free(times, limit, state, fixed, fate, row, column, status):
+    """Free the lanes that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
         if row[i] < 0 or (fate[i] == 0.0 and state[STEPS, i] < limit):
             continue
-        r, ending = row[i], -1
-        if fate[i] == _PASSED or fate[i] == _PASSED + _LOST:
-            j = _record(
-                T, state, before, fixed, i, block, times[r], column[i], floats[r], turnings[r]
-            )
-            if j < 0:
-                ending = NO_CONVERGENCE
-            elif j == times.shape[1] or not math.isfinite(times[r, j]):
+        r, j, ending = row[i], column[i], -1
+        if _passed(fate[i]):
+            if j == times.shape[1] or not math.isfinite(times[r, j]):
                 ending = OK
             else:
-                column[i], fixed[NEXT, i] = j, times[r, j]
+                fixed[NEXT, i] = times[r, j]
         if ending < 0 and fate[i] >= _LOST:
             ending = NO_CONVERGENCE if math.isfinite(state[V, i]) else OVERFLOW
         if ending < 0 and state[STEPS, i] >= limit:
@@ -481,28 +492,18 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     lanes, free ones too.
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
-    T, state, before, fixed, fate = split(work)
+    T, state, before, fixed, found, fate = split(work)
     tolerance = min(tolerance, COARSEST)
-    row, column, block = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64), np.zeros(_SIZE)
+    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
     waiting, steps = _refill(P, starts, times, waiting, state, fixed, row, column, status), 0
     while busy(row):
         step(T, state, before, fixed, fate, tolerance)
         steps += LANES
-        if _collect(
-            T,
-            times,
-            limit,
-            state,
-            before,
-            fixed,
-            fate,
-            block,
-            row,
-            column,
-            floats,
-            turnings,
-            status,
-        ):
+        for first in range(0, LANES, BLOCK):
+            while _due(times, state, before, found, fate, row, column, first):
+                _evaluate(T, before, fixed, found, first)
+                _note(state, before, fixed, found, fate, row, column, first, floats, turnings)
+        if _free(times, limit, state, fixed, fate, row, column, status):
             waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
     return steps

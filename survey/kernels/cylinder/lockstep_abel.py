@@ -408,7 +408,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     first.
     """
     work, block = np.zeros((ROWS, LANES)), np.zeros(_SIZE)
-    T, state, before, fixed, fate = split(work)
+    T, state, before, fixed, _found, fate = split(work)
     axes = np.zeros((LANES, BOUND_DDG + 1))  # coefficients and bounds in the axes of the lane
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
