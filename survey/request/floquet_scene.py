@@ -1,21 +1,26 @@
 """The scene of a user's A(t, p), or M, C, K: what a module of `survey.scenes` offers, as an object."""
 
+import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from survey.errors import BadInput
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.compile_ahead import compile_ahead
 from survey.measures.floquet.halves import alike_or_opposite
 from survey.measures.floquet.system import System
+from survey.request.function_scene import refusal
 from survey.request.traced_scene import TracedScene, rebinds
 from survey.scene import plus_minus
 
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
 NODES = 1500  # that a map asks for, roughly
+STRUCTURES = ("symplectic", "reversible")  # by which stable points can be told
+SOME = 4  # points at which one is tried
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
 STATUS = {
     "invalid_parameters": "outside the domain, or A or T is not finite there, or A does not have the stated structure",
@@ -223,9 +228,10 @@ class FloquetScene(TracedScene):
                 f"a branch of the code changes within a period at {self._where(given[known[i]])}",
                 "name the times in BREAKS",
             )
+        traceless = len(groups) > 0
         for own, programs in groups:
             for i in known[own]:
-                self._compare(programs, given[i], period[i], edges[i])
+                traceless &= self._compare(programs, given[i], period[i], edges[i])
         if self.conserved is not None:
             self._check_conserved(given[known])
         known = self._called(monodromy.SystemPoints, system, given)
@@ -236,10 +242,36 @@ class FloquetScene(TracedScene):
                 f"A has a spike near t = {spikes[i]:.6g} at {self._where(given[i])}, too narrow to be seen in a run",
                 "name its position in BREAKS",
             )
+        if traceless:
+            self._suggest_structure(given[:SOME])
+
+    def _suggest_structure(self, points):
+        """Say, once, which structure fits a system without one whose trace is 0: none of its points
+        is found stable.
+        """
+        if self.structure != "none" or self.conserved is not None or "suggested" in self._known:
+            return
+        self._known["suggested"] = 1.0
+        fitting = [name for name in STRUCTURES if self._fits(name, points)]
+        if fitting:
+            what = "the trace of A is 0: the multipliers have the product 1, and no point can be found stable"
+            which = " or ".join(f"'{name}'" for name in fitting)
+            remedy = f"set STRUCTURE = {which}, which the system is at the points tried"
+            logging.getLogger("survey").warning(str(refusal(self.NAME, f"{what}; {remedy}")))
+
+    def _fits(self, structure, points):
+        """Does A have this structure at these points (N, n)?"""
+        if structure == "symplectic" and len(self.states) % 2:
+            return False
+        try:
+            replace(self, structure=structure, _known={}).check(points)
+        except BadInput:
+            return False
+        return True
 
     def _compare(self, programs, point, period, edges):
         """Refuse what the recorded operations show: another value than the code's, no period, no
-        structure.
+        structure; is the trace of A 0 throughout?
         """
         n = len(self.states)
         size = 0.0
@@ -271,6 +303,8 @@ class FloquetScene(TracedScene):
             self._check_reversible(programs, point, edges, size)
         if len(programs) == 1:
             self._check_period(point, period, size)
+        trace = np.trace(np.concatenate(recorded), axis1=1, axis2=2)
+        return bool((abs(trace) <= SAME * size).all())
 
     def _check_filled(self, given, period):
         """Refuse matrices that stay 0, and states of which nothing depends and that depend on nothing."""

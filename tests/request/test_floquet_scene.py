@@ -303,6 +303,27 @@ def test_reversible_systems_of_one_coordinate_are_stable_on_the_circle():
     assert ds.verdict.values.tolist() == known.verdict.values.tolist() == [1, 0]
 
 
+@pytest.mark.parametrize(
+    ("matrices", "fitting"),
+    [
+        ({"K": K}, "'symplectic' or 'reversible'"),
+        ({"K": lambda t, p, out: out.__setitem__((0, 0), p[0] + math.cos(2 * t) + 0.3 * math.sin(4 * t))},
+         "'symplectic'"),
+        ({"K": K, "C": C}, None),
+    ],
+)  # fmt: skip
+def test_a_structure_that_fits_is_named_once(matrices, fitting, caplog):
+    given = {name: matrices.get(name) for name in ("K", "C")}
+    own = scene(**given)
+    for a in (2.2, 2.5):
+        ds = survey.evaluate(own, delta=a, epsilon=0.1, zeta=0.05)
+        assert int(ds.verdict) == (-1 if fitting else 1)
+    said = [record.getMessage() for record in caplog.records]
+    assert len(said) == bool(fitting)
+    if fitting:
+        assert f"set structure = {fitting}, which the system is" in said[0]
+
+
 def test_a_file_may_name_what_is_conserved(tmp_path):
     """Two free masses, damped by their relative motion: s' = w - u, and u + w stays the same."""
     path = tmp_path / "free.py"
