@@ -313,6 +313,42 @@ def bound_circle(p):
 
 
 @kernel
+def _periodic(p, angles):
+    """Are f and g the same, within their rounding, at these angles and 2 pi further on?"""
+    near, far = np.empty((_count(p, SLOTS), 1, 2)), np.empty((_count(p, SLOTS), 1, 2))
+    for phi in angles:
+        ball(p, phi, 0.0, 1, near)
+        ball(p, phi + 2.0 * math.pi, 0.0, 1, far)
+        for at, steep in ((int(p[F_AT]), p[BOUND_F]), (int(p[G_AT]), p[BOUND_DG])):
+            most = 2.0 * (near[at, 0, 1] + far[at, 0, 1]) + 4e-15 * steep
+            if not abs(near[at, 0, 0] - far[at, 0, 0]) <= most:
+                return False
+    return True
+
+
+@kernel
+def complete(rows, angles):
+    """Fill in AT_REST and, on a circle, the bounds of programs; NaN where a number is not finite, or
+    f and g have no bounds or, by these angles, not the period 2 pi.
+    """
+    for p in rows:
+        good = True
+        for k in range(OPERATIONS, len(p)):
+            good &= math.isfinite(p[k])
+        if good:
+            B, g = np.empty((_count(p, SLOTS), 1, 2)), int(p[G_AT])
+            ball(p, 0.0, 0.0, 1, B)
+            p[AT_REST] = 1.0 if B[g, 0, 0] == 0.0 and B[g, 0, 1] == 0.0 else 0.0
+            if p[ON_CIRCLE] > 0.0:
+                bound_circle(p)
+                for k in range(_BOUNDS):
+                    good &= math.isfinite(p[BOUND_F + k])
+                good = good and _periodic(p, angles)
+        if not good:
+            p[:] = math.nan
+
+
+@kernel
 def bound_near(p, phi):
     """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they
     are not finite.

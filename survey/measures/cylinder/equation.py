@@ -1,10 +1,11 @@
 """A user's f(phi, p), g(phi, p) as a program of `kernels.cylinder.program`, one for each set of
 parameters.
 
-Each function is run once at every set of parameters, as Python: phi is a record of operations, the
-parameters are numbers of 128 bits. So what depends on parameters alone may branch and loop; what
-depends on phi must be analytic: + - * / ** and the functions in `FUNCTIONS`. Numbers in the code
-are taken as exact binary64 numbers.
+Each function is run as Python: phi is a record of operations, the parameters are numbers of 128
+bits. So what depends on parameters alone may branch and loop; what depends on phi must be analytic:
++ - * / ** and the functions in `FUNCTIONS`. Numbers in the code are taken as exact binary64
+numbers. Where the code takes the same path at other sets of parameters, its record serves them,
+with their numbers (see `numbers`).
 """
 
 from functools import lru_cache
@@ -12,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from survey.kernels.cylinder import program as pg
+from survey.measures.cylinder.numbers import Number, Steps
 from survey.measures.hill import multiprecision
 from survey.measures.hill.multiprecision import LOCK, Unsupported
 
@@ -19,6 +21,7 @@ FUNCTIONS = {name: getattr(pg, name.upper()) for name in (
     "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log sqrt erf"
 ).split()}  # fmt: skip
 MOST = 2000  # operations
+MOST_PATHS = 16  # through the code of f and g that are kept
 HIGHEST = 64  # the largest exponent that is multiplied out
 SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is checked
 
@@ -86,8 +89,11 @@ class AngleRecord:
     does not enter.
     """
 
-    def __init__(self):
+    def __init__(self, point):
         self.mp = multiprecision.context()
+        self.steps = Steps(self.mp, point)
+        self.numbers = {}
+        self.raised = False
         self.operations = [(-1, 0, 0, 0.0)]
         self._places = {}
         self._slopes = {}
@@ -96,17 +102,23 @@ class AngleRecord:
 
     def __getattr__(self, name):
         plain = getattr(self.mp, name)
-        return lambda *given: (
-            self._call(name, plain, given)
-            if any(isinstance(x, Angle) for x in given)
-            else plain(*given)
-        )
+        if not callable(plain):
+            return plain
+
+        def called(*given):
+            if any(isinstance(x, Angle) for x in given):
+                return self._call(name, given)
+            if any(isinstance(x, Number) for x in given):
+                return self.steps.number(plain, *given)
+            return plain(*given)
+
+        return called
 
     def mpf(self, x):
-        """A number with more digits; what depends on phi stays as it is."""
-        return x if isinstance(x, Angle) else self.mp.mpf(x)
+        """A number with more digits; what depends on phi, or on the parameters, stays as it is."""
+        return x if isinstance(x, (Angle, Number)) else self.mp.mpf(x)
 
-    def _call(self, name, plain, given):
+    def _call(self, name, given):
         if name == "power":
             return self.power(*given)
         if name in FUNCTIONS and len(given) == 1:
@@ -127,6 +139,10 @@ class AngleRecord:
 
     def with_number(self, code, number, at=None, first=None):
         """An operation with a number; the rest that binary64 does not hold stands where no operand does."""
+        if isinstance(number, Number):
+            made = self.index(code, first or 0, at or 0, ("of", number.at))
+            self.numbers[made.index] = (number, pg.FIRST if first is None else pg.SECOND)
+            return made
         number = self.mp.nan if isinstance(number, self.mp.mpc) else self.mp.mpf(number)
         rounded = float(number)
         missed = abs(float(number - rounded)) * (1 + 1e-15) if self.mp.isfinite(number) else 0.0
@@ -149,7 +165,7 @@ class AngleRecord:
     def difference(self, x, y):
         """x - y."""
         if not isinstance(y, Angle):
-            return self.sum(x, -self.mp.mpf(y))
+            return self.sum(x, -self.mpf(y))
         if not isinstance(x, Angle):
             return self.with_number(pg.FROM, x, first=y.index)
         return self.index(pg.SUBTRACT, x.index, y.index)
@@ -165,7 +181,7 @@ class AngleRecord:
     def quotient(self, x, y):
         """x / y."""
         if not isinstance(y, Angle):
-            return self.product(x, 1 / self.mp.mpf(y))
+            return self.product(x, 1 / self.mpf(y))
         if not isinstance(x, Angle):
             return self.with_number(pg.OVER, x, at=y.index)
         return self.index(pg.DIVIDE, x.index, y.index)
@@ -173,9 +189,9 @@ class AngleRecord:
     def power(self, x, y):
         """x^y: products where y is a whole number up to HIGHEST."""
         if isinstance(y, Angle):
-            log = self.function(pg.LOG, x) if isinstance(x, Angle) else self.mp.log(x)
+            log = self.function(pg.LOG, x) if isinstance(x, Angle) else self.log(self.mpf(x))
             return self.function(pg.EXP, self.product(y, log))
-        y = self.mp.mpf(y)
+        y = self.mpf(y)
         if y == int(y) and abs(y) <= HIGHEST:
             return self._whole(x, int(y))
         if y == self.mp.mpf(0.5):
@@ -219,6 +235,7 @@ class AngleRecord:
             return None
         if code in (pg.PLUS, pg.FROM, pg.TIMES):
             inner = self.slope(first)
+            number = self.numbers[index][0] if index in self.numbers else number
             factor = {pg.PLUS: 1, pg.FROM: -1, pg.TIMES: number}[code]
             return None if inner is None else self.product(inner, factor)
         if code in (pg.ADD, pg.SUBTRACT):
@@ -289,7 +306,7 @@ def recorded(function, name, record, p):
     """The index of the function's value; None where it has none; raises Unsupported or Raised."""
     try:
         value = multiprecision.lift(function, record)(record.angle, p)
-        if not isinstance(value, (bool, int, float, Angle, record.mp.mpf, record.mp.mpc)):
+        if not isinstance(value, (bool, int, float, Angle, Number, record.mp.mpf, record.mp.mpc)):
             raise Unsupported(f"it returns {type(value).__name__}, which is not a real number")
         return record.constant(value).index
     except Unsupported as error:
@@ -297,40 +314,80 @@ def recorded(function, name, record, p):
     except NameError as error:  # a builtin that numbers with more digits have not
         raise Unsupported(f"{name}(phi, p): it uses {error.name}") from None
     except ArithmeticError:
+        record.raised = True
         return record.constant(np.nan).index
     except Exception as error:
         raise Raised(name) from error
 
 
-@lru_cache(maxsize=4096)
+class Template:
+    """The programs of f and g on one path through their code, recorded at the parameters `point`."""
+
+    def __init__(self, f, g, point, on_circle):
+        record = AngleRecord(point)
+        found = [
+            recorded(h, name, record, record.steps.parameters) for h, name in ((f, "f"), (g, "g"))
+        ]
+        forces = len(record.operations)
+        dg = record.slope(found[1])
+        slope = record.constant(0 if dg is None else dg).index
+        self._steps, self._numbers = record.steps, record.numbers
+        # a function without a value has ended before all decisions were met
+        self.shared = not record.raised
+        table = np.array([(*rest, 0.0 if isinstance(number, tuple) else number) for *rest, number in record.operations],
+                         dtype=float)  # fmt: skip
+        self._row = np.zeros(pg.OPERATIONS + table.size)
+        self._row[pg.OPERATIONS :] = table.ravel()
+        self._row[[pg.REVERSED, pg.ON_CIRCLE, pg.MIRRORED]] = 1.0, on_circle, 1.0
+        self._row[[pg.SLOTS, pg.FORCES, pg.F_AT, pg.G_AT, pg.DG_AT]] = (
+            len(table),
+            forces,
+            *found,
+            slope,
+        )
+        self._row[pg.RADIUS] = 1e300 if on_circle else 1.0
+
+    def serve(self, points, which, found):
+        """Add to `found` (which points, their rows of a flow, less the initial states) for those of
+        `which` that take this path; returns the others.
+        """
+        wanted = [number for number, _column in self._numbers.values()]
+        fits, values = self._steps.again(points[which], wanted)
+        some = np.flatnonzero(fits)
+        rows = np.tile(self._row, (some.size, 1))
+        for (index, (_number, column)), own in zip(self._numbers.items(), values, strict=True):
+            at = pg.OPERATIONS + pg.WIDTH * index
+            rounded = [_rounded(own[i]) for i in some]
+            rows[:, [at + pg.NUMBER, at + column]] = np.reshape(rounded, (-1, 2))
+        if some.size:
+            found.append((which[some], rows))
+        return which[~np.array(fits, bool)]
+
+
+def _rounded(x):
+    """The number in binary64, and a bound of what that misses; NaN for complex numbers."""
+    if type(x) is float:
+        return x, 0.0
+    if not hasattr(x, "_mpf_"):
+        return np.nan, np.nan
+    rounded = float(x)
+    return rounded, abs(float(x - rounded)) * (1 + 1e-15) if np.isfinite(rounded) else 0.0
+
+
+@lru_cache(maxsize=64)
+def _templates(f, g, on_circle):
+    """The Templates of f and g so far: a list."""
+    return []
+
+
 def program(f, g, point, on_circle):
-    """The row of a flow, less its initial state, for the parameters `point` (a tuple); see
+    """The row of a flow, less its initial state, for the parameters `point` (n); see
     `kernels.cylinder.program`.
 
     NaN where f or g has no value, or not the period 2 pi although `on_circle`. Raises Unsupported
     or Raised.
     """
-    with LOCK:
-        record = AngleRecord()
-        p = [record.mp.mpf(value) for value in point]
-        found = [recorded(h, name, record, p) for h, name in ((f, "f"), (g, "g"))]
-        forces = len(record.operations)
-        dg = record.slope(found[1])
-        slope = record.constant(0 if dg is None else dg).index
-    table = np.array(record.operations, dtype=float)
-    row = np.zeros(pg.OPERATIONS + table.size)
-    row[pg.OPERATIONS :] = table.ravel()
-    row[[pg.REVERSED, pg.ON_CIRCLE, pg.MIRRORED]] = 1.0, on_circle, 1.0
-    row[[pg.SLOTS, pg.FORCES, pg.F_AT, pg.G_AT, pg.DG_AT]] = len(table), forces, *found, slope
-    row[pg.RADIUS] = 1e300 if on_circle else 1.0
-    if not np.isfinite(table).all():
-        return np.full_like(row, np.nan)
-    row[pg.AT_REST] = (balls(row, 0.0)[found[1]] == 0.0).all()
-    if on_circle:
-        pg.bound_circle(row)
-        if not np.isfinite(row[pg.BOUND_F : pg.BOUND_DDG + 1]).all() or not periodic(row):
-            return np.full_like(row, np.nan)
-    return row
+    return flows(f, g, np.array(point, dtype=float)[None], on_circle)[0]
 
 
 def balls(row, phi):
@@ -342,26 +399,27 @@ def balls(row, phi):
     return out[:, 0]
 
 
-def periodic(row):
-    """Are f and g at angles, and 2 pi further on, the same within their rounding?"""
-    for phi in SAMPLES:
-        near, far = balls(row, phi), balls(row, phi + 2.0 * np.pi)
-        for at, steep in ((pg.F_AT, pg.BOUND_F), (pg.G_AT, pg.BOUND_DG)):
-            one, two = near[int(row[at])], far[int(row[at])]
-            if not abs(one[0] - two[0]) <= 2.0 * (one[1] + two[1]) + 4e-15 * row[steep]:
-                return False
-    return True
-
-
 def flows(f, g, points, on_circle):
     """The programs (N, n) of the parameters (N, m), padded to one length; NaN where there is none."""
-    own, where = np.unique(points, axis=0, return_inverse=True)
-    found = [
-        program(f, g, tuple(point.tolist()), on_circle)
-        if np.isfinite(point).all()
-        else np.full(pg.OPERATIONS, np.nan)
-        for point in own
-    ]
-    longest = max(map(len, found), default=pg.OPERATIONS)
-    padded = np.array([np.pad(row, (0, longest - len(row))) for row in found]).reshape(-1, longest)
-    return padded[where.reshape(-1)]
+    own, where = np.unique(np.asarray(points, dtype=float), axis=0, return_inverse=True)
+    left = np.flatnonzero(np.isfinite(own).all(axis=1))
+    found = []
+    with LOCK:
+        known = _templates(f, g, on_circle)
+        for template in known:
+            left = template.serve(own, left, found)
+        while left.size:
+            template = Template(f, g, own[left[0]], on_circle)
+            if template.shared:
+                known.append(template)
+                del known[:-MOST_PATHS]
+                left = template.serve(own, left, found)
+            else:
+                template.serve(own, left[:1], found)
+                left = left[1:]
+    longest = max((rows.shape[1] for _, rows in found), default=pg.OPERATIONS)
+    out = np.full((len(own), longest), np.nan)
+    for served, rows in found:
+        pg.complete(rows, SAMPLES)
+        out[served] = np.pad(rows, ((0, 0), (0, longest - rows.shape[1])))
+    return out[where.reshape(-1)]
