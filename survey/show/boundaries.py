@@ -24,7 +24,10 @@ CURVES = {
     "even_antiperiodic": (_EDGES, {"color": "#000000", "ls": (0, (5, 2)), "lw": 0.8}),
     "odd_antiperiodic": (_EDGES, {"color": "#707070", "ls": (0, (5, 2)), "lw": 0.8}),
     "plus_one": ("a multiplier passes 1", {"color": "#000000", "ls": "-", "lw": 1.0}),
-    "minus_one": ("a multiplier passes -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0}),
+    "minus_one": (
+        "a multiplier passes \N{MINUS SIGN}1",
+        {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0},
+    ),
     "neimark_sacker": (
         "a complex pair passes the circle",
         {"color": "#D40000", "ls": "-", "lw": 1.2},
