@@ -124,8 +124,7 @@ def title_of(ds, variable):
     """
     title = literal(ds.attrs.get("title", ""))
     name = literal(variable.attrs.get("long_name", variable.name))
-    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
-    fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
+    fixed = fixed_numbers(ds, variable)
     position = {name: f" ({_position(ds[name], c)} of {ds.sizes[name]})"
                 for name, c in variable.coords.items() if c.ndim == 0 and ds.sizes.get(name, 1) > 1}  # fmt: skip
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
@@ -143,6 +142,12 @@ def title_of(ds, variable):
     lines[-1] += f" ({words})" if words and words not in title else ""
     lines = [printed(line) for line in lines]
     return "\n".join([*lines, numbers] if numbers else lines)
+
+
+def fixed_numbers(ds, variable):
+    """The fixed parameters that a title names: those of axes, and others that are not zero."""
+    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
+    return [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
 
 
 def options_in_words(ds):
