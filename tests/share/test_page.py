@@ -608,7 +608,7 @@ def test_a_map_of_three_axes_shows_a_plane_and_says_which(tmp_path):
     for at, chosen, r in (({}, {"r": "0.0"}, "0"), ({"r": "2"}, {}, "2")):
         told = page.write(three, tmp_path / "map.html", at)
         assert told["plane"] == chosen
-        subtitle = f"satellite, oblate, r = {r}: each point shown"
+        subtitle = f"satellite, oblate, r = {r}: "
         assert subtitle in (tmp_path / "map.html").read_text()
 
 
