@@ -603,7 +603,7 @@ def test_a_map_of_three_axes_shows_a_plane_and_says_which(tmp_path):
         body="oblate",
         rho=xr.DataArray(np.linspace(0.6, 2.0, 5), dims="rho"),
     )
-    three = xr.concat([ds, 0 * ds + ds], "r").assign_coords(r=("r", [0.0, 2.0]))
+    three = xr.concat([ds, ds], "r").assign_coords(r=("r", [0.0, 2.0]))
     three = three.transpose("k", "rho", "r").assign_attrs(ds.attrs)
     for at, chosen, r in (({}, {"r": "0.0"}, "0"), ({"r": "2"}, {}, "2")):
         told = page.write(three, tmp_path / "map.html", at)
