@@ -36,8 +36,11 @@ CURVES = {
         "multipliers collide on the circle",
         {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2},
     ),
-    "A": ("A: multipliers meet at -1", {"color": "#000000", "ls": "-", "lw": 1.2}),
-    "B": ("B: multipliers meet at -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2}),
+    "A": ("A: multipliers meet at \N{MINUS SIGN}1", {"color": "#000000", "ls": "-", "lw": 1.2}),
+    "B": (
+        "B: multipliers meet at \N{MINUS SIGN}1",
+        {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2},
+    ),
     "KC": ("KC: two pairs meet on the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "critical_rate": ("critical rate of the rotation", {"ls": "-"} | _PALE),
     "equal_moments": (
