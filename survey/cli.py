@@ -505,6 +505,9 @@ def share(path, output, at, trust_scene):
         else f"of points: {written['why']}"
     )
     err.print(plain(f"{target}: {written['bytes']:,} bytes, {how}"), markup=False)
+    if written["plane"]:
+        plane = ", ".join(f"{name} = {value}" for name, value in written["plane"].items())
+        err.print(plain(f"the page shows the plane {plane}; --at chooses another"), markup=False)
     if written["left_out"]:
         err.print(written["left_out"], markup=False)
     out.print(plain(target), markup=False)

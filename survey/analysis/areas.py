@@ -25,6 +25,7 @@ def of_map(ds):
     if "verdict" not in ds:
         raise BadInput("this survey has no verdict, so there are no areas of it")
     refuse_members(ds, "areas")
+    refuse_names(ds, "areas")
     if not ds.status.dims or min(ds.status.shape) < 2:
         raise BadInput("areas: every axis needs two values or more; remove the others with slice")
     for dim in ds.status.dims:
@@ -60,6 +61,16 @@ def refuse_members(ds, what, remedy="use counts()"):
             raise BadInput(
                 f"{what}: {dim} only counts points, of {', '.join(map(str, along))}: "
                 f"they do not lie on a grid; {remedy}"
+            )
+
+
+def refuse_names(ds, what):
+    """Raise BadInput where an axis is one of names, such as those of bodies."""
+    for dim in ds.status.dims:
+        if dim in ds.coords and ds[dim].dtype.kind in "UO":
+            raise BadInput(
+                f"{what}: {dim} is an axis of names, and nothing lies between them; choose one of them with "
+                f"ds.sel({dim}=...), or use counts()"
             )
 
 

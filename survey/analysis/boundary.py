@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from survey import modules
-from survey.analysis.areas import refuse_members
+from survey.analysis.areas import refuse_members, refuse_names
 from survey.errors import BadInput
 from survey.file import schema
 from survey.file.labels import flag_codes
@@ -25,6 +25,7 @@ def find(ds, kind=None, index=None):
         found = _undecided_cells(ds)
     else:
         refuse_members(ds, "boundary")
+        refuse_names(ds, "boundary")
         found = _between_points(ds)
     for name, value in (("kind", kind), ("index", index)):
         if value is not None and name not in found:

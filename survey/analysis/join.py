@@ -244,12 +244,22 @@ def _differ(one, other, axis):
             i = tuple(int(k) for k in np.argwhere(~agree)[0])
             value = shown(one[axis].values[i[variable.dims.index(axis)]])
             bars = f"{name}_error" in one
+            both = f"{_named(one[name], a[i])} and {_named(other[name], b[i])}"
             raise BadInput(
                 f"concat: the surveys have different values at common points, such as {axis} = {value}, where {name} "
-                f"is {shown(a[i])} and {shown(b[i])}{', beyond the error bars' if bars else ''}; leave these points "
-                "out of one of the surveys, with ds.sel, or solve both again with one version"
+                f"is {both}{', beyond the error bars' if bars else ''}; leave these points out of one of the surveys, "
+                "with ds.sel, or solve both again with one version"
             )
     return differ
+
+
+def _named(variable, value):
+    """The value as messages show it: a flag by its meaning, as verdicts and statuses are."""
+    if "flag_values" not in variable.attrs:
+        return shown(value)
+    return next(
+        (word for word, code in flag_codes(variable.attrs).items() if code == value), shown(value)
+    )
 
 
 def _within(one, other, name, a, b):

@@ -38,7 +38,7 @@ def nearest(ds, coords):
     missing = [dim for dim in ds.status.dims if dim not in indices and ds.sizes[dim] > 1]
     if missing:
         raise BadInput(
-            f"{missing[0]} is missing: a point needs a number for each of {', '.join(ds.status.dims)}"
+            f"{missing[0]} is missing: a point needs one value of each of {', '.join(ds.status.dims)}"
         )
     indices |= {dim: 0 for dim in ds.status.dims if dim not in indices}
     return of_points(ds).isel(indices)

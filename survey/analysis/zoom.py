@@ -70,7 +70,13 @@ def _of_names(ds, ranges, num, output):
 
 def _ranges(ds, ranges):
     """{axis: (low, high)}; raises BadInput for an unknown axis or an invalid range."""
-    axes = [dim for dim in ds.status.dims if dim in ds.coords]
+    given = [dim for dim in ds.status.dims if dim in ds.coords]
+    axes = [dim for dim in given if ds[dim].dtype.kind in "iuf"]
+    for name in given:
+        if name not in axes and (name in ranges or not axes):
+            raise BadInput(
+                f"zoom: {name} is an axis of names, and nothing lies between them; survey.evaluate solves further ones"
+            )
     if not axes:
         refuse_members(ds, "zoom", "survey.evaluate solves further ones")
         raise BadInput(

@@ -84,7 +84,9 @@ def refuse(path, found, workflow, code, scene_hash):
             f"from another version of the code ({', '.join(other) or 'its sources differ'})"
         )
     extend = (
-        f", or extend it with --reuse {path}" if _has_values_for(found, workflow, causes) else ""
+        f", or extend it with --reuse {path}, which says if values can be taken"
+        if _has_values_for(found, workflow, causes)
+        else ""
     )
     points = found.get("points")
     many = f" of {points:,} points" if isinstance(points, (int, np.integer)) else ""

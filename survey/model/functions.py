@@ -39,8 +39,8 @@ def of(workflow, names, fixed):
     maker = {"hill": _hill, "danby": _danby, "floquet": _floquet}.get(workflow.scene.FAMILY)
     if maker is None or (maker is _floquet and not isinstance(workflow.scene, FunctionScene)):
         raise BadInput(
-            f"model: no series are available for the scene {workflow.name}; choose satellite, "
-            "mathieu, libration_elliptic, or a Hill equation or a linear periodic system of your own"
+            f"model: no series are available for the scene {workflow.name}; they are for satellite, "
+            "mathieu, libration_elliptic, and Hill equations and linear periodic systems of your own"
         )
     return (_damped if getattr(workflow.scene, "DAMPED", False) else maker)(workflow, names, fixed)
 

@@ -64,9 +64,11 @@ def workflow(scene):
     if curves and not (
         hasattr(curves, "refusal") and curves.refusal([p.name for p in axes], module, options)
     ):
+        # tongues are narrower than cells, and their edges take no longer than the points
+        quick = "" if not hasattr(curves, "refusal") else "# "
         lines += [
             "",
-            "# [boundaries]  # the curves between verdicts, exact, in the file and its pictures",
+            f"{quick}[boundaries]  # the curves between verdicts, exact, in the file and its pictures",
         ]
     if measures.cells(module) is not None:
         lines += ["", "# [refine]  # cells as small as needed where the verdict changes, and the area of each verdict",

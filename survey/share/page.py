@@ -31,7 +31,7 @@ from survey.model import build, proved
 from survey.model.reader import Model
 from survey.request import workflow
 from survey.show import boundaries, maps, palette
-from survey.show.text import label_of, literal, spaced
+from survey.show.text import fixed_numbers, label_of, literal, options_in_words, spaced
 from survey.wording import plain
 
 RTOL = 1e-12  # of the series, at most
@@ -69,16 +69,37 @@ HINT = (
 
 def write(ds, path, at=None, progress=None):
     """Write the page of a survey to `path`; returns {"bytes", "series": does it hold series?,
-    "why": else why not,
+    "why": else why not, "plane": {axis: value} of the plane that was chosen for a map with more axes,
     "left_out": one line about curves in other planes, or ""}.
     """
     check_folder(path, ".html", ".htm")
     ds = point.plane(ds, at or {})
+    chosen = _first_plane(ds)
+    ds = point.plane(ds, chosen)
     content, why = made(ds, progress)
     write_atomically(Path(path), content.encode())
     axes = [dim for dim in ds.status.dims if ds.sizes[dim] > 1]
     left_out = boundaries.elsewhere(ds, axes)
-    return {"bytes": len(content.encode()), "series": not why, "why": why, "left_out": left_out}
+    return {
+        "bytes": len(content.encode()),
+        "series": not why,
+        "why": why,
+        "plane": chosen,
+        "left_out": left_out,
+    }
+
+
+def _first_plane(ds):
+    """{axis: value as text} of the axes along which a map of more than two is cut, where pictures cut it."""
+    axes = [dim for dim in ds.status.dims if ds.sizes[dim] > 1]
+    drawn = boundaries.plane_of(ds) or [dim for dim in axes if ds[dim].dtype.kind in "fi"][:2]
+    if len(drawn) < 2:
+        return {}
+    return {
+        dim: str(ds[dim].values[boundaries.position_of(ds, dim)])
+        for dim in axes
+        if dim not in drawn
+    }
 
 
 def made(ds, progress=None):
@@ -88,6 +109,8 @@ def made(ds, progress=None):
         raise BadInput(
             f"share: a page shows a map of two numeric axes, and this file has {', '.join(axes) or 'none'}"
         )
+    numbers = [f"{c.name} = {float(c):.6g}" for c in fixed_numbers(ds, ds.status.squeeze())]
+    about = ", ".join([str(ds.attrs["scene"]), *filter(None, [options_in_words(ds)]), *numbers])
     ds = boundaries.in_plane(ds, ds.status.squeeze())
     ds = ds.squeeze([dim for dim in ds.status.dims if ds.sizes[dim] == 1]).sortby(axes)
     proof = proved.of(ds)
@@ -95,7 +118,7 @@ def made(ds, progress=None):
     table = _common(ds, axes)
     table |= _of_model(ds, packed) if packed else _of_points(ds, axes)
     table["proof"] = bool(packed and proof and proof["names"] == axes)  # the model has it
-    return _html(ds, table, proof, why), why
+    return _html(ds, table, proof, why, plain(about, 300)), why
 
 
 def _series(ds, proof, progress):
@@ -340,21 +363,20 @@ def _packed(values, kind):
     return {"type": kind, "data": base64.b64encode(packer.compress(raw) + packer.flush()).decode()}
 
 
-def _html(ds, table, proof, why):
-    """The page; `why` it holds no series."""
+def _html(ds, table, proof, why, about):
+    """The page; `why` it holds no series; `about`: the scene, options and fixed numbers in a line."""
     parts = {name: resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
              for name in ("page.html", "page.css", "model.js", "engine.js", "app.js")}  # fmt: skip
     engine = parts["model.js"] + parts["engine.js"]
     scripts = " ".join(f"'sha256-{_digest(text)}'" for text in (engine, parts["app.js"]))
     title = plain(str(ds.attrs.get("title", "")) or "a stability map", 300)
-    options = plain(str(ds.attrs.get("options", "")), 300)
     kind = ("each point shown with its own value, no point between them" if why else
             "drawn from Chebyshev series with error bars, sharp at every scale")  # fmt: skip
     filled = {
         "policy": f"default-src 'none'; script-src {scripts}; style-src 'unsafe-inline'; img-src data: blob:; "
                   "worker-src blob:; base-uri 'none'; form-action 'none'",
         "version": survey.__version__, "title": html.escape(title), "style": parts["page.css"],
-        "subtitle": html.escape(f"{plain(str(ds.attrs['scene']), 300)}{', ' + options if options else ''}: {kind}"),
+        "subtitle": html.escape(f"{about}: {kind}"),
         "alt": html.escape(f"{title}: a map; arrows move it, plus and minus zoom"), "about": _about(ds, proof, why),
         # no "<" in it: nothing in the data can end the element
         "data": json.dumps(table, allow_nan=False).replace("<", "\\u003c"), "engine": engine, "app": parts["app.js"],

@@ -24,7 +24,10 @@ CURVES = {
     "even_antiperiodic": (_EDGES, {"color": "#000000", "ls": (0, (5, 2)), "lw": 0.8}),
     "odd_antiperiodic": (_EDGES, {"color": "#707070", "ls": (0, (5, 2)), "lw": 0.8}),
     "plus_one": ("a multiplier passes 1", {"color": "#000000", "ls": "-", "lw": 1.0}),
-    "minus_one": ("a multiplier passes -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0}),
+    "minus_one": (
+        "a multiplier passes \N{MINUS SIGN}1",
+        {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.0},
+    ),
     "neimark_sacker": (
         "a complex pair passes the circle",
         {"color": "#D40000", "ls": "-", "lw": 1.2},
@@ -33,8 +36,11 @@ CURVES = {
         "multipliers collide on the circle",
         {"color": "#D40000", "ls": (0, (4, 1.5)), "lw": 1.2},
     ),
-    "A": ("A: multipliers meet at -1", {"color": "#000000", "ls": "-", "lw": 1.2}),
-    "B": ("B: multipliers meet at -1", {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2}),
+    "A": ("A: multipliers meet at \N{MINUS SIGN}1", {"color": "#000000", "ls": "-", "lw": 1.2}),
+    "B": (
+        "B: multipliers meet at \N{MINUS SIGN}1",
+        {"color": "#000000", "ls": (0, (5, 2)), "lw": 1.2},
+    ),
     "KC": ("KC: two pairs meet on the circle", {"color": "#D40000", "ls": "-", "lw": 1.2}),
     "critical_rate": ("critical rate of the rotation", {"ls": "-"} | _PALE),
     "equal_moments": (

@@ -19,6 +19,19 @@ IN_WORDS = {
     "side": "{} side",
     "root": "{} root",
 }
+# what long names and titles spell in ASCII, and how it is printed; a symbol with an index is a formula
+_SPELT = (
+    (r"\bp_(theta|psi)\b", r"$p_\\\1$"),
+    (r"\bp_phi\b", r"$p_\\varphi$"),
+    (r"(?<!\\)\b(theta|phi|psi|epsilon)\b", lambda found: _GREEK[found[1]]),
+    (r"\bsqrt(?=\|)", "√"),
+    (r"\bsqrt\((\w+)\)", r"√\1"),
+    (r"(?<=\w)\^(\d+)\b", lambda found: found[1].translate(_RAISED)),
+    (r" -> ", " → "),
+    (r"(?<=[-+])inf\b", "∞"),
+    (r"(?<![\w.)])-(?=[\d∞])", "\N{MINUS SIGN}"),
+)
+_GREEK = {"theta": "θ", "phi": "φ", "psi": "ψ", "epsilon": "ε"}
 _RAISED = str.maketrans("-0123456789", "\N{SUPERSCRIPT MINUS}⁰¹²³⁴⁵⁶⁷⁸⁹")
 MAX_DEPTH = 6  # of nested braces in a formula
 WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be miles
@@ -27,6 +40,13 @@ WITH_LENGTHS = ("\\hspace", "\\genfrac")  # TeX that takes lengths, which may be
 def literal(text, most=MAX_TEXT):
     """Text from a file for matplotlib: no formulas, nothing invisible, and not endless."""
     return plain(str(text), most).replace("$", r"\$")
+
+
+def printed(text):
+    """Literal text of a long name or a title with Greek letters, roots, powers and arrows as they are printed."""
+    for spelt, glyph in _SPELT:
+        text = re.sub(spelt, glyph, text)
+    return text
 
 
 def formula(symbol, name):
@@ -81,6 +101,7 @@ def label_of(variable, width=40):
     )
     text += "" if units in ("1", "") else f"\N{NO-BREAK SPACE}({_with_powers(units)})"
     wrapped = textwrap.fill(text, width, break_long_words=False).replace("\N{NO-BREAK SPACE}", " ")
+    wrapped = printed(wrapped)
     return wrapped.replace("$$", f"${symbol}$") if shown else wrapped
 
 
@@ -103,8 +124,7 @@ def title_of(ds, variable):
     """
     title = literal(ds.attrs.get("title", ""))
     name = literal(variable.attrs.get("long_name", variable.name))
-    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
-    fixed = [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
+    fixed = fixed_numbers(ds, variable)
     position = {name: f" ({_position(ds[name], c)} of {ds.sizes[name]})"
                 for name, c in variable.coords.items() if c.ndim == 0 and ds.sizes.get(name, 1) > 1}  # fmt: skip
     numbers = [f"{_equal(c)}{position.get(c.name, '')}" for c in fixed]
@@ -120,7 +140,14 @@ def title_of(ds, variable):
     )
     lines = [title] if labelled or name.lower() in title.lower() else [title, name]
     lines[-1] += f" ({words})" if words and words not in title else ""
+    lines = [printed(line) for line in lines]
     return "\n".join([*lines, numbers] if numbers else lines)
+
+
+def fixed_numbers(ds, variable):
+    """The fixed parameters that a title names: those of axes, and others that are not zero."""
+    fixed = [c for c in variable.coords.values() if c.ndim == 0 and c.dtype.kind in "fi"]
+    return [c for c in fixed if c.name in ds.dims or (float(c) != 0 and not _is_default(c))]
 
 
 def options_in_words(ds):

@@ -26,6 +26,7 @@ MOST_UNANSWERED = 0.5
 LITTLE = 1e-3  # seconds of an estimate: beside the beginning of a run they cannot be measured
 # a run of fewer seconds that took more times its estimate has spent them on beginning, as a window does
 LONG, SLOWEST = 10.0, 10.0
+FAR = 25.0  # and nothing of one whose estimate is more times its own
 KERNEL_OPTIONS = ("question", "motion", "order", "case")  # which select what is compiled
 # [seconds estimated, measured] of the points; of edges, curves and cells
 PARTS = ("kernels", "further")
@@ -57,9 +58,10 @@ def factor(workflow, part, estimated):
     known.
 
     The runs most like this one decide: of the same question on the same axes, else of the question,
-    of the scene; of those the three of nearest length.
+    of the scene; of those the three of nearest length. Edges and cells are no measure of each other.
     """
     about = _about(workflow)
+    alike = ("tables",) if part == "further" else ()
     for keys in (
         ("scene", "options", "method", "axes"),
         ("scene", "options", "method"),
@@ -68,7 +70,9 @@ def factor(workflow, part, estimated):
         like = [
             one[part]
             for one in _records()
-            if part in one and all(one.get(key) == about[key] for key in keys)
+            if part in one
+            and all(one.get(key) == about[key] for key in (*keys, *alike))
+            and (one[part][1] > LONG or one[part][0] * FAR >= estimated)
         ]
         if like and estimated > 0.0:
             like.sort(key=lambda pair: abs(log(pair[0] / estimated)))

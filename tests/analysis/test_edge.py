@@ -52,6 +52,20 @@ def test_characteristic_values_of_mathieu():
     assert (found.edge_error < 1e-12).all()
 
 
+def test_a_closed_gap_is_two_edges_and_a_marginal_value_between_equal_verdicts_none():
+    closed = survey.edge("mathieu", along="a", q=0.0, a=(3.0, 5.0))
+    assert closed.edge.size == 2 and (abs(closed.edge - 4.0) <= closed.edge_error).all()
+    assert closed.attrs["complete"] == 1
+    for scene, along, fixed, verdict in (
+        ("mathieu", "q", {"a": 4.0}, "unstable"),
+        ("satellite", "rho", {"k": 0.5, "body": "oblate"}, "stable"),
+    ):
+        found = survey.edge(scene, along=along, **{along: (-0.2, 0.2)}, **fixed)
+        assert not found.edge.size and found.attrs["complete"] == 1
+        line = survey.evaluate(scene, **{along: [-0.1, 0.0, 0.1]}, **fixed)
+        assert line.survey.names().values.tolist() == [verdict, "marginal", verdict]
+
+
 def test_near_gives_the_neighbours():
     everything = survey.edge("satellite", along="rho", rho=(0.6, 2.5), k=0.5)
     near = survey.edge("satellite", along="rho", near=1.2, k=0.5)

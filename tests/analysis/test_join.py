@@ -120,6 +120,8 @@ def test_what_does_not_fit_is_refused():
         "different values at common points, such as a = 1.5",
         other.assign(discriminant=other.discriminant + 1),
     )
+    unstable = other.assign(verdict=other.verdict.where(other.a > 1.5, 1 - other.verdict))
+    refused("verdict is (un)?stable and (un)?stable; leave", unstable)
     refused("was not written by survey", xr.Dataset())
     other = survey.evaluate("mathieu", a=[0.2, 1.5], q=[0.5, 0.6])
     refused(r"stacked along p: restore its axes with \.unstack", other.stack(p=("a", "q")))

@@ -58,7 +58,8 @@ def test_another_workflow_is_refused_and_nothing_is_lost(
     assert str(refused.value) == (
         f"small.nc is a finished survey of 24 points of another workflow ({told}); write to another file with -o, "
         + (
-            "replace it with --fresh, or extend it with --reuse small.nc (in Python output=, fresh=True, reuse=)"
+            "replace it with --fresh, or extend it with --reuse small.nc, which says if values can be taken "
+            "(in Python output=, fresh=True, reuse=)"
             if serves
             else "or replace it with --fresh (in Python output=, fresh=True)"
         )

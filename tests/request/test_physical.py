@@ -56,6 +56,14 @@ def test_masses_and_bodies():
     ]
     assert several.e.values.tolist() == [0.04838624, 0.0549] and (several.verdict == 1).all()
     assert 1.0 / float(several.mu[0]) == pytest.approx(1048.35, abs=0.01)
+    for refused in (
+        several.survey.areas,
+        several.survey.boundary,
+        several.survey.zoom,
+        lambda: several.survey.zoom(body=(0.0, 1.0)),
+    ):
+        with pytest.raises(BadInput, match="body is an axis of names, and nothing lies between"):
+            refused()
     assert float(survey.evaluate("libration_elliptic", body="Earth-Moon", e=0.1).e) == 0.1
     with pytest.raises(BadInput, match="unknown pair 'Earth-Mon'; did you mean 'Earth-Moon'"):
         survey.evaluate("libration", body="Earth-Mon")

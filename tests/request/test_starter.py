@@ -77,6 +77,12 @@ def test_the_schema_accepts_the_kept_workflows_and_no_others():
     }
 
 
+def test_starters_of_hill_equations_have_the_edges_of_their_tongues():
+    for scene, on in (("satellite", True), ("mathieu", True), ("libration_elliptic", False)):
+        text = starter.workflow(scene)
+        assert ("boundaries" in tomllib.loads(text)) == on and "[boundaries]" in text
+
+
 def test_completion_offers_scenes_and_workflows(program):
     asked = {"_SURVEY_COMPLETE": "bash_complete"}
     (program.folder / "one.toml").write_text("")

@@ -596,6 +596,22 @@ def test_every_pixel_has_the_colour_of_the_verdict_at_its_place(rule, tmp_path):
     )
 
 
+def test_a_map_of_three_axes_shows_a_plane_and_says_which(tmp_path):
+    ds = survey.evaluate(
+        "satellite",
+        k=np.linspace(0.1, 0.9, 4),
+        body="oblate",
+        rho=xr.DataArray(np.linspace(0.6, 2.0, 5), dims="rho"),
+    )
+    three = xr.concat([ds, ds], "r").assign_coords(r=("r", [0.0, 2.0]))
+    three = three.transpose("k", "rho", "r").assign_attrs(ds.attrs)
+    for at, chosen, r in (({}, {"r": "0.0"}, "0"), ({"r": "2"}, {}, "2")):
+        told = page.write(three, tmp_path / "map.html", at)
+        assert told["plane"] == chosen
+        subtitle = f"satellite, oblate, r = {r}: "
+        assert subtitle in (tmp_path / "map.html").read_text()
+
+
 def test_what_cannot_be_shown_is_refused_in_a_line():
     ds = survey.evaluate("mathieu", a=np.linspace(0.0, 1.0, 5), q=0.5)
     with pytest.raises(BadInput, match="two numeric axes"):

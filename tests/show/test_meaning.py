@@ -39,6 +39,25 @@ def test_a_symbol_stands_once_and_the_unit_on_its_line():
 
 
 @pytest.mark.parametrize(
+    ("spelt", "shown"),
+    [
+        ("scaled momentum p_psi / sqrt|k|", r"scaled momentum $p_\psi$ / √|k|"),
+        ("momentum p_phi where u = cos theta", r"momentum $p_\varphi$ where u = cos θ"),
+        ("where the solution ends as t -> +inf", "where the solution ends as t → +∞"),
+        ("does w -> -inf attract?", "does w → \N{MINUS SIGN}∞ attract?"),
+        ("slower than sqrt(epsilon)", "slower than √ε"),
+        ("strength of the field, 3 mu / R^3", "strength of the field, 3 mu / R³"),
+        ("x-1 at 1e-3, thetas and R^n", "x-1 at 1e-3, thetas and R^n"),
+    ],
+)
+def test_letters_roots_and_powers_are_printed(spelt, shown):
+    variable = xr.DataArray(0.0, attrs={"long_name": spelt})
+    assert label_of(variable, 80) == shown
+    ds = xr.Dataset({"v": ((), 0.0)}, attrs={"title": spelt})
+    assert title_of(ds, ds.v.assign_attrs(long_name=spelt)) == shown
+
+
+@pytest.mark.parametrize(
     ("units", "shown"), [("rad s-1", "(rad s⁻¹)"), ("m2 s-2", "(m² s⁻²)"), ("kg", "(kg)")]
 )
 def test_units_have_their_powers_raised(units, shown):

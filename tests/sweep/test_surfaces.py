@@ -134,7 +134,7 @@ def test_pictures(path):
     assert axes.name == "3d" and len(drawn.get_facecolor()) == ds.sizes["surface_triangle"]
     assert axes.get_xlim() == (0.2, 2.0) and [
         t.get_text() for t in axes.figure.legends[0].texts
-    ] == ["a multiplier passes -1"]
+    ] == ["a multiplier passes \N{MINUS SIGN}1"]
     plt.close("all")
     for place in range(3):
         plane = section(ds, ds.verdict.isel(c=place))
