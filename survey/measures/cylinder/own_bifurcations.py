@@ -107,9 +107,10 @@ def _extrema(plane, position):
     angles = np.linspace(0.0, TWO_PI, ANGLES + 1)
     slopes = np.array([pg.values(row, phi)[2] for phi in angles])
     found = []
-    for i in np.flatnonzero(slopes[1:] * slopes[:-1] < 0.0):
+    slopes[-1] = slopes[0]  # of which one alone may be 0
+    for i in np.flatnonzero((slopes[1:] > 0.0) != (slopes[:-1] > 0.0)):
         phi = angles[i] + (angles[i + 1] - angles[i]) * slopes[i] / (slopes[i] - slopes[i + 1])
-        found.append(("fold", bool(slopes[i] < 0.0), phi, pg.values(row, phi)[1]))
+        found.append(("fold", bool(slopes[i + 1] > 0.0), phi, pg.values(row, phi)[1]))
     return found
 
 
@@ -162,11 +163,11 @@ def _hopfs(plane, part):
     indices = [index for index, _ in marks]
     refined = tracks.with_points(part, indices, [mark for _, mark in marks]) if marks else part
     cuts = [0, *(index + i for i, index in enumerate(indices)), len(refined.x) - 1]
+    alone = len(refined.x) == 1  # of a line
     for low, high in pairwise(cuts):
-        if high > low:
-            s = _series(
-                plane, refined, (low + high + 1) // 2 if high > low + 1 else low + (low in cuts[1:])
-            )
+        if high > low or alone:
+            inner = low + (low in cuts[1:] and not alone)
+            s = _series(plane, refined, (low + high + 1) // 2 if high > low + 1 else inner)
             if s[G1, 0] < 0.0:
                 kind = "supercritical_hopf" if bend(s)[0] > 0.0 else "subcritical_hopf"
                 yield _curve(plane, kind, tracks.part_of(refined, slice(low, high + 1)))
@@ -194,7 +195,7 @@ def _marks(plane, part, function, third):
 
     points = np.column_stack([part.coordinate, part.x])
     values = np.array([equations(u)[2, 0] for u in points])
-    for i in np.flatnonzero(values[1:] * values[:-1] < 0.0):
+    for i in np.flatnonzero((values[1:] > 0.0) != (values[:-1] > 0.0)):
         u = points[i] + (points[i + 1] - points[i]) * values[i] / (values[i] - values[i + 1])
         step = now = slopes = np.full((3, 3), np.nan)
         for _ in range(20):

@@ -185,12 +185,14 @@ def passing(M, E, kind, structure):
                 )
             else:
                 real = (abs(centre.imag) <= bars) & (abs(centre) > 1.0)
-                apart, other = (_distances(centre + 1.0 / centre, some) for some in (upper, real))
+                s = centre + 1.0 / centre
+                apart, other = (_distances(s, some) for some in (upper, real))
                 first, second = np.unravel_index(apart.reshape(len(M), -1).argmin(axis=1), (n, n))
-                # it is not two beyond -2 and 2 that meet
+                # it is not two beyond -2 and 2 that meet, as real ones or as conjugates
                 sure = (apart[rows, first, second] < CLOSE) & (
                     apart[rows, first, second] < other.min(axis=(1, 2))
                 )
+                sure &= abs(s[rows, first] + s[rows, second]) < 4.0
             sure &= upper[rows, first] & upper[rows, second]
             angle = np.angle(centre[rows, first] + centre[rows, second])
             # |arg z - arg c| <= asin(r / |c|) <= (pi / 2) r / |c|

@@ -112,18 +112,25 @@ def _bisected(c, values, low, high):
 class ContinuedCurves:
     """The curves of each of R rows, sets of parameters whose continued one does not matter.
 
-    begin(points) gives [(states (R, n), periods (R))] from which Newton's method begins; the start
-    if it is missing.
+    begin(points (N, parameters)) gives [(states (N, n), periods (N))] from which Newton's method
+    begins; the start if it is missing.
     """
 
-    def __init__(self, equation, continued, rows, reach, begin=None):
+    def __init__(self, equation, continued, rows, reach, begin=None, seeds=SEEDS):
         self.equation, self.continued, self.rows, self.reach = equation, continued, rows, reach
         self.free = equation.free
         self.of_row = [[] for _ in rows]
-        for share in np.linspace(0.0, 1.0, SEEDS):
-            points = self.points(np.arange(len(rows)), share)
-            for x, T in begin(points) if begin else [equation.begin(points)]:
-                self._follow(share, *located(equation, points, reach, x, T))
+        shares = np.linspace(0.0, 1.0, seeds)
+        points = [self.points(np.arange(len(rows)), share) for share in shares]
+        every = np.concatenate(points)
+        starts = [
+            (x.reshape(seeds, len(rows), -1), T.reshape(seeds, -1))
+            for x, T in (begin(every) if begin else [equation.begin(every)])
+        ]
+        for k, share in enumerate(shares):
+            for x, T in starts:
+                if np.isfinite(x[k]).any():
+                    self._follow(share, *located(equation, points[k], reach, x[k], T[k]))
 
     def points(self, those, share):
         """The parameters of these rows, with the continued one at shares of its range."""
@@ -180,6 +187,15 @@ class ContinuedCurves:
         which = np.concatenate([np.zeros(0, int), *(one for one, _y in found)])
         y = np.concatenate([np.zeros((0, m)), *(y for _one, y in found)])
         return which, y[:, :n], y[:, n] if self.free else np.full(len(y), np.nan)
+
+
+def distinct(x, T, free):
+    """Which of the orbits of one point, states x (K, n) and periods T (K), are none of those before
+    them.
+    """
+    size = abs(x).max(axis=0, initial=0.0).max(initial=0.0)
+    off = abs(T[:, None] - T) > SAME * T if free else abs(x[:, None] - x).max(axis=2) > SAME * size
+    return [k for k in range(len(x)) if off[k, :k].all()]
 
 
 class _Walk:

@@ -83,7 +83,10 @@ def searched(scene, square, axes, fixed, options):
     names = [output.name for output in ALONG]
     if scene.FAMILY == "orbit":
         if scene.symmetry is None:
-            return joined(scene.curves(square, axes, fixed), names)
+            found, lacking = scene.curves(square, axes, fixed)
+            curves = joined(found, names)
+            curves.complete = False if lacking else None
+            return curves
         structure = "reversible"
         number = LINES_OF_ORBITS
         orbits = scene.family(square, axes, fixed, number)

@@ -6,7 +6,8 @@ on the unit circle.
     neimark_sacker  a complex pair
 
 Orbits are followed along ROWS lines of the map each way (`continuation`); on a line along another
-parameter than that of the continuation, from the orbits that this gives at nine points. Where det(M
+parameter than that of the continuation, from the orbits that this gives at SEEDS points, or, of a line
+by itself, ALONE, along which their number must be what folds explain. Where det(M
 - 1), det(M + 1) or the product of all l_i l_j - 1 changes its sign there, Newton's method on the
 equations of `critical` finds the orbit that has the multiplier, and the curve is followed from it
 in the space of all unknowns, in which folds of orbits and cusps of their curves are nothing
@@ -23,15 +24,25 @@ import numpy as np
 from survey.kernels.math.roundoff import EPS
 from survey.measures import contours
 from survey.measures.floquet import bifurcations, existence, monodromy
-from survey.measures.floquet.continuation import ContinuedCurves, Range, floored, rough_flow, slopes
+from survey.measures.floquet.continuation import (
+    SEEDS,
+    ContinuedCurves,
+    Range,
+    distinct,
+    floored,
+    rough_flow,
+    slopes,
+)
 from survey.measures.floquet.critical import Critical
 from survey.measures.floquet.critical_points import RTOL, CriticalPoints
 from survey.measures.floquet.critical_walk import NEAREST, Walk
 from survey.measures.floquet.multipliers import MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
 from survey.measures.floquet.newton import bordered
+from survey.measures.segments import along
 
 KINDS = (NEIMARK_SACKER, PLUS_ONE, MINUS_ONE)  # in the order in which they are followed
 ROWS, FINER = 17, 4  # lines each way, and points for each of those of an orbit's curve
+ALONE = 33  # points of a line by itself at which the continuation gives the orbits
 SAME, ALIKE = 3e-4, 0.05  # of the map; of the orbit, relative: what lies on a curve already
 OWN_IMAGE = 1e-3  # relative: what is its own mirror image
 MOST_SIGNS, TRIED, ODD = 8, 24, 1e-12  # states; points at which symmetry is tried; relative
@@ -40,7 +51,8 @@ NOISE, EDGE = 1e-7, 1e-9  # of M's entries; of the map
 
 def searched(scene, square, axes, fixed):
     """[(class, parameters (m, 2), errors (m), {name: (values, errors)})] of the curves; see
-    `curves.searched`.
+    `curves.searched`; and whether some are known to lack, as along a line by itself, where they do
+    not explain the numbers of orbits.
     """
     names = [p.name for p in scene.own]
     varied = [names.index(name) for name in axes if name in names]
@@ -55,7 +67,7 @@ def searched(scene, square, axes, fixed):
             for other in on_map.at_ends(how):
                 seeds[other] += on_map.beside(points, y, other)
     order = {kind: k for k, kind in enumerate((PLUS_ONE, MINUS_ONE, NEIMARK_SACKER))}
-    return sorted(found, key=lambda one: order[one[0]])
+    return sorted(found, key=lambda one: order[one[0]]), on_map.lacks(found)
 
 
 class Criticality(NamedTuple):
@@ -77,6 +89,7 @@ class _Map:
         self.continued = continued
         self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
+        self._numbers = None  # of orbits along a line, by the continuation
         self.kinds = [
             Criticality(kind)
             for kind in KINDS
@@ -132,7 +145,10 @@ class _Map:
             rows[:, other] = self.square.parameters(lines)[:, k]
         elsewhere = self.continued is not None and self.continued.index not in self.varied
         begin = self._continued if elsewhere else None
-        curves = ContinuedCurves(self.equation, Range(index, low, high), rows, self.reach, begin)
+        seeds = ALONE if elsewhere and len(rows) == 1 else SEEDS
+        curves = ContinuedCurves(
+            self.equation, Range(index, low, high), rows, self.reach, begin, seeds
+        )
         for row, of_row in enumerate(curves.of_row):
             for curve in of_row:
                 yield from self._of_curve(curves, row, curve.finer(FINER), axis)
@@ -143,14 +159,31 @@ class _Map:
         """
         curves = ContinuedCurves(self.equation, self.continued, points, self.reach)
         n = self.equation.n
-        found = [
-            curves.starts(k, point[[self.continued.index]])[1:] for k, point in enumerate(points)
-        ]
+        found = []
+        for k, point in enumerate(points):
+            _which, x, T = curves.starts(k, point[[self.continued.index]])
+            own = distinct(x, T, self.equation.free)
+            found.append((x[own], T[own]))
+        self._numbers = np.array([len(T) for _x, T in found])
         for i in range(max(len(T) for _x, T in found)):
             some = [k for k, (_x, T) in enumerate(found) if i < len(T)]
             x, T = np.full((len(points), n), np.nan), np.full(len(points), np.nan)
             x[some], T[some] = [found[k][0][i] for k in some], [found[k][1][i] for k in some]
             yield x, T if self.equation.free else self.equation.periods(points)
+
+    def lacks(self, found):
+        """Does the number of orbits along a line change by what no fold in `found` explains?"""
+        if self._numbers is None or len(self.varied) > 1:
+            return False
+        folds = [
+            (PLUS_ONE, at)
+            for kind, parameters, *_rest in found
+            if kind == PLUS_ONE
+            for at in self.square.positions(parameters)[:, 0]
+        ]
+        ticks = np.linspace(0.0, 1.0, len(self._numbers))
+        explained = along(self._numbers, ticks, folds, {PLUS_ONE: 2}, optional=(PLUS_ONE,))
+        return not all(explained.values())
 
     def _of_curve(self, curves, row, y, axis):
         """The same of one curve of orbits."""

@@ -189,3 +189,44 @@ def test_hopf_points_are_classified_by_the_cycle_beside_them(f1, kind, monkeypat
     other = survey.evaluate(scene, question="portrait", a=0.01 * f1, k=1.0)
     assert (int(side.librations), int(other.librations)) == (1, 0)
     assert (side.cycle_multiplier.values[0] < 1.0) == (f1 < 0.0)
+
+
+def on_line(scene, along, ends, kinds, **fixed):
+    """[(position, error)] of the edges of these kinds."""
+    found = survey.edge(scene, along=along, question="portrait", **{along: ends}, **fixed)
+    some = np.isin(found.edge_class, [NAMES.index(kind) for kind in kinds])
+    return list(zip(found.edge.values[some], found.edge_error.values[some], strict=True))
+
+
+@pytest.mark.parametrize("wave", [sin, cos])
+@pytest.mark.parametrize("ends", [(0.9, 1.1), (0.9, 1.13)])
+def test_a_line_meets_the_fold_at_1_wherever_its_angle_and_its_nodes_are(wave, ends):
+    """g = I - sin phi, or I - cos phi, whose slope is 0 exactly at a node; 1 is the middle of a line."""
+    scene = survey.abel(
+        lambda phi, p: -p[0],
+        lambda phi, p: p[1] - wave(phi),
+        parameters=("a", "I"),
+        period=2 * pi,
+    )
+    ((at, bar),) = on_line(scene, "I", ends, ["fold"], a=2.0)
+    assert abs(at - 1.0) <= bar and bar < 1e-10
+
+
+@pytest.mark.parametrize("bias", [0.0, 0.3, 0.7])
+def test_a_line_meets_hopf_points(bias):
+    """f = a - cos phi, g = I - sin phi: at the rest where cos phi = sqrt(1 - I^2) = a, beyond which
+    it repels.
+    """
+    scene = survey.abel(
+        lambda phi, p: p[0] - cos(phi),
+        lambda phi, p: p[1] - sin(phi),
+        parameters=("a", "I"),
+        period=2 * pi,
+    )
+    kinds = "supercritical_hopf", "subcritical_hopf"
+    ((at, bar),) = on_line(scene, "a", (0.6, 1.4), kinds, I=bias)
+    assert abs(at - np.sqrt(1.0 - bias * bias)) <= bar + 1e-15 and bar < 1e-10
+    beside = survey.evaluate(scene, question="portrait", a=[at - 1e-3, at + 1e-3], I=bias)
+    types = beside.equilibrium_type.attrs["flag_meanings"].split()
+    first = [types[k] for k in beside.equilibrium_type.values[:, 0]]
+    assert first == ["attracting_focus", "repelling_focus"]

@@ -13,8 +13,9 @@ from scipy.special import mathieu_a, mathieu_b
 
 import survey
 from survey.errors import BadInput
-from survey.measures.floquet.bifurcations import determinant
+from survey.measures.floquet.bifurcations import determinant, passing
 from survey.measures.floquet.curves import CLASSES
+from survey.measures.floquet.multipliers import COLLISION
 from survey.request.workflow import check
 from survey.sweep import boundaries
 
@@ -327,6 +328,17 @@ def test_bounds_of_determinants(n, rank):
             exact, other = (mp.det(mp.matrix(X[k].tolist())) / size for X in (A, near))
             assert max(abs(exact - value[k]), abs(other - value[k])) <= bar[k] * (1 + 1e-9)
     assert np.median(bar) < 1e-5
+
+
+@pytest.mark.parametrize(
+    "size, angle, passes", [(1 + 1e-6, 1.0, True), (4.1, 1e-4, False), (1.004, 1e-5, False)]
+)
+@pytest.mark.parametrize("structure", ["symplectic", "reversible"])
+def test_multipliers_that_meet_off_the_circle_do_not_pass_it(size, angle, passes, structure):
+    """Four complex ones next to where they meet in two points: of the circle, or of the real axis."""
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    M = np.block([[size * turn, np.zeros((2, 2))], [np.zeros((2, 2)), turn / size]])[None]
+    assert passing(M, np.full((1, 4, 4), 1e-14), COLLISION, structure)[0].tolist() == [passes]
 
 
 def test_conserved_quantities_and_three_axes():

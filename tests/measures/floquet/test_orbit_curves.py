@@ -10,6 +10,7 @@ from scipy.optimize import fsolve
 
 import survey
 from survey.errors import BadInput
+from survey.measures.floquet import orbit_curves
 from survey.measures.floquet.curves import CLASSES
 from survey.request.workflow import check
 from survey.sweep import boundaries
@@ -259,6 +260,36 @@ def test_a_map_without_the_parameter_of_the_continuation():
     for k in (0, F.size // 2, -1):
         back = survey.edge(scene, along="omega", omega=(1.2, 1.8), F=F[k], zeta=zeta[k])
         assert abs(back.edge.values - 1.5).min() < 1e-10
+
+
+def narrow_cusp(t, x, p, out):
+    """x' = l + h x - x^3, three orbits for h > 3 (l / 2)^(2 / 3): within 0.024 of q = 0.43 here."""
+    out[0] = p[0] + (0.03 - 20 * (p[1] - 0.43) ** 2) * x[0] - x[0] ** 3
+
+
+NARROW_CUSP = survey.orbit(
+    narrow_cusp,
+    states="x",
+    parameters=("l", "q"),
+    period=1.0,
+    start=(0.0,),
+    continuation=("l", -0.5, 0.5),
+)
+
+
+def test_a_line_meets_orbits_that_begin_and_end_on_it():
+    """Between two of the values of q at which the continuation along l had been asked for orbits."""
+    found = survey.edge(NARROW_CUSP, along="q", q=(0.0, 1.0), l=1e-3)
+    half = math.sqrt((0.03 - 3 * (1e-3 / 2) ** (2 / 3)) / 20)
+    assert found.edge_class.values.tolist() == [CLASSES["plus_one"]] * 2
+    assert (abs(found.edge.values - [0.43 - half, 0.43 + half]) <= found.edge_error.values).all()
+    assert found.edge_error.max() < 1e-9 and "complete" not in found.attrs
+
+
+def test_a_line_says_where_numbers_of_orbits_have_no_fold_between_them(monkeypatch):
+    monkeypatch.setattr(orbit_curves, "KINDS", ())
+    found = survey.edge(NARROW_CUSP, along="q", q=(0.0, 1.0), l=1e-3)
+    assert found.edge.size == 0 and found.attrs["complete"] == 0
 
 
 def test_where_there_are_none():
