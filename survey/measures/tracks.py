@@ -356,7 +356,8 @@ def _changes(some, others, here, there):
         same = [(abs(y - x), y, c) for *other, y, c in others if other == [label, side]]
         if same:
             off, y, c = min(same)
-            if (a > 0.0) != (c > 0.0) and off < 1.0:  # a may be 0 at one of them exactly
+            # one of them may be 0 exactly
+            if (a > 0.0) != (c > 0.0) and np.isfinite(a - c) and off < 1.0:
                 share = a / (a - c)
                 yield label, np.array([x + share * (y - x), *(here + share * (there - here))])
 
