@@ -368,7 +368,7 @@ def _rounded(x):
     """The number in binary64, and a bound of what that misses; NaN for complex numbers."""
     if type(x) is float:
         return x, 0.0
-    if not hasattr(x, "_mpf_"):
+    if hasattr(x, "_mpc_"):
         return np.nan, np.nan
     rounded = float(x)
     return rounded, abs(float(x - rounded)) * (1 + 1e-15) if np.isfinite(rounded) else 0.0

@@ -132,19 +132,21 @@ class Steps:
             self._values(x, points, columns, fits) if isinstance(x, Number) else [x] * len(points)
             for x in given
         ]
-        exact = not isinstance(function, type) and function not in _EXACT
-        mpf = self.mp.mpf
         found = [None] * len(points)
         for i, own in enumerate(zip(*lists, strict=True)):
             if fits[i]:
                 try:
-                    found[i] = function(
-                        *((mpf(x) if type(x) is float else x for x in own) if exact else own)
-                    )
+                    found[i] = function(*(own if function in _OF_FLOATS else map(self._more, own)))
                 except (ArithmeticError, TypeError, ValueError):
                     fits[i] = False
         return found
 
+    def _more(self, x):
+        """A parameter, which is a float, as a number with more digits."""
+        return self.mp.mpf(x) if type(x) is float else x
 
-# of binary64 numbers, the same as of numbers with more digits
-_EXACT = frozenset((operator.neg, abs, *(getattr(operator, name) for name in _COMPARISONS)))
+
+# of floats the same as of numbers with more digits
+_OF_FLOATS = frozenset(
+    (bool, int, float, operator.neg, abs, *(getattr(operator, name) for name in _COMPARISONS))
+)
