@@ -410,13 +410,12 @@ def flows(f, g, points, on_circle):
             left = template.serve(own, left, found)
         while left.size:
             template = Template(f, g, own[left[0]], on_circle)
+            template.serve(own, left[:1], found)
+            left = left[1:]
             if template.shared:
                 known.append(template)
                 del known[:-MOST_PATHS]
                 left = template.serve(own, left, found)
-            else:
-                template.serve(own, left[:1], found)
-                left = left[1:]
     longest = max((rows.shape[1] for _, rows in found), default=pg.OPERATIONS)
     out = np.full((len(own), longest), np.nan)
     for served, rows in found:
