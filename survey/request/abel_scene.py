@@ -78,7 +78,9 @@ class AbelScene(FunctionScene):
             return 1.5e-2
         if options["question"] == "fate":
             return basins.cost(sizes["phi0"] * sizes["w0"], 3e-4, 2e-2)
-        return 6e-5 / sizes.get("t", sizes.get("phi", 1)) + 4e-7
+        if options["question"] == "trajectory":
+            return 2.5e-4 / sizes["t"] + 2e-7
+        return 7.5e-5 / sizes["phi"] + 6e-7
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
