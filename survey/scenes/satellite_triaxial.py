@@ -99,9 +99,9 @@ structure = "symplectic"
 _ULPS = 8  # of T and of the exponents' other factors
 
 
-# measured on two cores, of which a map's curves use one: 100 to 130 s on maps of moments, their ratios, and
-# amplitudes, as most points lie in tongues that are narrow
-curves_seconds = 230.0
+# measured, on one thread: 42 to 144 on maps of moments, their ratios, and amplitudes, as most points
+# lie in tongues that are narrow
+curves_seconds = 115.0
 
 
 def cost(options, sizes):

@@ -10,6 +10,7 @@ finds the edges of each row, `curves` follows them over the map, and `folds` fin
 back.
 """
 
+import heapq
 from functools import partial
 from itertools import pairwise, product
 from math import prod
@@ -101,8 +102,8 @@ def along(scene, options, name, ends, fixed):
     return OnLine(edges.position, edges.error, edges.kind), edges.index, bool(edges.complete.all())
 
 
-def plan(workflow, cost):
-    """({rows, bytes per edge, if known beforehand}, estimated seconds on one thread).
+def plan(workflow, cost, threads):
+    """({rows, bytes per edge, if known beforehand}, estimated seconds on so many threads).
 
     `cost` is the scene's estimate for a point, in seconds.
     """
@@ -111,9 +112,11 @@ def plan(workflow, cost):
     if hasattr(measure, "refusal"):
         size = 8 * (1 + len(sizes) + 2 * len(measure.ALONG))
         maps = [pair for pair, _ in _maps(workflow)] or [tuple(sizes)]  # or an axis alone
-        return {"bytes_per_curve_point": size}, sum(
-            _seconds_of_map(workflow, measure, list(pair), cost) for pair in maps
-        )
+        busy = [0.0] * threads  # the curves of one map are found on one thread
+        for pair in maps:
+            longer = busy[0] + _seconds_of_map(workflow, measure, list(pair), cost)
+            heapq.heapreplace(busy, longer)
+        return {"bytes_per_curve_point": size}, max(busy)
     # measured: ten to twenty edges per row; about five hundred points of curves
     rows = {
         axis: prod(size for dim, size in sizes.items() if dim != axis)
@@ -125,7 +128,7 @@ def plan(workflow, cost):
         "rows": sum(rows.values()),
         "bytes_per_edge": 25,
         "bytes_per_curve_point": 8 * (1 + len(sizes)) if workflow.planes else 0,
-    }, seconds
+    }, seconds / threads
 
 
 def _seconds_of_map(workflow, measure, axes, cost):

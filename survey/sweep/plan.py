@@ -20,17 +20,19 @@ GUESSED = (
 )
 
 
-def estimates(workflow):
-    """({"kernels", "further": seconds on all threads of a usual machine}, what is known of edges
-    and cells).
+def estimates(workflow, threads=None):
+    """({"kernels", "further": seconds of a usual machine}, what is known of edges and cells), on so
+    many threads, by default one for each processor.
     """
     scene, request, grid = workflow.scene, workflow.request, workflow.grid
-    seconds = {"kernels": grid.points * seconds_per_point(scene, request, grid), "further": 0.0}
+    threads = threads or cpus()
+    one_thread = grid.points * seconds_per_point(scene, request, grid)
+    seconds = {"kernels": one_thread / threads, "further": 0.0}
     parts = {}
     for name, module in edges_and_cells.requested(workflow).items():
-        parts[name], more = module.plan(workflow, lone_cost(scene, request, grid))
+        parts[name], more = module.plan(workflow, lone_cost(scene, request, grid), threads)
         seconds["further"] += more
-    return {name: value / cpus() for name, value in seconds.items()}, parts
+    return seconds, parts
 
 
 def plan(workflow):

@@ -60,8 +60,8 @@ def find(workflow, each=in_turn, once=lambda name, make: make(), report=None):
     return _describe(workflow, found, points)
 
 
-def plan(workflow, cost):
-    """({number of cells: at most, and on most maps}, estimated seconds on one thread).
+def plan(workflow, cost, threads):
+    """({number of cells: at most, and on most maps}, estimated seconds on so many threads).
 
     `cost` is the scene's estimate for a point, in seconds.
     """
@@ -76,7 +76,7 @@ def plan(workflow, cost):
         getattr(measure, "CELL_SECONDS", CELL_SECONDS) * usual
         + blocks * measure.POINTS.size**2 * 20 * cost
     )
-    return {"most": most, "bytes_at_most": 33 * most, "usually": usual}, seconds
+    return {"most": most, "bytes_at_most": 33 * most, "usually": usual}, seconds / threads
 
 
 def _measure(workflow):

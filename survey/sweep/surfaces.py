@@ -41,8 +41,8 @@ def find(workflow, each=in_turn, once=lambda name, make: make()):
     )
 
 
-def plan(workflow, cost):
-    """({what is known beforehand: bytes}, estimated seconds on one thread), as in
+def plan(workflow, cost, threads):
+    """({what is known beforehand: bytes}, estimated seconds on so many threads), as in
     `survey.sweep.boundaries.plan`.
     """
     from survey.measures import isosurfaces
@@ -51,7 +51,7 @@ def plan(workflow, cost):
     lines, numbers = isosurfaces.LINES, 3 + 1 + 2 * len(measure.ALONG)
     known = {"lattice": f"{lines} x {lines} x {lines}", "bytes_per_vertex": 8 * numbers + 1,
              "bytes_per_triangle": BYTES_PER_TRIANGLE}  # fmt: skip
-    return known, (lines**3 + EVALUATIONS * VERTICES) * cost
+    return known, (lines**3 + EVALUATIONS * VERTICES) * cost / threads
 
 
 def _variables(workflow, measure, names, values, found):

@@ -7,9 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
+from survey import measures
+from survey.measures.tasks import in_turn
 from survey.request import workflow
-from survey.sweep import dispatch, engine, measured, plan
-from survey.sweep.dispatch import cpus
+from survey.sweep import boundaries, dispatch, engine, measured, plan
 
 WORKFLOWS = Path(__file__).parents[2] / "workflows"
 LONGEST = 6.0  # seconds of the processor that are planned for the reduced workflow
@@ -24,7 +25,7 @@ def reduced(name, output):
     }
     for _ in range(20):
         checked = workflow.check(table, output=output, near=WORKFLOWS)
-        if sum(plan.estimates(checked)[0].values()) * cpus() < LONGEST:
+        if sum(plan.estimates(checked, threads=1)[0].values()) < LONGEST:
             break
         for axis in table["axes"].values():
             if isinstance(axis, dict) and "num" in axis:
@@ -51,10 +52,9 @@ def test_plans_are_within_a_factor_of_2(name, tmp_path, monkeypatch):
     engine.run(checked, fresh=True)
     monkeypatch.setattr(engine, "time", SimpleNamespace(perf_counter=time.process_time))
     engine.run(checked, fresh=True)
-    _workflow, estimated, taken, compiling = noted[-1]
+    *_, taken, compiling = noted[-1]
     assert compiling < 1.0
-    for part, seconds in estimated.items():
-        expected = seconds * cpus()
+    for part, expected in plan.estimates(checked, threads=1)[0].items():
         assert expected / 2 - ROUNDING < taken[part] < 2 * expected + ROUNDING, (
             part,
             expected,
@@ -78,8 +78,32 @@ def test_curves_of_a_part_of_a_map_are_planned_as_such(name, tmp_path):
     fixed = {"yaw_ratio": 0.3, "roll_ratio": 0.6, "amplitude": 0.5236}
     table = {"scene": "satellite_triaxial", "axes": fixed | axes, "boundaries": {}}
     checked = workflow.check(table, output=tmp_path / "map.nc")
-    expected = plan.estimates(checked)[0]["further"] * cpus()
+    expected = plan.estimates(checked, threads=1)[0]["further"]
     assert taken / 2 < expected < 2 * taken
+
+
+@pytest.mark.parametrize(
+    ("stacked", "threads", "rounds"), [(1, 1, 1), (1, 8, 1), (5, 1, 5), (5, 2, 3), (5, 8, 1)]
+)
+def test_the_curves_of_one_map_are_planned_on_one_thread(stacked, threads, rounds, tmp_path):
+    """As they are found: each map is one task."""
+    axis = {"start": 0.4, "stop": 1.2, "num": 5}
+    axes = {"p_psi": axis, "p_theta0": axis, "theta0": 0.8 if stacked == 1 else axis}
+    axes |= {"A": 1.3, "C": 0.6, "epsilon": 2.0, "p_phi": 0.3}
+    table = {"scene": "brun", "axes": axes, "boundaries": {"plane": ["p_psi", "p_theta0"]}}
+    checked = workflow.check(table, output=tmp_path / "map.nc")
+    lone = boundaries._seconds_of_map(
+        checked, measures.curves(checked.scene), ["p_psi", "p_theta0"], 0.0
+    )
+    assert plan.estimates(checked, threads)[0]["further"] == pytest.approx(rounds * lone)
+    tasks = []
+
+    def each(task, items, _what):
+        tasks.append(len(items))
+        return in_turn(task, items[:1]) * len(items)
+
+    boundaries.find(checked, each)
+    assert tasks == [stacked]
 
 
 @pytest.mark.parametrize(
@@ -92,7 +116,7 @@ def test_cells_of_danbys_map_are_planned_as_they_were_measured(name, taken, tmp_
         output=tmp_path / "map.nc",
         near=WORKFLOWS,
     )
-    expected = plan.estimates(checked)[0]["further"] * cpus()
+    expected = plan.estimates(checked, threads=1)[0]["further"]
     assert taken / 2 < expected < 2 * taken
 
 

@@ -8,9 +8,10 @@ On such a map there is no closed form. Its curves are zeros of functions that ar
 
 with b = p_psi, a = p_phi. They are searched for on LINES lines of the map each way by marching
 squares, and every point is bracketed on its line by certain signs. A closed curve narrower than a
-LINES-th of the map may be missed, and a curve may end as far before the cusp at which its saddle
-ends. No curve shows where a well begins in which the motion is not. A precession is stable where
-its squared frequency (S18) is positive, else it is the saddle itself.
+LINES-th of the map may be missed. A separatrix ends some 1e-5 of the map before the cusp at which
+its saddle ends: there the function leaves rounding with the third power of the distance. No curve
+shows where a well begins in which the motion is not. A precession is stable where its squared
+frequency (S18) is positive, else it is the saddle itself.
 
 Positions are those of `survey.measures.square`.
 """
@@ -47,7 +48,9 @@ def traced(square, axes, fixed):
         def on_map(x, function=function):
             return function(states(square, axes, fixed, x))
 
-        for x, error in contours.lines(on_map, square, LINES):
+        values = None if square.across is not None else contours.continued(on_map, LINES)
+        for line in contours.lines(on_map, square, LINES, values):
+            x, error = contours.to_the_end(on_map, square.grain, line, LINES)
             found.append((function, x, error, states(square, axes, fixed, x)))
     return [(function, *part) for function, *rest in found for part in _reaching(function, *rest)]
 

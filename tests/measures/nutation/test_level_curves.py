@@ -8,7 +8,9 @@ from measures.nutation.test_curves import discriminant, quartic, roots, runs
 from mpmath import mp, mpf
 
 import survey
+from survey.measures import contours
 from survey.measures.nutation import curves as nc
+from survey.measures.nutation import level_curves
 from survey.request.workflow import check
 from survey.sweep import boundaries
 
@@ -139,14 +141,107 @@ def test_no_crossing_of_a_row_is_missed(axes, fixed):
         signs = np.array(
             [np.sign(float(discriminant(*scaled(rest | {across: value, along: t})[:4]))) for t in x]
         )
-        middle = 0.5 * (x[1:] + x[:-1])[signs[1:] != signs[:-1]]
-        expected = [t for t in middle if at_saddle(rest | {across: value, along: t})]
+        expected = []
+        for i in np.flatnonzero(signs[1:] != signs[:-1]):
+            low, high = mpf(x[i]), mpf(x[i + 1])
+            for _ in range(
+                40
+            ):  # beside cusps the roots of the quartic are close in pairs elsewhere
+                t = (low + high) / 2
+                same = discriminant(*scaled(rest | {across: value, along: t})[:4]) * signs[i] > 0
+                low, high = (t, high) if same else (low, t)
+            if at_saddle(rest | {across: value, along: low}):
+                expected.append(float(low))
         crossed = []
         for _, own in runs(ds, (nc.SADDLE,)):
             q, p = ds[f"curve_{across}"].values[own], ds[f"curve_{along}"].values[own]
             at = np.flatnonzero((q[1:] > value) != (q[:-1] > value))
             crossed += [*(p[at] + (value - q[at]) / (q[at + 1] - q[at]) * (p[at + 1] - p[at]))]
         np.testing.assert_allclose(np.sort(crossed), expected, atol=0.02)
+
+
+def cusps_of(theta, p_phi, root):
+    """(theta0, p_psi, p_phi) where the squared frequency of (S18) is 0, of one theta0 or one p_phi."""
+    if p_phi is None:
+        square = np.cos(theta) ** 2
+        own = np.roots([1.0, 3.0 * square - 1.0, square])  # y^2: y^2 + z^2 = 1 - 3 u^2, u = -y z
+    else:
+        own = np.roots([-1.0, 3.0, -3.0 - 3.0 * (p_phi / root) ** 2, 1.0 - (p_phi / root) ** 2])
+        own = own[abs(own.imag) < 1e-12].real
+    own = own[(own > 0.0) & (own < 1.0)]
+    y = np.append(np.sqrt(own), -np.sqrt(own))
+    if p_phi is None:
+        z = -np.cos(theta) / y
+    else:
+        z = np.sign(p_phi) * np.sqrt((1.0 - y * y) / (1.0 + 3.0 * y * y))
+    return np.arccos(-y * z), y * (1.0 - z * z) * root, z * (1.0 - y * y) * root
+
+
+def separatrices(axes, fixed):
+    """(the square, [positions (m, 2)]) of the separatrices on the map."""
+    square = boundaries.square_over([np.array(ends) for ends in axes.values()])
+    rest = {name: value for name, value in (BODY | fixed).items() if name not in axes}
+    traced = level_curves.traced(square, list(axes), rest)
+    return square, [x for function, x, *_ in traced if function is level_curves.separatrix]
+
+
+@pytest.mark.parametrize(
+    ("axes", "fixed", "number"),
+    [
+        ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {"p_phi": 0.3}, 2),
+        ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {"p_phi": -0.7}, 2),
+        ({"p_phi": (-2.0, 1.8), "p_psi": (1.9, -2.1)}, {"theta0": 1.3}, 4),
+        ({"p_phi": (-2.0, 1.8), "p_psi": (1.9, -2.1)}, {"theta0": 1.9}, 4),
+    ],
+    ids=str,
+)
+def test_separatrices_end_at_the_cusps(axes, fixed, number):
+    """Where the saddle meets the well (S18), which is in closed form."""
+    square, curves = separatrices(axes, fixed | {"p_theta0": 0.0})
+    root = np.sqrt(BODY["epsilon"] * BODY["A"] * (BODY["A"] - BODY["C"]))
+    theta0, p_psi, p_phi = cusps_of(fixed.get("theta0"), fixed.get("p_phi"), root)
+    first = theta0 if "theta0" in axes else p_phi
+    cusps = square.positions(np.stack([first, p_psi], axis=1))
+    assert len(cusps) == number
+    ends = np.concatenate([x[[0, -1]] for x in curves])
+    apart = np.hypot(*(ends[:, None] - cusps).T).T
+    assert (apart.min(axis=0) < 2e-5).all()
+    at_cusp = apart.min(axis=1) < 2e-5
+    assert at_cusp.sum() == number  # one curve at each
+    for x in curves:
+        assert np.hypot(*np.diff(x, axis=0).T).max() < 2.0 / level_curves.LINES
+
+
+def test_a_separatrix_beside_the_end_of_its_saddle_is_one_curve():
+    """Along the discriminant, on which the saddle ends, it runs up to 1e-5 of the map beside it."""
+    axes = {"p_phi": (-1.0, 0.8), "p_psi": (0.9, -1.0)}
+    _, curves = separatrices(axes, {"p_theta0": 0.0})
+    assert len(curves) == 2
+    for x in curves:
+        on_border = (x[[0, -1]] == 0.0) | (x[[0, -1]] == 1.0)
+        assert on_border.any(axis=1).all()
+
+
+def test_a_curve_less_than_a_cell_beside_the_end_of_its_function_is_one():
+    """A parabola of which the nodes of the lattice behind it have no value; and the same up to a cusp."""
+    square = boundaries.square_over([np.array([0.0, 1.0])] * 2)
+
+    def function(x, cusp=False):
+        q, p = x.T
+        beyond = 0.1 * (q - 0.5003) ** 2 * ((q < 0.5003) | (not cusp))
+        value = p - 0.2113 - 0.7 * q * q
+        return np.where(value < beyond, value, np.nan), 1e-16 * np.ones(len(x))
+
+    for cusp, ends in ((False, 1.0), (True, 0.5003)):
+
+        def here(x, cusp=cusp):
+            return function(x, cusp)
+
+        found = contours.lines(here, square, 65, contours.continued(here, 65))
+        ((x, error),) = [contours.to_the_end(here, square.grain, line, 65) for line in found]
+        assert (abs(x[:, 1] - 0.2113 - 0.7 * x[:, 0] ** 2) <= 2.0 * error).all()
+        assert sorted(x[[0, -1], 0]) == pytest.approx([0.0, ends], abs=3e-5)
+        assert np.unique(x, axis=0).shape == x.shape
 
 
 @pytest.mark.parametrize(
