@@ -209,9 +209,8 @@ def _halved(at, low, high, grain, halvings):
     """
     rows = np.arange(low.size)
     sign = np.sign(at(rows, low[:, None])[0][:, 0])
-    lost = np.flatnonzero(
-        np.isnan(sign)
-    )  # they begin at the other end, where the function is known
+    # these begin at the other end, where the function is known
+    lost = np.flatnonzero(np.isnan(sign))
     if lost.size:
         low, high = low.copy(), high.copy()
         low[lost], high[lost] = high[lost], low[lost]
