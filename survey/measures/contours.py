@@ -12,6 +12,7 @@ from scipy.ndimage import distance_transform_edt
 from survey.measures.hill.edges import close_in
 
 HALVINGS = 30
+TO_GRAIN = 50  # halvings, to the rounding of a position: where a function ends on a line
 DENSER = 8  # times the nodes of a line, where one line alone is searched
 SURE = 1e-9  # half the width of what brackets a point
 
@@ -77,7 +78,7 @@ def _crossings(function, square, x, values, halvings):
     ends = np.flatnonzero(known[1:] != known[:-1])
     inner, outer = ends + known[ends + 1], ends + known[ends]
     last, beyond, value = t[inner], t[outer].copy(), values[inner].copy()
-    for _ in range(halvings if ends.size else 0):
+    for _ in range(TO_GRAIN if ends.size else 0):
         middle = 0.5 * (last + beyond)
         here = at(None, middle)[0]
         on = np.isfinite(here)

@@ -77,10 +77,13 @@ def curves(plane):
     everything = _traced(plane, contours.lattice(LINES, plane.square.across), np.ones((4, 2)))
     for connection in _every():
         values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
-        if np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
+        # on a line a sign may change beyond the last node before a fold
+        alone = plane.square.across is not None
+        if alone or np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
             function = partial(missed, plane, connection)
-            pieces = contours.lines(function, plane.square, LINES, values, HALVINGS)
-            if plane.square.across is None:
+            halvings = contours.HALVINGS if alone else HALVINGS
+            pieces = contours.lines(function, plane.square, LINES, values, halvings)
+            if not alone:
                 pieces = tips.followed(function, _continuous(function, pieces), plane.square.grain)
             for x, error in _continuous(function, pieces):
                 yield connection, x, error
