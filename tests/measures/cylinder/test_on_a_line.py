@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import survey
-from survey.measures.cylinder import curves
+from survey.measures.cylinder import curves, own_bifurcations
 
 JUNCTION = str(Path(__file__).parents[3] / "workflows" / "josephson.py")
 CYCLES = ("rotations_plus", "rotations_minus", "librations")
@@ -121,3 +121,21 @@ def test_the_homoclinic_point_of_a_junction_next_to_its_fold(a):
     apart = 0.3 * (1.0 - edge)
     beside = survey.evaluate(JUNCTION, question="portrait", a=a, I=[edge - apart, edge + apart])
     assert beside.rotations_plus.values.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(("a", "complete"), [(1.1930459, 0), (1.2, None)])
+def test_a_homoclinic_point_that_cannot_be_told_from_the_fold_is_not_denied(a, complete):
+    """They meet at a = 1.1930459: (a* - a)^2 is how far apart they are, to a few percent. Beyond, the
+    rotation is born in the fold.
+    """
+    found = survey.edge(JUNCTION, question="portrait", along="I", a=a, I=(0.02, 1.3))
+    assert found.edge_class.values.tolist() == [curves.CLASSES["fold"]]
+    assert found.attrs.get("complete") == complete
+
+
+def test_a_fold_that_a_branch_passes_explains_no_rotation(monkeypatch):
+    """Without the connection 9e-6 from the fold, no rotation is said to be born in the fold."""
+    monkeypatch.setattr(own_bifurcations.connections, "found", lambda plane: [])
+    found = survey.edge(JUNCTION, question="portrait", along="I", a=1.19, I=(0.02, 1.3))
+    assert found.edge_class.values.tolist() == [curves.CLASSES["fold"]]
+    assert found.attrs["complete"] == 0
