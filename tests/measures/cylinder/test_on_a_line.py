@@ -8,6 +8,8 @@ from scipy.integrate import solve_ivp
 
 import survey
 from survey.measures.cylinder import curves, own_bifurcations
+from survey.measures.square import Square
+from survey.request import user_scene
 
 JUNCTION = str(Path(__file__).parents[3] / "workflows" / "josephson.py")
 CYCLES = ("rotations_plus", "rotations_minus", "librations")
@@ -139,3 +141,16 @@ def test_a_fold_that_a_branch_passes_explains_no_rotation(monkeypatch):
     found = survey.edge(JUNCTION, question="portrait", along="I", a=1.19, I=(0.02, 1.3))
     assert found.edge_class.values.tolist() == [curves.CLASSES["fold"]]
     assert found.attrs["complete"] == 0
+
+
+def test_on_a_map_the_homoclinic_curve_of_a_junction_ends_in_the_fold(monkeypatch):
+    monkeypatch.setattr(own_bifurcations.connections, "LINES", 25)
+    square = Square(np.array([1.1, 0.99]), np.array([1.25, 1.01]), np.array([False, False]))
+    scene = user_scene.find(JUNCTION)[1]
+    plane = own_bifurcations.ScenePlane(square, ("a", "I"), {}, scene)
+    ((_connection, x, _error),) = own_bifurcations.connections.curves(plane)
+    points = square.parameters(x)
+    assert points[:, 0].min() == 1.1 and abs(points[:, 0].max() - 1.193) < 0.005
+    for a, current in points[:: len(points) // 4]:
+        apart = 1e-3 * (1.0 - current)
+        assert _junction(a, current - apart) < 0.0 < _junction(a, current + apart)
