@@ -12,6 +12,7 @@ from scipy.ndimage import distance_transform_edt
 from survey.measures.hill.edges import close_in
 
 HALVINGS = 30
+TO_GRAIN = 50  # halvings, to the rounding of a position: where a function ends on a line
 DENSER = 8  # times the nodes of a line, where one line alone is searched
 SURE = 1e-9  # half the width of what brackets a point
 # of the distance between two lines: how far from a curve's chord it is searched for at its end, and
@@ -158,7 +159,7 @@ def _on_line(at, t, values, grain, halvings):
     ends = np.flatnonzero(known[1:] != known[:-1])
     inner, outer = ends + known[ends + 1], ends + known[ends]
     last, value = _at_end(
-        lambda middle: at(None, middle), t[inner], t[outer], values[inner], halvings
+        lambda middle: at(None, middle), t[inner], t[outer], values[inner], TO_GRAIN
     )
     both = np.flatnonzero(known[1:] & known[:-1])
     low, high = np.append(t[both], t[inner]), np.append(t[both + 1], last)

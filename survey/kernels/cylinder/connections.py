@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.branches import unstable
+from survey.kernels.cylinder.branches import FURTHEST, unstable
 from survey.kernels.cylinder.equilibria import (
     ANGLE,
     BAR,
@@ -181,7 +181,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
     """
     eqs = np.zeros((MOST, EQUILIBRIUM_SIZE))
     turned = np.zeros((MOST, EQUILIBRIUM_SIZE))
-    starts = np.zeros((2 * MOST, rc.START))
+    starts = np.zeros((2, rc.START))
     q = np.zeros(P.shape[1])
     for i in range(len(P)):
         for system in range(4):
@@ -206,8 +206,6 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     turned[k, j] = eqs[k, j]
                 if mirrored:
                     turned[k, ANGLE] = TWO_PI - eqs[k, ANGLE]
-            unstable(like(P[i], q), turned, count, starts)
-            branch = 0
             for k in range(count):
                 if eqs[k, KIND] != SADDLE:
                     continue
@@ -220,7 +218,7 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     away = away if away > 0.0 else away + TWO_PI
                     row[OFFSETS + j] = away if j < count - 1 else TWO_PI
                 if wanted[system, label] > 0.0:
-                    first_turn(
-                        setting, begin, at, like(P[i], q), starts[2 * branch + 1], tolerance, row
-                    )
-                branch += 1
+                    # a start behind the next equilibrium would be taken for the passage of it
+                    reach = min(FURTHEST, 0.5 * row[OFFSETS])
+                    unstable(like(P[i], q), turned[k : k + 1], 1, starts, reach)
+                    first_turn(setting, begin, at, like(P[i], q), starts[1], tolerance, row)

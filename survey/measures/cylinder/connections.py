@@ -32,6 +32,8 @@ from survey.methods import taylor
 LINES, HALVINGS = 97, 12
 TOLERANCE = 1e-17  # truncation of one step
 BESIDE = 1e-5  # of the map: a jump is as high there as next to the point
+# of the map, from a fold to where its equilibria are told apart; and their distance (rad) there
+STEPS, CLOSE = 1e-12 * 4.0 ** np.arange(12), 0.05
 HIGH, LOW = range(2)  # saddles, by V
 # (unstable, stable): the systems in which both branches leave to the right
 UPPER, LOWER = (cn.ITSELF, cn.BOTH), (cn.MIRRORED, cn.REVERSED)
@@ -77,10 +79,13 @@ def curves(plane):
     everything = _traced(plane, contours.lattice(LINES, plane.square.across), np.ones((4, 2)))
     for connection in _every():
         values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
-        if np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
+        # on a line a sign may change beyond the last node before a fold
+        alone = plane.square.across is not None
+        if alone or np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
             function = partial(missed, plane, connection)
-            pieces = contours.lines(function, plane.square, LINES, values, HALVINGS)
-            if plane.square.across is None:
+            halvings = contours.HALVINGS if alone else HALVINGS
+            pieces = contours.lines(function, plane.square, LINES, values, halvings)
+            if not alone:
                 pieces = tips.followed(function, _continuous(function, pieces), plane.square.grain)
             for x, error in _continuous(function, pieces):
                 yield connection, x, error
@@ -117,6 +122,26 @@ def missed(plane, connection, x):
         wanted[branch] = 1.0
     out = _traced(plane, x, wanted)
     return connection.miss(*(out[:, *branch] for branch in connection.branches))
+
+
+def passes(plane, position, error):
+    """On which sides, {1 (w > 0), -1}, does a branch that comes round pass both equilibria next to a
+    fold of theirs at this position of the line? Then no rotation of that side lies on the fold.
+    """
+    for step in np.maximum(STEPS, 4.0 * error):
+        x = np.array([[position + side * step, plane.square.across] for side in (1.0, -1.0)])
+        found = [
+            (side, row[2 * before])
+            for out in _traced(plane, x, np.ones((4, 2)))
+            for side, systems in ((1, UPPER), (-1, LOWER))
+            for row in out[list(systems)].reshape(-1, cn.ROW)
+            if np.isfinite(row[cn.COLUMNS])
+            for before in [int(row[cn.COLUMNS]) - 2]
+            if row[cn.OFFSETS + before + 1] - row[cn.OFFSETS + before] < CLOSE
+        ]
+        if found:
+            return {side for side, w in found if np.isfinite(w)}
+    return set()
 
 
 def _smooth(function, x, error):

@@ -3,7 +3,8 @@
 Rotations with w > 0, those with w < 0, and librations are counted where the return maps are
 conclusive. Their numbers change by 2 at a fold of cycles of that kind, that of librations by 1 at a
 Hopf bifurcation; at a saddle connection, at a fold of equilibria, which may lie on a cycle, and
-where the ends change, by 1 or not at all (see `segments`).
+where the ends change, by 1 or not at all (see `segments`). On a line a fold of equilibria that a
+branch passes lies on no rotation, and leaves their numbers as they are.
 """
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy as np
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.program import COLUMNS
 from survey.measures import contours
+from survey.measures.cylinder import connections
 from survey.measures.cylinder.fate import KINDS, LIBRATIONS, MINUS, PLUS, G, remembered
 from survey.measures.segments import UNKNOWN, along, segments
 from survey.methods import taylor
@@ -18,6 +20,7 @@ from survey.methods import taylor
 LINES = 33
 WITHIN = 1e-8  # of the map: what positions on a border may be off
 BESIDE = (0.2, 0.02, 2e-3, 2e-4)  # of the gap to the next point of a curve
+SIDES = {PLUS: 1, MINUS: -1}
 HOPF = ("supercritical_hopf", "subcritical_hopf")
 OPTIONAL = ("homoclinic", "heteroclinic", "fold", "ends")
 WEIGHTS = {"cycle_fold": 2}
@@ -54,13 +57,17 @@ def lost(plane, rows, counts):
 
 
 def _met(plane, rows):
-    """[(name, position, known)] of the points on the border that is asked for alone."""
+    """[(name, position, known)] of the points on the border that is asked for alone; `known` with
+    the sides on which folds are "passed" (see `connections.passes`).
+    """
     value = plane.square.parameters(np.array([0.0, plane.square.across]))[1]
-    return [
-        (name, plane.positions(point[None])[0, 0], known)
-        for name, xy, _error, known in rows
-        for point in xy[xy[:, 1] == value]
-    ]
+    met = []
+    for name, xy, errors, known in rows:
+        for i in np.flatnonzero(xy[:, 1] == value):
+            position = plane.positions(xy[i : i + 1])[0, 0]
+            passed = connections.passes(plane, position, errors[i]) if name == "fold" else ()
+            met.append((name, position, known | {"passed": passed}))
+    return met
 
 
 def lost_on_border(plane, rows):
@@ -71,7 +78,11 @@ def lost_on_border(plane, rows):
     ticks, counts = _on_border(plane, met)
     parts = set()
     for kind, values in zip(KINDS, counts, strict=True):
-        own = [(name, position) for name, position, known in met if _counts_for(kind, name, known)]
+        own = [
+            (name, position)
+            for name, position, known in met
+            if _counts_for(kind, name, known) and SIDES.get(kind) not in known["passed"]
+        ]
         explained = along(values, ticks, own, WEIGHTS, OPTIONAL, WITHIN)
         parts |= {segment for segment, good in explained.items() if not good}
     return [

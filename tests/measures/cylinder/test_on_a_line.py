@@ -1,11 +1,17 @@
 """The boundaries of portraits along one axis: all, by how many cycles there are beside each."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import survey
-from survey.measures.cylinder import curves
+from survey.measures.cylinder import curves, own_bifurcations
+from survey.measures.square import Square
+from survey.request import user_scene
 
+JUNCTION = str(Path(__file__).parents[3] / "workflows" / "josephson.py")
 CYCLES = ("rotations_plus", "rotations_minus", "librations")
 # (axis, fixed parameters) of lines along which a search at the spacing of a whole map misses a curve,
 # and of one that meets a loop with two turning points
@@ -73,3 +79,78 @@ def test_no_boundary_hides_another_beside_it(along, ends, near, kind, system):
     beside = survey.evaluate("gyrostat", question="portrait", **{along: sides}, **system)
     change = sum(abs(np.diff(beside[name].values)).item() for name in CYCLES)
     assert change == (2 if kind == "cycle_fold" else 1) and error < 1e-10
+
+
+def _junction(a, current):
+    """w of the unstable less that of the stable branch of the saddle, at the other equilibrium, by
+    SciPy: below 0 where the junction's branch does not come back to its saddle.
+    """
+    saddle, rest = np.pi - np.arcsin(current), np.arcsin(current)
+    steep = np.cos(rest)  # g' at the saddle
+    rates = 0.5 * (-a + np.array([1.0, -1.0]) * np.sqrt(a * a + 4.0 * steep))
+    found = []
+    for rate, start, end in (
+        (rates[0], saddle - 2.0 * np.pi, rest),
+        (rates[1], saddle, rest),
+    ):
+        x = 0.01 * (end - start)
+        bend = 0.5 * current / (3.0 * rate + a)
+        third = (-steep / 6.0 - 2.0 * bend * bend) / (4.0 * rate + a)
+        w = ((third * x + bend) * x + rate) * x
+        solved = solve_ivp(
+            lambda phi, w: (current - np.sin(phi)) / w - a,
+            (start + x, end),
+            [w],
+            method="DOP853",
+            rtol=1e-12,
+            atol=1e-15,
+        )
+        found.append(solved.y[0, -1] if solved.success else 0.0)
+    return found[0] - found[1]
+
+
+@pytest.mark.parametrize("a", [0.2, 1.15, 1.167, 1.18, 1.19])
+def test_the_homoclinic_point_of_a_junction_next_to_its_fold(a):
+    """The curve ends in the fold at a = 1.193: the branches miss each other to either side of the
+    point, a rotation is born in it, and there is no other.
+    """
+    found = survey.edge(JUNCTION, question="portrait", along="I", a=a, I=(0.02, 1.3))
+    kinds = [curves.CLASSES["homoclinic"], curves.CLASSES["fold"]]
+    assert found.edge_class.values.tolist() == kinds
+    edge, error = found.edge.values[0].item(), found.edge_error.values[0].item()
+    assert error < 1e-11 and "complete" not in found.attrs
+    assert _junction(a, edge - 1e-9) < 0.0 < _junction(a, edge + 1e-9)
+    apart = 0.3 * (1.0 - edge)
+    beside = survey.evaluate(JUNCTION, question="portrait", a=a, I=[edge - apart, edge + apart])
+    assert beside.rotations_plus.values.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(("a", "complete"), [(1.1930459, 0), (1.2, None)])
+def test_a_homoclinic_point_that_cannot_be_told_from_the_fold_is_not_denied(a, complete):
+    """They meet at a = 1.1930459: (a* - a)^2 is how far apart they are, to a few percent. Beyond, the
+    rotation is born in the fold.
+    """
+    found = survey.edge(JUNCTION, question="portrait", along="I", a=a, I=(0.02, 1.3))
+    assert found.edge_class.values.tolist() == [curves.CLASSES["fold"]]
+    assert found.attrs.get("complete") == complete
+
+
+def test_a_fold_that_a_branch_passes_explains_no_rotation(monkeypatch):
+    """Without the connection 9e-6 from the fold, no rotation is said to be born in the fold."""
+    monkeypatch.setattr(own_bifurcations.connections, "found", lambda plane: [])
+    found = survey.edge(JUNCTION, question="portrait", along="I", a=1.19, I=(0.02, 1.3))
+    assert found.edge_class.values.tolist() == [curves.CLASSES["fold"]]
+    assert found.attrs["complete"] == 0
+
+
+def test_on_a_map_the_homoclinic_curve_of_a_junction_ends_in_the_fold(monkeypatch):
+    monkeypatch.setattr(own_bifurcations.connections, "LINES", 25)
+    square = Square(np.array([1.1, 0.99]), np.array([1.25, 1.01]), np.array([False, False]))
+    scene = user_scene.find(JUNCTION)[1]
+    plane = own_bifurcations.ScenePlane(square, ("a", "I"), {}, scene)
+    ((_connection, x, _error),) = own_bifurcations.connections.curves(plane)
+    points = square.parameters(x)
+    assert points[:, 0].min() == 1.1 and abs(points[:, 0].max() - 1.193) < 0.005
+    for a, current in points[:: len(points) // 4]:
+        apart = 1e-3 * (1.0 - current)
+        assert _junction(a, current - apart) < 0.0 < _junction(a, current + apart)
