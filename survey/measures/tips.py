@@ -15,7 +15,7 @@ from survey.measures.sampled import FLAT, LONGEST
 LEAST = 1e-4  # of the map: a shorter step than this is the end
 FITS = 3  # parabolas, one inside the other
 MOST = 60  # steps
-ENDS = 64  # that are followed, those of the longest pieces: where tongues crowd there are hundreds
+ENDS = 256  # that are followed, those of the longest pieces: where tongues crowd there are hundreds
 SURE = 1e-6  # the widest bracket of a point, half of it, that is drawn
 SAME = 1e-8  # how near one point is found again, besides the brackets
 BESIDE = 1e-4  # of the map: a step that ends so near a piece of the same sense is on its curve
