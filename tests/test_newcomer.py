@@ -504,7 +504,7 @@ def labelled(scene):
 DATASET = [
     (
         lambda ds, scene: labelled(scene).survey.zoom(case=("soft", "hard")),
-        "case = ('soft', 'hard'): give two numbers",
+        "case = ('soft', 'hard'): an axis of names, and nothing lies between them",
     ),
     (
         lambda ds, scene: ds.survey.zoom(a=(0.5, 1.0), num={"e": 3}),

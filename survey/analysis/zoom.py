@@ -74,8 +74,10 @@ def _ranges(ds, ranges):
     axes = [dim for dim in given if ds[dim].dtype.kind in "iuf"]
     for name in given:
         if name not in axes and (name in ranges or not axes):
+            value = f" = {shown(ranges[name])}:" if name in ranges else " is"
             raise BadInput(
-                f"zoom: {name} is an axis of names, and nothing lies between them; survey.evaluate solves further ones"
+                f"zoom: {name}{value} an axis of names, and nothing lies between them; survey.evaluate solves "
+                "further ones"
             )
     if not axes:
         refuse_members(ds, "zoom", "survey.evaluate solves further ones")
