@@ -62,7 +62,7 @@ def test_masses_and_bodies():
         several.survey.zoom,
         lambda: several.survey.zoom(body=(0.0, 1.0)),
     ):
-        with pytest.raises(BadInput, match="body is an axis of names, and nothing lies between"):
+        with pytest.raises(BadInput, match=r"body.* an axis of names, and nothing lies between"):
             refused()
     assert float(survey.evaluate("libration_elliptic", body="Earth-Moon", e=0.1).e) == 0.1
     with pytest.raises(BadInput, match="unknown pair 'Earth-Mon'; did you mean 'Earth-Moon'"):
