@@ -35,6 +35,7 @@ for name in (
     "statvfs", "sync", "writev",
 ):
     vars(os).pop(name, None)
+os.process_cpu_count = os.cpu_count  # from Python 3.13 on; elsewhere it asks for no affinity
 for name in ("SIGHUP", "SIGUSR1", "alarm", "pthread_kill", "pthread_sigmask", "setitimer", "sigwait"):
     vars(signal).pop(name, None)
 os.supports_fd.clear()
