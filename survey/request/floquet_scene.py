@@ -19,8 +19,7 @@ from survey.scene import plus_minus
 LARGEST = 64  # states
 TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
 NODES = 1500  # that a map asks for, roughly
-STRUCTURES = ("symplectic", "reversible")  # by which stable points can be told
-SOME = 4  # points at which one is tried
+SOME = 4  # points at which a structure is tried
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
 STATUS = {
     "invalid_parameters": "outside the domain, or A or T is not finite there, or A does not have the stated structure",
@@ -252,7 +251,8 @@ class FloquetScene(TracedScene):
         if self.structure != "none" or self.conserved is not None or "suggested" in self._known:
             return
         self._known["suggested"] = 1.0
-        fitting = [name for name in STRUCTURES if self._fits(name, points)]
+        others = [name for name in stability.STRUCTURES if name != self.structure]
+        fitting = [name for name in others if self._fits(name, points)]
         if fitting:
             what = "the trace of A is 0: the multipliers have the product 1, and no point can be found stable"
             which = " or ".join(f"'{name}'" for name in fitting)

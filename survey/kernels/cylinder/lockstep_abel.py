@@ -128,23 +128,20 @@ def _coast(w, change, distance):
 
 
 @inline
-def _sine_cosine(x):
-    """`lockstep.sine_cosine` of any x."""
-    k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
-    return sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
+def _forces(fixed, i):
+    """The coefficients of f and g of lane i."""
+    return fixed[P12, i], fixed[P31, i], fixed[P2, i], fixed[P3, i], fixed[PD, i]
 
 
 @inline
-def _functions(fixed, i, sine, cosine):
-    """f, g and g' of lane i."""
-    f = fixed[P12, i] * cosine - fixed[P31, i] * sine
-    g = fixed[P2, i] * cosine - fixed[P3, i] * sine - fixed[PD, i] * (sine * cosine)
-    dg = (
-        -fixed[PD, i] * ((cosine - sine) * (cosine + sine))
-        - fixed[P2, i] * sine
-        - fixed[P3, i] * cosine
-    )
-    return f, g, dg
+def _functions(forces, x):
+    """f, g and g' at the angle x, from `_forces`."""
+    p12, p31, p2, p3, pd = forces
+    k = (x * (1.0 / TWO_PI) + NEAREST) - NEAREST
+    sine, cosine = sine_cosine((x - k * TWO_PI) - k * TWO_PI_LOW)
+    g = p2 * cosine - p3 * sine - pd * (sine * cosine)
+    dg = -pd * ((cosine - sine) * (cosine + sine)) - p2 * sine - p3 * cosine
+    return p12 * cosine - p31 * sine, g, dg
 
 
 @inline
@@ -185,9 +182,7 @@ def _cross(T, state, before, fixed, i, reach, total, end, block, size):
         before[TIME_LOW, i],
     )
     carried = before[SAA, i], before[SAB, i], before[SBB, i]
-    p12, p31, p2, p3, pd, most_f, most_g = (
-        fixed[P12, i], fixed[P31, i], fixed[P2, i], fixed[P3, i], fixed[PD, i], fixed[PF, i], fixed[PG, i]
-    )  # fmt: skip
+    forces, most_f, most_g = _forces(fixed, i), fixed[PF, i], fixed[PG, i]
     ends = last_terms(T, i)
     # psi is nearly the cubic with these w, and these w', at both ends
     bulge = 6.0 * total / reach - 3.0 * (w + end)
@@ -215,8 +210,7 @@ def _cross(T, state, before, fixed, i, reach, total, end, block, size):
         x += psi
         a, b, d = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
         a += block[SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
-        sine, cosine = _sine_cosine(x)
-        f, g = p12 * cosine - p31 * sine, p2 * cosine - p3 * sine - pd * (sine * cosine)
+        f, g, _dg = _functions(forces, x)
         more = min(max((block[GOAL + j] - x) / max(v, 1e-300), -dt), reach - dt)
         v, dt = v + more * (f * v + g), dt + more
         value, time, value_bar, time_bar = crossing(n, v, t + (dt + t_low), a, b, d, f, g)
@@ -386,8 +380,7 @@ def _calm(state, fixed, goal, doubt, started, calm):
     for i in range(LANES):
         psi, v, square = state[PSI, i], state[V, i], state[SBB, i]
         x = psi + state[TURNS, i] * TWO_PI
-        sine, cosine = _sine_cosine(psi)
-        f, g, dg = _functions(fixed, i, sine, cosine)
+        f, g, dg = _functions(_forces(fixed, i), psi)
         no_node = (v * fixed[PF, i] > 0.3 * fixed[PG, i]) | (
             not node_possible(f, g, dg, fixed[PF, i])
         )

@@ -390,15 +390,6 @@ def program(f, g, point, on_circle):
     return flows(f, g, np.array(point, dtype=float)[None], on_circle)[0]
 
 
-def balls(row, phi):
-    """Middle and radius of the ball of every value at phi (SLOTS, 2): what is computed, and its
-    rounding error.
-    """
-    out = np.zeros((int(row[pg.SLOTS]), 1, 2))
-    pg.ball(row, float(phi), 0.0, 1, out)
-    return out[:, 0]
-
-
 def flows(f, g, points, on_circle):
     """The programs (N, n) of the parameters (N, m), padded to one length; NaN where there is none."""
     own, where = np.unique(np.asarray(points, dtype=float), axis=0, return_inverse=True)
