@@ -134,7 +134,9 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
             P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0]
         )
         waiting.wait()
-    _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status)
+    at = np.full((len(P), targets.shape[1] + lockstep_phi.BLOCK), np.inf)
+    at[:, : targets.shape[1]] = targets
+    _abels_in_angle(P, starts, at, tolerance, limit, ahead, floats, status)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
 
 

@@ -322,6 +322,10 @@ def _refill(
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
+            begun, first = ahead[waiting, far.W] > 0.0, int(ahead[waiting, far.COLUMN])
+            if begun and first == targets.shape[1]:  # all are known
+                waiting += 1
+                continue
             p = P[waiting]
             phi0 = starts[waiting, rc.START_PHI]
             w0 = starts[waiting, rc.START_W]
@@ -331,8 +335,6 @@ def _refill(
                 floats[waiting, :size],
                 status[waiting, :size],
             )
-            begun = ahead[waiting, far.W] > 0.0
-            first = int(ahead[waiting, far.COLUMN]) if begun else 0
             if first < size and (
                 begun or not at_rest(p, reduced(phi0)[0], phi0, w0, at, rows, codes)
             ):

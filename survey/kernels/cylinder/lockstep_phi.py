@@ -50,10 +50,11 @@ from survey.kernels.unroll import summed, unroll
 
 ORDER = 16
 VARIED = 4  # order of the integral of g / w^2
-# Rows of the series: f / w0 and g / w0^2, omega, q, r.
+# Rows of the series: f / w0 and g / w0^2, omega, q, r, and the integral of r.
 F_, G_, OMEGA = 0, ORDER, 2 * ORDER
 Q, R = OMEGA + ORDER + 1, OMEGA + 2 * ORDER + 1
-TABLE = R + ORDER + 1
+INTEGRAL = R + ORDER + 1
+TABLE = INTEGRAL + ORDER + 1
 # Rows of a state: where the solution stands, its error bounds, the next target, and 1 / the last
 # step.
 (AT, TURNED, W, TIME, TIME_LOW, W_BOUND, T_BOUND, COUNT, COLUMN, RATE) = range(10)
@@ -86,7 +87,7 @@ def _functions(T, fixed, i, s, c, inverse):
         two.append(-4.0 * share * two[n - 2])
     for n in range(ORDER):
         T[F_ + n, i], T[G_ + n, i] = f[n], one[n] + two[n]
-    T[OMEGA, i], T[R, i] = 1.0, 1.0
+    T[OMEGA, i], T[R, i], T[INTEGRAL, i] = 1.0, 1.0, 1.0
 
 
 def _orders(first, last):
@@ -107,6 +108,7 @@ def _orders(first, last):
             omega.append((T[F_ + n, i] + q[n]) * (1.0 / (n + 1)))
             r.append(-summed(omega[k] * r[n + 1 - k] for k in range(1, n + 2)))
             T[Q + n, i], T[OMEGA + n + 1, i], T[R + n + 1, i] = q[n], omega[n + 1], r[n + 1]
+            T[INTEGRAL + n + 1, i] = r[n + 1] * (1.0 / (n + 2))
 
     return expand
 
@@ -147,6 +149,7 @@ def _coefficients(row, size):
 
 _omega = _coefficients(OMEGA, ORDER + 1)
 _r = _coefficients(R, ORDER + 1)
+_integral = _coefficients(INTEGRAL, ORDER + 1)
 _low_q = _coefficients(Q, VARIED + 1)
 
 
@@ -158,11 +161,10 @@ def _rise(omega, s):
 
 
 @unroll
-def _elapsed(r, s):
+def _elapsed(integral, s):
     """w0 (t - t0) at s."""
-    x = [r[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
     square = s * s
-    return (polynomial(x[0::2], square) + polynomial(x[1::2], square) * s) * s
+    return (polynomial(integral[0::2], square) + polynomial(integral[1::2], square) * s) * s
 
 
 @unroll
@@ -203,7 +205,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         end = psi + 1.0 / rate
         h = end - psi
         v = w + w * _rise(omega, h)
-        spent = _elapsed(r, h) * inverse
+        spent = _elapsed(_integral(T, i), h) * inverse
         lowest = 0.5 * (w + v - h * slope)
         h2 = h * h
         h4 = h2 * h2
@@ -230,10 +232,22 @@ def _advance(T, state, before, step, fixed, tolerance):
         state[RATE, i] = rate
 
 
+@inline
+def _eight(table, row, column):
+    """Eight numbers of a row, all read before any is used: else no vector code."""
+    # nor with an index that may count from the end
+    i, j = np.uint64(row), np.uint64(column)
+    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+    k = j + four
+    return (
+        table[i, j], table[i, j + one], table[i, j + two], table[i, j + three],
+        table[i, k], table[i, k + one], table[i, k + two], table[i, k + three],
+    )  # fmt: skip
+
+
 @kernel
-def _record(T, before, state, step, i, block, targets, first, floats, status):
-    """Record lane i at its targets, from the `first` on, within the step; returns the next."""
-    omega, r = _omega(T, i), _r(T, i)
+def _record(T, before, state, step, i, block, targets, k, first, floats):
+    """Record lane i at the targets of row k, from the `first` on, within the step; returns the next."""
     psi, turns, w, t, t_low = (
         before[AT, i],
         before[TURNED, i],
@@ -241,32 +255,33 @@ def _record(T, before, state, step, i, block, targets, first, floats, status):
         before[TIME, i],
         before[TIME_LOW, i],
     )
-    inverse, size, end = 1.0 / before[W, i], len(targets), state[AT, i]
-    high = step[W_WITHIN, i]
-    slope = step[STEEPEST, i]
-    time_bar = state[T_BOUND, i]
-    slowest = 1.0 / step[LOWEST, i]
-    last = first
-    while last < size and unturned(targets[last], turns) <= end:
-        last += 1
-    while first < last:
-        for j in range(BLOCK):  # the last of a block may lie beyond the step
-            target = targets[min(first + j, size - 1)]
-            block[j] = max(unturned(target, turns) - psi, 0.0)
-            block[BLOCK + j] = 3e-16 * abs(target)
+    inverse, end = 1.0 / w, state[AT, i]
+    high, slope = step[W_WITHIN, i], step[STEEPEST, i]
+    time_bar, slowest = state[T_BOUND, i], 1.0 / step[LOWEST, i]
+    while True:
+        # read anew: broadcast from memory, where 34 vectors would be kept on the stack
+        omega, integral = _omega(T, i), _integral(T, i)
+        given = _eight(targets, k, first)
         for j in range(BLOCK):
-            s, slip = block[j], block[BLOCK + j]
-            value, time = w + w * _rise(omega, s), t + (_elapsed(r, s) * inverse + t_low)
-            block[2 * BLOCK + j], block[3 * BLOCK + j] = value, time
-            block[4 * BLOCK + j] = 1.02 * (high + slope * slip)
-            block[5 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
-        for j in range(min(BLOCK, last - first)):
-            row = floats[first + j]
-            row[rc.VALUE], row[rc.TIME] = block[2 * BLOCK + j], block[3 * BLOCK + j]
-            row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[4 * BLOCK + j], block[5 * BLOCK + j]
-            status[first + j] = OK
-        first += BLOCK
-    return last
+            block[j] = given[j]
+        count = 0
+        for j in range(BLOCK):
+            target = block[j]
+            x = unturned(target, turns)
+            passed = x <= end
+            count += passed
+            s, slip = max(x - psi, 0.0) if passed else 0.0, 3e-16 * abs(target)
+            value, time = w + w * _rise(omega, s), t + (_elapsed(integral, s) * inverse + t_low)
+            block[BLOCK + j], block[2 * BLOCK + j] = value, time
+            block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
+            block[4 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
+        for j in range(count):
+            row = floats[np.uint64(k), np.uint64(first + j)]
+            row[rc.VALUE], row[rc.TIME] = block[BLOCK + j], block[2 * BLOCK + j]
+            row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[3 * BLOCK + j], block[4 * BLOCK + j]
+        first += count
+        if count < BLOCK:
+            return first
 
 
 @inline
@@ -276,8 +291,9 @@ def _far(w, bound, most_g):
 
 
 @kernel
-def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
-    """Give free lanes the rows that wait; returns the first that still waits."""
+def _refill(P, starts, targets, status, waiting, state, fixed, row, sizes, goal, ahead):
+    """Give free lanes the rows that wait, whose status is OK at first; returns the first that still waits."""
+    width = status.shape[1]
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             p, w0 = P[waiting], starts[waiting, rc.START_W]
@@ -298,11 +314,11 @@ def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
                         2.0 + bend / w0,
                     )
                     state[W_BOUND, i], state[T_BOUND, i] = bound, slip / w0
-                    row[i], sizes[i], goal[i] = (
-                        waiting,
-                        finite(targets[waiting]),
-                        targets[waiting, 0],
-                    )
+                    row[i], goal[i], sizes[i] = waiting, targets[waiting, 0], width
+                    if not math.isfinite(targets[waiting, width - 1]):
+                        sizes[i] = finite(targets[waiting])
+                    for k in range(sizes[i]):
+                        status[waiting, k] = OK
             waiting += 1
         if row[i] < 0:
             state[AT, i], state[W, i] = 0.0, 1.0  # a free lane moves too
@@ -311,7 +327,8 @@ def _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead):
 
 @inline
 def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
-    """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`.
+    """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`, but
+    that the rows of `targets` end with BLOCK infinities.
 
     `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and
     COLUMN is the number of its targets where all are known.
@@ -324,12 +341,14 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     step, fixed = work[third:fourth], work[fourth:]
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
-    goal, block = np.zeros(LANES), np.zeros(6 * BLOCK)
+    goal, block = np.zeros(LANES), np.zeros(5 * BLOCK)
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
     free, ended = True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
-            waiting = _refill(P, starts, targets, waiting, state, fixed, row, sizes, goal, ahead)
+            waiting = _refill(
+                P, starts, targets, status, waiting, state, fixed, row, sizes, goal, ahead
+            )
             if not busy(row):
                 return
         _series(T, state, fixed)
@@ -349,9 +368,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
             size, j = sizes[i], int(state[COLUMN, i])
             if sound:
-                j = _record(
-                    T, before, state, step, i, block, targets[k, :size], j, floats[k], status[k]
-                )
+                j = _record(T, before, state, step, i, block, targets, k, j, floats)
             far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
             if j < size and sound and far and state[COUNT, i] < limit:
                 state[COLUMN, i], goal[i] = j, targets[k, j]

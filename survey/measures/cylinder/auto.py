@@ -120,8 +120,10 @@ def _left_open(results, rtol):
     too many steps or an overflow, and those that have turned an undetermined number of times.
     """
     status = results[-1]
-    missed = solution.missed(results, max(rtol, FINEST))
-    if missed.any():
+    if solution.met(results, max(rtol, FINEST)):
+        missed = np.zeros(status.shape, bool)
+    else:
+        missed = solution.missed(results, max(rtol, FINEST))
         missed &= (
             (status == OK)
             | (status == TURNING)
@@ -136,9 +138,9 @@ def _left_open(results, rtol):
 
 def _completed(results, missed, solve, rows, columns):
     """`results`, with those of `solve` where they are `missed` and `solve` does no worse."""
-    some = missed.any(axis=1)
-    if not some.any():
+    if not missed.any():
         return results
+    some = missed.any(axis=1)
     others = solve(rows[some], np.where(missed[some], columns[some], np.inf))
     old = [result[some] for result in results]
     take = missed[some] & (solution.badness(others) <= solution.badness(old))

@@ -33,8 +33,10 @@ def dense(point, names, name):
         rows[..., i] = array
     rows = rows.reshape(-1, len(names))
 
+    whole, axes = [shape[i] for i in order], np.argsort(order)
+
     def back(values):
-        return values.reshape([shape[i] for i in order]).transpose(np.argsort(order))
+        return values.reshape(whole).transpose(axes)
 
     return rows, last, back
 
@@ -79,24 +81,21 @@ def abel(rows, targets, back, measure, method, rtol, before):
 def at_angles(results, good, back):
     """The outputs of the question `abel`, from floats and status where the input is `good`."""
     floats, status = results
-    status = np.where(good, status, INVALID_PARAMETERS)
+    if not good.all():
+        status = np.where(good, status, INVALID_PARAMETERS)
     results = {"status": back(status)}
+    nothing = np.broadcast_to(np.nan, results["status"].shape)
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), TURNING)):
         here = status == code
+        some, all_ = here.any(), here.all()
         for name, value, bar in zip(
             names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True
         ):
-            results[name], results[f"{name}_error"] = (
-                back(_only(here, floats[..., at])) for at in (value, bar)
-            )
+            for key, at in ((name, value), (f"{name}_error", bar)):
+                values = floats[..., at]
+                values = values if all_ else np.where(here, values, np.nan) if some else None
+                results[key] = nothing if values is None else back(values)
     return results
-
-
-def _only(here, values):
-    """The values with NaN elsewhere; without a copy where it is all or nothing."""
-    if here.all():
-        return values
-    return np.where(here, values, np.nan) if here.any() else np.broadcast_to(np.nan, here.shape)
 
 
 def _systems(point, names):

@@ -8,6 +8,7 @@ that misses the requested accuracy is solved again with smaller steps, and the b
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.accuracy import all_within
 from survey.kernels.cylinder.flow import spread, spread_programs
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
@@ -154,7 +155,8 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
     """
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
-    if len(rows) and (past == past[0]).all() and (targets >= phi0).all():  # as a rule
+    least = distinct(targets).min(axis=1, keepdims=True, initial=np.inf)
+    if targets.size and (past == past[0]).all() and (least >= phi0).all():  # as a rule
         return _branch(method, rows, targets, rtol, 1.0, past[0], by_row)
     floats = np.full((*targets.shape, rc.STATE), np.nan)
     status = np.zeros(targets.shape, dtype=np.int64)
@@ -188,11 +190,12 @@ def _branch(method, rows, targets, rtol, side, past, by_row):
     rows = reverse(rows) if past else rows
     rows = mirror(rows) if side < 0 else rows.copy()
     rows[:, rc.W0] = np.abs(rows[:, rc.W0])
+    rows[:, rc.PHI0] += 0.0  # no negative zeros
     floats, status = _in_phi(method, rows, side * targets if side < 0 else targets, rtol, by_row)
     if side < 0 or past:
         floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
         floats[..., rc.TIME] *= -1.0 if past else 1.0
-    floats += 0.0  # no negative zeros
+        floats += 0.0  # no negative zeros
     return floats, status
 
 
@@ -209,7 +212,8 @@ def _in_phi(method, rows, targets, rtol, by_row):
         solve(P, starts, at, tolerance, budget, floats, status)
         return floats, status
 
-    return back(_repeated(run, np.isfinite(targets), tolerances(method, rtol, ABEL_SHARE), rtol))
+    asked = np.isfinite(distinct(targets))
+    return back(_repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol))
 
 
 def _repeated(run, asked, ladder, rtol):
@@ -217,6 +221,8 @@ def _repeated(run, asked, ladder, rtol):
     first, *others = ladder
     results = run(slice(None), first)
     for tolerance in others:
+        if met(results, rtol):
+            break
         coarse = (missed(results, rtol) & asked).any(axis=1)
         if not coarse.any() or tolerance >= first:
             break
@@ -229,11 +235,17 @@ def _repeated(run, asked, ladder, rtol):
     return results
 
 
+def met(results, rtol):
+    """Does no answer miss the requested accuracy? As a rule; where some do, `missed` says which."""
+    floats, status = results[0], results[-1]
+    return all_within(floats.reshape(-1, floats.shape[-1]), status.reshape(-1), rtol)
+
+
 def missed(results, rtol):
     """Where the answer misses the requested accuracy, or there is none."""
     floats, status = results[0], results[-1]
-    out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
     points = floats.reshape(-1, floats.shape[-1])
+    out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
     for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
         wide = np.flatnonzero(~(points[:, bar] <= rtol))  # as a rule, few
         if wide.size:
@@ -250,11 +262,17 @@ def badness(results):
     return worst + np.where((status == OK) | (status == TURNING), 0.0, 1e300)
 
 
+def distinct(columns):
+    """The one row of an array whose rows are the same by broadcasting, else all."""
+    return columns[:1] if columns.strides[0] == 0 else columns
+
+
 def _sorted(columns):
     """`columns` (rows, n) in ascending order, and the function that brings results back into their order."""
-    if (columns[:, 1:] >= columns[:, :-1]).all():
+    own = distinct(columns)
+    if (own[:, 1:] >= own[:, :-1]).all():
         return columns, lambda results: results
-    if (columns[:, 1:] <= columns[:, :-1]).all():
+    if (own[:, 1:] <= own[:, :-1]).all():
         return columns[:, ::-1], lambda results: tuple(result[:, ::-1] for result in results)
     order = np.argsort(columns, axis=1, kind="stable")
     back = np.argsort(order, axis=1)

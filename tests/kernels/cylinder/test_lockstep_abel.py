@@ -89,7 +89,16 @@ def test_phi_is_the_variable_far_from_turning_points():
     ahead = np.zeros((len(rows), lockstep_phi.STATE))
     P, starts = solution.split(rows)
     again, codes = np.empty_like(floats), np.empty_like(status)
-    lockstep_phi.abels(P, starts, rows[:, 6:7] + over, 1e-13, solution.STEPS, ahead, again, codes)
+    lockstep_phi.abels(
+        P,
+        starts,
+        np.pad(rows[:, 6:7] + over, ((0, 0), (0, lockstep_phi.BLOCK)), constant_values=np.inf),
+        1e-13,
+        solution.STEPS,
+        ahead,
+        again,
+        codes,
+    )
     assert (ahead[:, lockstep_phi.COLUMN] == len(over)).all() and (status == steps.OK).all()
     np.testing.assert_array_equal(again, floats)
     assert floats[..., 2].max() < 1e-10 and floats[..., 3].max() < 1e-10
@@ -184,7 +193,7 @@ def test_a_row_of_nan_affects_itself_alone(column):
 def test_a_row_ends_at_its_first_infinity_and_a_budget_ends_it():
     rows = drawn(MANY, 8, (1, 1, 1, 1, 1, 1, 3, 9))
     rows[:, 7] += 5.0
-    floats, status = solved(rows, [2.0, np.inf, 3.0])
+    floats, status = solved(rows, [2.0, np.inf, np.inf])
     assert (
         np.isfinite(floats[:, 0]).all()
         and np.isnan(floats[:, 1:]).all()
