@@ -133,7 +133,7 @@ def applies(p, phi0, w0):
     sigma = (p[S2] * b12 + p[S3] * b31) / square
     rest = 0.5 * abs(p[D] - delta * u) + abs(p[C23] - delta * v)
     rest += abs(p[S2] - sigma * b12) + abs(p[S3] - sigma * b31)
-    b, F = math.sqrt(square), b12 * math.sin(phi0) + b31 * math.cos(phi0)
+    b = math.sqrt(square)
     inner = 0.25 - delta
     if inner < -SAME:
         return NONE, 0.0, 0.0
@@ -141,9 +141,11 @@ def applies(p, phi0, w0):
     for i in range(2):
         one, two = 0.5 + root, delta / (0.5 + root)
         mu, other = (one, two) if i == 0 else (two, one)
-        n = w0 - mu * F
-        miss = rest + b * (abs(other * n + sigma) + b * abs(delta - mu * other))
         size = b * (abs(sigma) + abs(delta) * b + abs(other) * (abs(w0) + abs(mu) * b))
+        if not rest <= SAME * size:  # as a rule, and no sine is needed
+            continue
+        n = w0 - mu * (b12 * math.sin(phi0) + b31 * math.cos(phi0))
+        miss = rest + b * (abs(other * n + sigma) + b * abs(delta - mu * other))
         if miss <= SAME * size:
             return TRIGONOMETRIC, mu, other
     return NONE, 0.0, 0.0

@@ -64,6 +64,13 @@ def on_circle(p):
     return len(p) == COLUMNS or p[ON_CIRCLE] > 0.0
 
 
+@inline
+def _length(x, y):
+    """sqrt(x^2 + y^2); libm's takes six times as long."""
+    square = x * x + y * y
+    return math.sqrt(square) if 1e-280 < square and square < 1e280 else math.hypot(x, y)
+
+
 @kernel
 def spread(rows, P, starts):
     """Fill P with the `coefficients` of rows of GIVEN numbers (see `records`), and starts with
@@ -73,9 +80,9 @@ def spread(rows, P, starts):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(SIX):
             P[i, k] = rows[i, k]
-        b = math.hypot(P[i, B12], P[i, B31])
-        c = math.hypot(0.5 * P[i, D], P[i, C23])
-        s = math.hypot(P[i, S2], P[i, S3])
+        b = _length(P[i, B12], P[i, B31])
+        c = _length(0.5 * P[i, D], P[i, C23])
+        s = _length(P[i, S2], P[i, S3])
         P[i, BOUND_F], P[i, BOUND_G], P[i, BOUND_DG], P[i, BOUND_DDG] = (
             b,
             c + s,

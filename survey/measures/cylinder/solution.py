@@ -188,9 +188,7 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
 def _branch(method, rows, targets, rtol, side, past, by_row):
     """As `abel`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
     rows = reverse(rows) if past else rows
-    rows = mirror(rows) if side < 0 else rows.copy()
-    rows[:, rc.W0] = np.abs(rows[:, rc.W0])
-    rows[:, rc.PHI0] += 0.0  # no negative zeros
+    rows = mirror(rows) if side < 0 else rows
     floats, status = _in_phi(method, rows, side * targets if side < 0 else targets, rtol, by_row)
     if side < 0 or past:
         floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
@@ -206,6 +204,8 @@ def _in_phi(method, rows, targets, rtol, by_row):
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
+        starts[:, rc.START_W] = np.abs(starts[:, rc.START_W])
+        starts += 0.0  # no negative zeros
         floats = np.full((*targets[pick].shape, rc.STATE), np.nan)
         status = np.zeros(targets[pick].shape, dtype=np.int64)
         at = np.array(targets[pick], order="C")
