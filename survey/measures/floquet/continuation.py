@@ -6,8 +6,9 @@ range, obey n, or n + 1, equations (see `newton`); a curve is followed by its ar
 along the tangent, and Newton's method across it. Where T is unknown, x(0) stays in a plane across
 the motion, which moves along with the curve.
 
-Curves begin at the orbits that Newton's method finds, from the start as a rule, at SEEDS values of
-l, and end where l leaves its range, after MOST_STEPS steps, or where these become too short. Curves
+Curves begin at the orbits that Newton's method finds at SEEDS values of l: from the start as a rule,
+and where T is known also from 0 and from MORE states of a box, as several orbits may coexist that no
+curve joins. They end where l leaves its range, after MOST_STEPS steps, or where these become too short. Curves
 that branch off are not looked for. They depend on the other parameters and the range alone: so a
 point has the same orbits, in the same order, on every grid.
 
@@ -32,8 +33,10 @@ from survey.measures.floquet.newton import (
 SEEDS = 9
 FIRST_STEP, LONGEST, SHORTEST = 0.01, 0.15, 1e-6  # relative to the range of l, x and T
 MOST_STEPS = 400  # in each direction
+MORE, AWAY = 8, 2.0  # states of a box; periods of the motion from the start that is in it
 CORRECTIONS, CORRECTED, CONTRACTION = 5, 1e-3, 0.5
 GROWTH, LEAST = 1.5, 1e-2  # of steps; the size of a state, relative to the largest one
+NOTHING = 1e-3  # relative to the states from which it is sought: an orbit that is smaller is 0
 # of the tangent in a step, in radians: too much, and so little that steps become longer
 TURN, LITTLE = 0.35, 0.12
 DIFFERENCE = 1e-7  # of l, for derivatives that give directions alone
@@ -120,17 +123,46 @@ class ContinuedCurves:
         self.equation, self.continued, self.rows, self.reach = equation, continued, rows, reach
         self.free = equation.free
         self.of_row = [[] for _ in rows]
-        shares = np.linspace(0.0, 1.0, seeds)
-        points = [self.points(np.arange(len(rows)), share) for share in shares]
-        every = np.concatenate(points)
-        starts = [
-            (x.reshape(seeds, len(rows), -1), T.reshape(seeds, -1))
-            for x, T in (begin(every) if begin else [equation.begin(every)])
-        ]
-        for k, share in enumerate(shares):
-            for x, T in starts:
-                if np.isfinite(x[k]).any():
-                    self._follow(share, *located(equation, points[k], reach, x[k], T[k]))
+        self.shares = np.linspace(0.0, 1.0, seeds)
+        self.met = [[[] for _ in self.shares] for _ in rows]  # orbits of the curves at the shares
+        every = self.points(np.tile(np.arange(len(rows)), seeds), np.repeat(self.shares, len(rows)))
+        self.least = np.zeros(len(rows))
+        starts = list(begin(every) if begin else [equation.begin(every)])
+        self._sought(every, starts)
+        if begin is None and not self.free:
+            self._sought(every, self._elsewhere(every, *starts[0]), relax=False)
+
+    def _elsewhere(self, points, x, T):
+        """Further states from which Newton's method begins, beside the start x (N, n): 0, and points
+        of a box as wide as the row's orbits and motions from the start.
+        """
+        n, R = self.equation.n, len(self.rows)
+        away = rough_flow(self.equation, points, x, AWAY * T, derived=False)[2]
+        wide = np.fmax.reduce(np.fmax(abs(x), away).reshape(-1, R, n), axis=0)
+        for i, curves in enumerate(self.of_row):
+            for curve in curves:
+                wide[i] = np.fmax(wide[i], curve.size[:, :n].max(axis=0))
+        wide = np.tile(wide, (len(self.shares), 1))
+        return [(u * wide, T) for u in np.concatenate([np.zeros((1, n)), spread(MORE, n)])]
+
+    def _sought(self, points, starts, relax=True):
+        """Follow the curves of the orbits that Newton's method finds from [(states, periods)], at the
+        shares of every row.
+        """
+        R, N = len(self.rows), len(points)
+        if not starts:
+            return
+        x, T = (np.concatenate(one) for one in zip(*starts, strict=True))
+        self.least = np.fmax(
+            self.least, NOTHING * np.fmax.reduce(abs(x).max(axis=1).reshape(-1, R), axis=0)
+        )
+        orbits, good = located(
+            self.equation, np.tile(points, (len(starts), 1)), self.reach, x, T, relax
+        )
+        of_start, at = good // N, good % N // R
+        for k in range(len(self.shares)):
+            for start in range(len(starts)):
+                self._follow(k, orbits, good[(of_start == start) & (at == k)])
 
     def points(self, those, share):
         """The parameters of these rows, with the continued one at shares of its range."""
@@ -139,15 +171,17 @@ class ContinuedCurves:
         points[:, index] = low + (high - low) * share
         return points
 
-    def _follow(self, share, orbits, good):
-        """Follow the curves through the `good` ones of LocatedOrbits at this share of the range,
+    def _follow(self, k, orbits, which):
+        """Follow the curves through these ones of LocatedOrbits, at the share number k of the range,
         but for those that are known.
         """
-        those = np.array([i for i in good if not self._known(i, share, orbits, i)], dtype=int)
-        if not those.size:
+        R = len(self.rows)
+        which = np.array([i for i in which if not self._known(i % R, k, orbits, i)], dtype=int)
+        if not which.size:
             return
-        share, size, T = np.full((those.size, 1), share), orbits.size[those], orbits.T[those, None]
-        y = np.concatenate([orbits.x[those], *([T] if self.free else []), share], axis=1)
+        those, share = which % R, np.full((which.size, 1), self.shares[k])
+        size, T = orbits.size[which], orbits.T[which, None]
+        y = np.concatenate([orbits.x[which], *([T] if self.free else []), share], axis=1)
         walk = _Walk(
             self,
             np.tile(those, 2),
@@ -161,20 +195,22 @@ class ContinuedCurves:
             joined = [np.concatenate([b[:0:-1], a]) for a, b in zip(there, back, strict=True)]
             joined[1][: max(len(back[0]) - 1, 0)] *= -1.0
             if len(joined[0]) > 1:
-                self.of_row[i].append(ContinuedCurve(*joined))
+                curve = ContinuedCurve(*joined)
+                self.of_row[i].append(curve)
+                for share, y in zip(*curve.crossings(self.shares), strict=True):
+                    self.met[i][share].append(y)
 
-    def _known(self, i, share, orbits, k):
-        for curve in self.of_row[i]:
-            for y in curve.crossings(np.array([share]))[1]:
-                if self.free and self.equation.symmetry is None:
-                    same = abs(y[-2] - orbits.T[k]) <= SAME * orbits.T[k]
-                    same &= (abs(y[:-2] - orbits.x[k]) <= orbits.size[k] * 2.1).all()
-                else:
-                    same = (
-                        abs(y[: self.equation.n] - orbits.x[k]) <= SAME * orbits.size[k].max()
-                    ).all()
-                if same:
-                    return True
+    def _known(self, row, k, orbits, i):
+        """Is orbit i on a curve of the row that is known?"""
+        x, T, size = orbits.x[i], orbits.T[i], orbits.size[i]
+        for y in self.met[row][k]:
+            if self.free and self.equation.symmetry is None:
+                same = abs(y[-2] - T) <= SAME * T and (abs(y[:-2] - x) <= size * 2.1).all()
+            else:
+                off = abs(y[: self.equation.n] - x)
+                same = (off <= SAME * max(size.max(), self.least[row])).all()
+            if same:
+                return True
         return False
 
     def starts(self, row, values):
@@ -187,6 +223,17 @@ class ContinuedCurves:
         which = np.concatenate([np.zeros(0, int), *(one for one, _y in found)])
         y = np.concatenate([np.zeros((0, m)), *(y for _one, y in found)])
         return which, y[:, :n], y[:, n] if self.free else np.full(len(y), np.nan)
+
+
+def spread(count, n):
+    """Points (count, n) of [-1, 1]^n, evenly spread (Roberts' sequence, an additive recurrence)."""
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1.0 + ratio) ** (1.0 / (n + 1))
+    return (
+        2.0 * ((0.5 + np.outer(np.arange(1, count + 1), ratio ** -np.arange(1.0, n + 1))) % 1.0)
+        - 1.0
+    )
 
 
 def distinct(x, T, free):
@@ -217,7 +264,7 @@ class _Walk:
             np.zeros((K, m)),
             np.full((2, K, self.n), np.nan),
         )
-        self.size[:, : self.n] = floored(moduli)
+        self.size[:, : self.n] = floored(moduli, curves.least[rows])
         self.tangent[:, -1] = sign
         everyone = np.arange(K)
         if self.free:
@@ -322,7 +369,7 @@ class _Walk:
             X[moved] = rough_flow(self.equation, others[moved], x[moved], span, derived=False)[0]
         by_l = (self._closing(those, others, x, X, M)[0] - value) / inward[:, None]
         size = np.ones_like(y)
-        size[:, :n] = floored(moduli)
+        size[:, :n] = floored(moduli, self.curves.least[self.rows[those]])
         if self.free:
             c = self.plane[0, those]
             size[:, n] = T
@@ -389,9 +436,11 @@ def slopes(equation, points, x):
     return f
 
 
-def floored(moduli):
-    """Sizes of states, from their largest moduli (K, n): one that is 0 all the time has one too."""
-    largest = moduli.max(axis=1, keepdims=True)
+def floored(moduli, least=0.0):
+    """Sizes of states, from their largest moduli (K, n): one that is 0 all the time has one too, and
+    so have all of an orbit that is smaller than `least` (K).
+    """
+    largest = np.maximum(moduli.max(axis=1), least)[:, None]
     return np.maximum(moduli, np.where(largest == 0.0, 1.0, LEAST * largest))
 
 

@@ -6,6 +6,7 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
 
 import survey
 
@@ -115,6 +116,44 @@ def test_bits_depend_on_no_grid():
             assert np.array_equal(
                 whole[name].isel(F=i, w=j, branch=k).values, one[name].values, equal_nan=True
             ), name
+
+
+def period_map(rhs, T, x):
+    return solve_ivp(rhs, (0.0, T), x, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+
+
+def test_coexisting_orbits_that_no_curve_from_the_start_meets():
+    """A forced van der Pol oscillator has three; SciPy's DOP853 and fsolve find the same."""
+    omega, F, mu = 0.88333, 0.61238, 1.50742
+    ds = survey.evaluate(
+        "workflows/entrainment.py", omega=omega, F=F, mu=mu, branch=[1.0, 2.0, 3.0]
+    )
+    assert ds.orbits.values.tolist() == [3, 3, 3] and (ds.status == 0).all()
+
+    def rhs(t, y):
+        return y[1], mu * (1 - y[0] ** 2) * y[1] - y[0] + mu * F * math.cos(omega * t)
+
+    found = []
+    for guess in ((0.17, -0.65), (0.42, -0.96), (-0.81, 1.66)):  # by size
+        x = fsolve(lambda x: period_map(rhs, 2 * math.pi / omega, x) - x, guess, xtol=1e-12)
+        found.append(x)
+    off = abs(ds.x0.values - np.array(found))
+    assert (off <= ds.x0_error.values + 1e-9).all()
+
+
+def test_the_orbit_that_is_zero_from_a_start_that_is_not():
+    def pendulum(t, x, p, out):
+        out[0] = x[1]
+        out[1] = -2 * p[1] * x[1] + (0.07439 + p[0] * np.cos(t)) * np.sin(x[0])
+
+    system = survey.orbit(
+        pendulum, states=("x", "v"), parameters=("b", "z"), period=2 * math.pi, start=(0.1, 0.0),
+        continuation=("b", 0.0, 3.0),
+    )  # fmt: skip
+    ds = survey.evaluate(system, b=[0.21509, 1.3, 2.6], z=0.16628)
+    assert (ds.status == 0).all() and (abs(ds.x0) <= ds.x0_error).all()
+    twice = survey.evaluate(system, b=[0.21509, 1.3, 2.6], z=0.16628, branch=2.0)
+    assert (abs(twice.x0).max("state") > 0.1).all()  # once
 
 
 def test_branches_that_are_no_numbers():
