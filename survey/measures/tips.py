@@ -48,9 +48,9 @@ class _End:
         return np.array(self.x[self.own :]).reshape(-1, 2), np.array(self.error[self.own :])
 
 
-def followed(function, pieces, grain):
+def followed(function, pieces, grain, first=0):
     """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends inside
-    the map.
+    the map; those before the `first` only where others meet them.
 
     Those that meet end to end are one. All pieces are positive on one side, as those of marching
     squares are, so that none is followed along another one.
@@ -59,9 +59,9 @@ def followed(function, pieces, grain):
         return []
     ends = [_End(x[::sense], error[::sense], sense) for x, error in pieces for sense in (-1, 1)]
     chords = np.concatenate([np.stack([x[:-1], x[1:]], axis=1) for x, _error in pieces])
-    for end in ends:
+    for k, end in enumerate(ends):
         tip = end.x[-1]
-        end.going = bool(((tip > 0.0) & (tip < 1.0)).all())
+        end.going = k >= 2 * first and bool(((tip > 0.0) & (tip < 1.0)).all())
     for end in sorted((end for end in ends if end.going), key=lambda end: -end.own)[ENDS:]:
         end.going = False
     _sides(function, [end for end in ends if end.going])
@@ -107,9 +107,11 @@ def _merged(pieces):
         return passed
 
     for end in [*np.flatnonzero(partner < 0), *range(len(ends))]:  # what closes has no first piece
+        linked = chain(end)
+        if linked and linked[0][1]:  # all keep their sense
+            linked = [(number, not back) for number, back in linked[::-1]]
         parts = [
-            tuple(one[::-1] if back else one for one in pieces[number])
-            for number, back in chain(end)
+            tuple(one[::-1] if back else one for one in pieces[number]) for number, back in linked
         ]
         if parts:
             joined = [parts[0], *((x[1:], error[1:]) for x, error in parts[1:])]
@@ -158,7 +160,7 @@ def _steps(function, going, ends, chords, grain):
         value, bar = function(here.reshape(-1, 2))
         return value.reshape(t.shape), bar.reshape(t.shape)
 
-    t, reach = _zeros(at, goals[rows, axis].copy(), 0.2 * length, slope)
+    t, reach = zeros(at, goals[rows, axis].copy(), 0.2 * length, slope)
     found = np.isfinite(t)
     t[~found] = goals[rows, axis][~found]
     wide = np.where(found, np.maximum(0.1 * reach, 4.0 * grain), 1e-3)
@@ -209,8 +211,10 @@ def _steps(function, going, ends, chords, grain):
 
 def _meets(end, other, reach):
     """Is the tip of the other end, which comes from there, straight ahead of this one and not
-    farther than `reach`?
+    farther than `reach`? That of a tongue's other edge is not the same curve's.
     """
+    if other.sense == end.sense:
+        return False
     run, ahead = other.x[-1] - end.x[-1], end.ahead
     along = run @ ahead
     return (
@@ -256,7 +260,7 @@ def _goal(end, ends):
     return goal, None
 
 
-def _zeros(at, t, reach, slope):
+def zeros(at, t, reach, slope):
     """(zeros near t (n) at which functions have slopes of the signs `slope`, or NaN; within what
     they are known).
     """

@@ -23,7 +23,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours, tips
-from survey.measures.floquet import bifurcations, counted_edges, narrow, row_count
+from survey.measures.floquet import bifurcations, counted_edges, dips, narrow, row_count
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
@@ -42,7 +42,6 @@ ALONG = (
 LINES, LINES_OF_ORBITS, FINER = 97, 49, 8
 # points along one axis; with damping, tongues are wide or none
 ALONE, ALONE_DAMPED = 769, 193
-DIPS, PARTS = 12, 8  # how often, and into how many parts, the surroundings of an extremum are cut
 NEAR = 3e-5  # of the map: how near curves of splines are
 BESIDE = 1e-9  # of the map: how near zeros are of what is computed roughly
 # one after another: times NEAR, along the best axis or the other
@@ -359,7 +358,7 @@ def _lines(function, grain, values, tried=TRIED):
     found = contourpy.contour_generator(fine, fine, dense).lines(0.0)
     parts = [_thinned(np.asarray(line)[:, ::-1]) for line in found]
     if not parts:
-        return []
+        return [] if tried is not TRIED else dips.followed(function, [], values, grain)
     x = np.concatenate(parts)
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
@@ -369,7 +368,10 @@ def _lines(function, grain, values, tried=TRIED):
     signs = np.sign(run[:, ::-1]) * [1.0, -1.0]
     signs[abs(run[:, ::-1]) < 0.1 * np.hypot(*run.T)[:, None]] = 0.0
     pieces = _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried, signs=signs)
-    return tips.followed(function, [part for one in pieces for part in _smooth(*one)], grain)
+    pieces = [part for one in pieces for part in _smooth(*one)]
+    if tried is not TRIED:  # values that are nearly right show no narrow tongue
+        return tips.followed(function, pieces, grain)
+    return dips.followed(function, pieces, values, grain)
 
 
 def _smooth(x, error):
@@ -406,7 +408,12 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
             np.isfinite(dense[1:] + dense[:-1]) & ((dense[1:] > 0.0) != (dense[:-1] > 0.0))
         )
     start = fine[at] + dense[at] / (dense[at] - dense[at + 1]) / (fine.size - 1)
-    start = np.sort(np.append(start, _dips(function, ticks, values[:, 0], across)))
+
+    def on_line(_line, t):
+        x = np.stack([t.ravel(), np.full(t.size, across)], axis=1)
+        return function(x)[0].reshape(t.shape)
+
+    start = np.sort(np.append(start, dips.zeros(on_line, ticks, values.T)[1]))
     if not start.size:
         return []
     parts = [np.array([[t, across]]) for t in start]
@@ -423,35 +430,6 @@ def _crossings(function, grain, values, tried=TRIED, *, across):
     position, error = (np.array([one[i].flat[0] for one in found]) for i in (0, 1))
     keep = np.diff(position, prepend=-1.0) > error + np.append(0.0, error)[:-1]
     return [one for one, good in zip(found, keep, strict=True) if good]
-
-
-def _dips(function, ticks, values, across):
-    """Positions next to zeros of a function between `ticks` at which its `values` have one sign:
-    about an extremum, as at both edges of a narrow tongue.
-    """
-    before, here, after = values[:-2], values[1:-1], values[2:]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        least = (here * before > 0.0) & (here * after > 0.0)
-        least &= (abs(here) <= abs(before)) & (abs(here) < abs(after))
-        # of the parabola through the three, which is 0 within twice that depth
-        depth = (after - before) ** 2 / (8.0 * (after - 2.0 * here + before))
-        at = np.flatnonzero(least & (abs(here) < 2.0 * abs(depth)))
-    ends, signs, found = np.stack([ticks[at], ticks[at + 2]], axis=1), np.sign(here[at]), []
-    for _ in range(DIPS):
-        if not ends.size:
-            break
-        t = np.linspace(*ends.T, PARTS + 1, axis=1)
-        x = np.stack([t.ravel(), np.full(t.size, across)], axis=1)
-        value = function(x)[0].reshape(t.shape) * signs[:, None]
-        value[np.isnan(value)] = np.inf
-        crossed = (value < 0.0).any(axis=1)
-        for own, v in zip(t[crossed], value[crossed], strict=True):
-            k = np.flatnonzero(((v[1:] < 0.0) != (v[:-1] < 0.0)) & np.isfinite(v[1:] + v[:-1]))
-            found += list(own[k] + (own[k + 1] - own[k]) * v[k] / (v[k] - v[k + 1]))
-        t, value, signs = t[~crossed], value[~crossed], signs[~crossed]
-        rows, k = np.arange(len(t)), np.clip(value.argmin(axis=1), 1, PARTS - 1)
-        ends = np.stack([t[rows, k - 1], t[rows, k + 1]], axis=1)
-    return found
 
 
 def _sharpened(function, pieces, grain):
