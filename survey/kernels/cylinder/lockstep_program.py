@@ -74,6 +74,7 @@ from survey.kernels.cylinder.program import (
     SLOTS,
     SUBTRACT,
     TIMES,
+    VECTOR,
     WIDTH,
     function,
 )
@@ -234,12 +235,13 @@ def _decoded(p, operations):
 
 
 @kernel
-def _extend(operations, N, degree, S, K, n, first, last):
+def _extend(operations, N, degree, S, K, n, first, last, width):
     """Fill S[i, n], order n of the values from `first` to `last` - 1, and K[i, n], n times as much,
-    from the lower orders and order n of phi.
+    from the lower orders and order n of phi; of the first `width` lanes.
+
+    That is as a rule all of them: a short loop of known length would be unrolled, not vector code.
     """
     share, whole = 1.0 if n == 0 else 0.0, float(n)
-    width = len(N) // (2 * len(degree) - 4)  # LANES: a short loop of known length is unrolled
     for i in range(first, last):
         if n > degree[i]:
             continue
@@ -289,16 +291,16 @@ def _extend(operations, N, degree, S, K, n, first, last):
 
 
 @splice
-def _bound(p, N, phi, radius, row, points, over, known, out, found):
+def _bound(p, N, phi, radius, row, points, over, known, out, found, width):
     """Fill `found` (bounds, LANES) with bounds of f, g, g', g'' within `radius` of phi, which is twice
     as large as it was, or smaller where there are none.
     """
     none, near, left = np.zeros(LANES), np.zeros(LANES, np.bool_), True
     for q in range(LANES):
         radius[q] = min(2.0 * radius[q], 0.25 * (1.0 + abs(phi[q])))
-    program.balls(p, N, known, phi, none, points)
+    program.balls(p, N, known, phi[:width], none, points)
     while left:
-        program.balls(p, N, known, phi, radius, over)
+        program.balls(p, N, known, phi[:width], radius, over)
         left = False
         for q in range(LANES):
             if near[q]:
@@ -339,16 +341,16 @@ def _onward(S, K, sign, side, r, x, g, w, fw, i):
 
 
 @splice
-def _in_time(p, operations, N, degree, S, K, T, phi, speed):
+def _in_time(p, operations, N, degree, S, K, T, phi, speed, width):
     """Fill the rows W, F_ and DG of T with the series in time through phi and w = speed (LANES)."""
-    forces, slots, step, width = max(1, int(p[FORCES])), len(degree) - 2, LANES * SERIES, len(phi)
+    forces, slots, step = max(1, int(p[FORCES])), len(degree) - 2, LANES * SERIES
     f, g, dg, w = step * int(p[F_AT]), step * int(p[G_AT]), step * int(p[DG_AT]), step * slots
     sign, side = p[REVERSED], p[MIRRORED]
     for q in range(width):
         S[q], K[q], S[w + q] = side * phi[q], 0.0, speed[q]
     for n in range(ORDER):
-        _extend(operations, N, degree, S, K, n, 1, forces)
-        _extend(operations, N, degree, S, K, n, slots + 1, slots + 2)
+        _extend(operations, N, degree, S, K, n, 1, forces, width)
+        _extend(operations, N, degree, S, K, n, slots + 1, slots + 2, width)
         at = LANES * n
         for q in range(width):
             _onward(S, K, sign, side, 1.0 / (n + 1), at, g + at, w + at, w + step + at, q)
@@ -356,7 +358,7 @@ def _in_time(p, operations, N, degree, S, K, T, phi, speed):
         for q in range(width):
             T[W + n, q] = S[w + LANES * n + q]
     for n in range(LOW + 1):
-        _extend(operations, N, degree, S, K, n, forces, slots)
+        _extend(operations, N, degree, S, K, n, forces, slots, width)
         for q in range(width):
             T[F_ + n, q], T[DG + n, q] = sign * S[f + LANES * n + q], S[dg + LANES * n + q]
 
@@ -435,6 +437,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
     N, K, degree = numbers.ravel(), np.zeros_like(S), np.zeros(slots + 2, np.int64)
     operations = np.zeros((slots + 2, 3), np.int64)
     _decoded(p, operations)
+    width = min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     _degrees(operations, ORDER, degree)
     phi, radius = np.zeros(LANES), np.ones(LANES)
     points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
@@ -450,9 +453,9 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
                 return
         _begin(circle, state, fixed, phi)
         if not circle:
-            _bound(p, N, phi, radius, row, points, over, known, out, bounds)
+            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
             _stay(state, fixed, bounds, radius)
-        _in_time(p, operations, N, degree, S, K, T, phi, state[V])
+        _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
             _vary(T, i)
         for i in range(LANES):
@@ -472,14 +475,14 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
 
 
 @splice
-def _in_angle(p, operations, N, degree, S, K, phi, w, forms):
+def _in_angle(p, operations, N, degree, S, K, phi, w, forms, width):
     """Fill `forms` (2 ORDER, LANES) with the series of f / w and g / w^2 in the angle from phi on."""
-    forces, step, width = max(1, int(p[FORCES])), LANES * SERIES, len(phi)
+    forces, step = max(1, int(p[FORCES])), LANES * SERIES
     f, g, sign, side = step * int(p[F_AT]), step * int(p[G_AT]), p[REVERSED], p[MIRRORED]
     for q in range(width):
         S[q], S[LANES + q], K[q], K[LANES + q] = side * phi[q], side, 0.0, side
     for n in range(far.ORDER):
-        _extend(operations, N, degree, S, K, n, 1, forces)
+        _extend(operations, N, degree, S, K, n, 1, forces, width)
         for q in range(width):
             inverse = 1.0 / w[q]
             forms[n, q] = sign * S[f + LANES * n + q] * inverse
@@ -534,8 +537,9 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, stat
     N, K, degree = numbers.ravel(), np.zeros_like(S), np.zeros(slots + 2, np.int64)
     operations = np.zeros((slots + 2, 3), np.int64)
     _decoded(p, operations)
+    width = min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     _degrees(operations, 1, degree)
-    forms = np.empty((2 * far.ORDER, LANES))
+    forms = np.zeros((2 * far.ORDER, LANES))
     radius = np.ones(LANES)
     points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
     known, out, bounds = np.zeros(slots, np.bool_), np.empty(4), np.empty((4, LANES))
@@ -562,12 +566,12 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, stat
                 )
                 state[far.T_BOUND, i] += slip / state[far.W, i]
         else:
-            _bound(p, N, state[far.AT], radius, row, points, over, known, out, bounds)
+            _bound(p, N, state[far.AT], radius, row, points, over, known, out, bounds, width)
             for i in range(LANES):
                 # a step no longer than the radius: see `lockstep_phi._advance`
                 fixed[BOUND_F, i] = max(bounds[0, i], 0.5 * state[far.W, i] / radius[i])
                 fixed[BOUND_G, i] = bounds[1, i]
-        _in_angle(p, operations, N, degree, S, K, state[far.AT], state[far.W], forms)
+        _in_angle(p, operations, N, degree, S, K, state[far.AT], state[far.W], forms, width)
         for n in range(far.ORDER):
             for i in range(LANES):
                 T[far.F_ + n, i], T[far.G_ + n, i] = forms[n, i], forms[far.ORDER + n, i]
@@ -840,6 +844,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, floats,
     N, K, degree = numbers.ravel(), np.zeros_like(S), np.zeros(slots + 2, np.int64)
     operations = np.zeros((slots + 2, 3), np.int64)
     _decoded(p, operations)
+    width = min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     _degrees(operations, ORDER, degree)
     phi, radius = np.zeros(LANES), np.ones(LANES)
     points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
@@ -861,9 +866,9 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, floats,
                 return
         _begin(circle, state, fixed, phi)
         if not circle:
-            _bound(p, N, phi, radius, row, points, over, known, out, bounds)
+            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
             _stay(state, fixed, bounds, radius)
-        _in_time(p, operations, N, degree, S, K, T, phi, state[V])
+        _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
             _vary(T, i)
         lockstep.advance(T, state, before, fixed, fate, tolerance)

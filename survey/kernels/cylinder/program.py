@@ -58,6 +58,7 @@ CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
 LEAST_RADIUS = 1e-9
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
 LANES = 32  # of them at once
+VECTOR = 8  # lanes of vector code
 
 
 @kernel
@@ -283,9 +284,8 @@ def _extend_balls(p, numbers, known, lanes, orders, B, n):
     `lanes`.
     """
     share = 1.0 if n == 0 else 0.0
-    width = len(numbers) // (
-        2 * _count(p, SLOTS)
-    )  # LANES: a short loop of known length is unrolled
+    # a short loop of known length would be unrolled, not vector code
+    width = (lanes + VECTOR - 1) // VECTOR * VECTOR
     for i in range(1, _count(p, SLOTS)):
         if known[i]:
             continue
