@@ -64,6 +64,20 @@ class _Number:
         return _Number(self.builder, self.builder.call(fabs, [self.value]))
 
 
+class _Index:
+    """An integer that a kernel will compute, of which others are made by adding."""
+
+    __slots__ = ("builder", "value")
+
+    def __init__(self, builder, value):
+        self.builder, self.value = builder, value
+
+    def __add__(self, other):
+        return _Index(self.builder, self.builder.add(self.value, _whole(other)))
+
+    __radd__ = __add__
+
+
 class _Unknown:
     """Stands for every argument where only the number of results is needed."""
 
@@ -88,7 +102,7 @@ class _Array:
 
     def _pointer(self, index):
         indices = index if isinstance(index, tuple) else (index,)
-        indices = [ir.Constant(ir.IntType(64), i) if isinstance(i, int) else i for i in indices]
+        indices = [_whole(i) for i in indices]
         return cgutils.get_item_pointer(self.context, self.builder, self.kind, self.array, indices)
 
     def __getitem__(self, index):
@@ -100,6 +114,10 @@ class _Array:
 
 def _value(x):
     return x.value if isinstance(x, _Number) else ir.Constant(ir.DoubleType(), float(x))
+
+
+def _whole(i):
+    return i.value if isinstance(i, _Index) else ir.Constant(ir.IntType(64), i)
 
 
 def largest(a, b):
@@ -192,5 +210,5 @@ def _symbol(context, builder, kind, value):
     if isinstance(kind, types.BaseTuple):
         return tuple(_Number(builder, each) for each in cgutils.unpack_tuple(builder, value))
     if isinstance(kind, types.Integer):
-        return value
+        return _Index(builder, value)
     return _Number(builder, value)

@@ -20,6 +20,7 @@ from survey.kernels.cylinder import (
     lockstep,
     lockstep_abel,
     lockstep_phi,
+    lockstep_program,
     returns,
     steps,
     winding,
@@ -85,33 +86,21 @@ def flow_at(p, T, dt):
 
 
 def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
-    """See `lockstep.trajectories`, and for programs `steps.trajectories`: each is compiled when it
-    is needed.
+    """See `lockstep.trajectories`, and for programs `lockstep_program.trajectories`: each is compiled
+    when it is needed.
     """
-    solve = _in_lockstep if P.shape[1] == COLUMNS else _one_by_one
-    return solve(P, starts, times, tolerance, limit, floats, turnings, status)
+    rest = starts, times, tolerance, limit, floats, turnings, status
+    if P.shape[1] == COLUMNS:
+        return _in_lockstep(P, *rest)
+    leads = lockstep_program.grouped(P)
+    for lead in np.unique(leads):
+        lockstep_program.trajectories(P, leads, lead, *rest)
+    return None
 
 
 @kernel
 def _in_lockstep(P, starts, times, tolerance, limit, floats, turnings, status):
     return lockstep.trajectories(P, starts, times, tolerance, limit, floats, turnings, status)
-
-
-@kernel
-def _one_by_one(P, starts, times, tolerance, limit, floats, turnings, status):
-    steps.trajectories(
-        flow_setting,
-        flow_begin,
-        flow_at,
-        P,
-        starts,
-        times,
-        tolerance,
-        limit,
-        floats,
-        turnings,
-        status,
-    )
 
 
 @kernel
@@ -123,20 +112,26 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
 
 
 def flow_abels(P, starts, targets, tolerance, limit, floats, status):
-    """See `lockstep_phi.abels` and `lockstep_abel.abels`, and for programs `steps.abels`."""
-    if P.shape[1] != COLUMNS:
-        flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status)
-        return
+    """See `lockstep_phi.abels` and `lockstep_abel.abels`, and for programs `abels` and
+    `abels_near` of `lockstep_program`.
+    """
     ahead = np.zeros((len(P), lockstep_phi.STATE))
+    # the first of both reads a block beyond the last
+    far = np.full((len(P), targets.shape[1] + lockstep_phi.BLOCK), np.inf)
+    far[:, : targets.shape[1]] = targets
+    if P.shape[1] != COLUMNS:
+        leads, rest = lockstep_program.grouped(P), (tolerance, limit, ahead, floats, status)
+        for lead in np.unique(leads):
+            lockstep_program.abels(P, leads, lead, starts, far, *rest)
+            lockstep_program.abels_near(P, leads, lead, starts, targets, *rest)
+        return
     # compile the longer one, by a call on nothing, while that process compiles the other
     if waiting.other_compiler:
         _abels_in_time(
             P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0]
         )
         waiting.wait()
-    at = np.full((len(P), targets.shape[1] + lockstep_phi.BLOCK), np.inf)
-    at[:, : targets.shape[1]] = targets
-    _abels_in_angle(P, starts, at, tolerance, limit, ahead, floats, status)
+    _abels_in_angle(P, starts, far, tolerance, limit, ahead, floats, status)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
 
 

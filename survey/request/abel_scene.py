@@ -79,8 +79,8 @@ class AbelScene(FunctionScene):
         if options["question"] == "fate":
             return basins.cost(sizes["phi0"] * sizes["w0"], 3e-4, 2e-2)
         if options["question"] == "trajectory":
-            return 2.5e-4 / sizes["t"] + 2e-7
-        return 7.5e-5 / sizes["phi"] + 6e-7
+            return 8e-5 / sizes["t"] + 2e-7
+        return 1.5e-5 / sizes["phi"] + 2e-7
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""

@@ -98,8 +98,18 @@ def spread_programs(rows, P, starts):
         starts[i, START_PHI], starts[i, START_W] = rows[i, PHI0], rows[i, W0]
         for k in range(P.shape[1]):
             P[i, k] = rows[i, k if k < SIX else k + GIVEN - SIX]
-        if not on_circle(P[i]):
-            program.bound_near(P[i], rows[i, PHI0])
+
+
+@inline
+def _no_bounds_needed(p, phi):
+    pass
+
+
+@for_constants(_no_bounds_needed)
+def bound_start(p, phi):
+    """On a line, write bounds near phi into p, where a solution starts."""
+    if not on_circle(p):
+        program.bound_near(p, phi)
 
 
 @inline

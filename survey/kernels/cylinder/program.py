@@ -20,9 +20,10 @@ import math
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math import functions
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
+from survey.kernels.unroll import unroll
 
 # Columns of the six parameters: signs and marks, and the mean of f on the circle, 0 where it
 # vanishes within rounding.
@@ -56,6 +57,8 @@ CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
 ) = range(9, 26)
 LEAST_RADIUS = 1e-9
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
+LANES = 32  # of them at once
+VECTOR = 8  # lanes of vector code
 
 
 @kernel
@@ -172,22 +175,6 @@ def along(p, x, f, dg):
         f[n], dg[n] = p[REVERSED] * S[int(p[F_AT]), n], S[int(p[DG_AT]), n]
 
 
-@inline
-def _product(a, r, b, s):
-    """The ball (a, r) times (b, s)."""
-    middle = a * b
-    return middle, abs(a) * s + abs(b) * r + r * s + ROUNDOFF_UP * abs(middle)
-
-
-@inline
-def _quotient(a, r, b, s):
-    """The ball (a, r) by (b, s)."""
-    if not abs(b) > s:
-        return 0.0, math.inf
-    middle = a / b
-    return middle, (r + abs(middle) * s) / (abs(b) - s) + ROUNDOFF_UP * abs(middle)
-
-
 @kernel
 def _function_ball(code, x, r, number):
     """The ball of the function over (x, r): all but sin, cos, cosh are monotone, and cosh dips less
@@ -214,136 +201,346 @@ def _function_ball(code, x, r, number):
 
 
 @kernel
-def extend_balls(p, B, n):
-    """As `extend`, on balls: fill B[i, n] = (middle, radius)."""
-    for i in range(1, _count(p, SLOTS)):
-        code, a, b, number = _operation(p, i)
-        m = r = 0.0
-        if code == CONSTANT:
-            if n == 0:
-                m, r = number, p[OPERATIONS + WIDTH * i + FIRST]
-        elif code == ADD or code == SUBTRACT:
-            m = B[a, n, 0] + (B[b, n, 0] if code == ADD else -B[b, n, 0])
-            r = B[a, n, 1] + B[b, n, 1] + ROUNDOFF_UP * abs(m)
-        elif code == PLUS or code == FROM:
-            m, r = B[a, n, 0] if code == PLUS else -B[a, n, 0], B[a, n, 1]
-            if n == 0:
-                m += number
-                r += p[OPERATIONS + WIDTH * i + SECOND] + ROUNDOFF_UP * abs(m)
-        elif code == TIMES:
-            m, r = _product(B[a, n, 0], B[a, n, 1], number, p[OPERATIONS + WIDTH * i + SECOND])
-        elif code == MULTIPLY:
-            for k in range(n + 1):
-                c, s = _product(B[a, k, 0], B[a, k, 1], B[b, n - k, 0], B[b, n - k, 1])
-                m += c
-                r += s + n * ROUNDOFF_UP * abs(c)
-        elif code == DIVIDE or code == OVER:
-            if code == DIVIDE:
-                m, r = B[a, n, 0], B[a, n, 1]
-            elif n == 0:
-                m, r = number, p[OPERATIONS + WIDTH * i + FIRST]
-            for k in range(1, n + 1):
-                c, s = _product(B[b, k, 0], B[b, k, 1], B[i, n - k, 0], B[i, n - k, 1])
-                m -= c
-                r += s + (n + 1) * ROUNDOFF_UP * abs(c)
-            m, r = _quotient(m, r + n * ROUNDOFF_UP * abs(m), B[b, 0, 0], B[b, 0, 1])
-        elif n == 0:
-            m, r = _function_ball(code, B[a, 0, 0], B[a, 0, 1], number)
-        else:
-            for k in range(1, n + 1):
-                c, s = _product(B[a, k, 0], B[a, k, 1], B[b, n - k, 0], B[b, n - k, 1])
-                m += k * c
-                r += k * (s + (n + 1) * ROUNDOFF_UP * abs(c))
-            m, r = m / n, r / n
-        B[i, n, 0], B[i, n, 1] = m, (r if math.isfinite(m) else math.inf)
+def note(p, numbers, first, end):
+    """Note the numbers of the program in the lanes from `first` to `end` - 1 of `numbers` (2 SLOTS,
+    LANES), each before the rest that is not in binary64.
+    """
+    for i in range(_count(p, SLOTS)):
+        at = OPERATIONS + WIDTH * i
+        code, rest = int(p[at + CODE]), 0.0
+        if code == CONSTANT or code == OVER:
+            rest = p[at + FIRST]
+        elif code == PLUS or code == FROM or code == TIMES:
+            rest = p[at + SECOND]
+        for q in range(first, end):
+            numbers[2 * i, q], numbers[2 * i + 1, q] = p[at + NUMBER], rest
+
+
+# The balls of many lanes stand in one flat array, middles before radii, LANES of each, so that LLVM
+# sees which overlap: a, b, o are where balls begin in B, x where a number does in N.
+
+
+@unroll
+def _ball_set(B, N, x, share, o, i):
+    B[o + i], B[o + LANES + i] = share * N[x + i], share * N[x + LANES + i]
+
+
+@unroll
+def _ball_copy(B, a, o, i):
+    B[o + i], B[o + LANES + i] = B[a + i], B[a + LANES + i]
+
+
+@unroll
+def _ball_sum(B, a, sign, b, o, i):
+    middle = B[a + i] + sign * B[b + i]
+    B[o + i] = middle
+    B[o + LANES + i] = B[a + LANES + i] + B[b + LANES + i] + ROUNDOFF_UP * abs(middle)
+
+
+@unroll
+def _ball_shift(B, sign, a, N, x, share, o, i):
+    middle = sign * B[a + i] + share * N[x + i]
+    B[o + i] = middle
+    rest = N[x + LANES + i] + ROUNDOFF_UP * abs(middle)
+    B[o + LANES + i] = B[a + LANES + i] + share * rest
+
+
+@unroll
+def _ball_scale(B, a, N, x, o, i):
+    middle, radius = _product(B[a + i], B[a + LANES + i], N[x + i], N[x + LANES + i])
+    B[o + i], B[o + LANES + i] = middle, radius
+
+
+@unroll
+def _ball_add(B, a, b, factor, rounding, o, i):
+    """Add factor times the product; `rounding`: that of the sum, as a share of it."""
+    middle, radius = _product(B[a + i], B[a + LANES + i], B[b + i], B[b + LANES + i])
+    B[o + i] = B[o + i] + factor * middle
+    B[o + LANES + i] = B[o + LANES + i] + abs(factor) * (radius + rounding * abs(middle))
+
+
+@unroll
+def _ball_share(B, below, o, i):
+    B[o + i], B[o + LANES + i] = B[o + i] / below, B[o + LANES + i] / below
+
+
+def _product(a, r, b, s):
+    """The ball (a, r) times (b, s)."""
+    middle = a * b
+    return middle, abs(a) * s + abs(b) * r + r * s + ROUNDOFF_UP * abs(middle)
 
 
 @inline
-def _largest(B, i, n):
+def _quotient(a, r, b, s):
+    """The ball (a, r) by (b, s)."""
+    middle = a / b
+    radius = (r + abs(middle) * s) / (abs(b) - s) + ROUNDOFF_UP * abs(middle)
+    return (middle, radius) if abs(b) > s else (0.0, math.inf)
+
+
+@splice
+def _extend_balls(p, numbers, known, lanes, orders, B, n):
+    """As `extend`, on balls: those of B of order n, but where known[i]; functions only in the first
+    `lanes`.
+    """
+    share = 1.0 if n == 0 else 0.0
+    # a short loop of known length would be unrolled, not vector code
+    width = (lanes + VECTOR - 1) // VECTOR * VECTOR
+    for i in range(1, _count(p, SLOTS)):
+        if known[i]:
+            continue
+        code, a, b, number = _operation(p, i)
+        x, o, step = 2 * LANES * i, 2 * LANES * (orders * i + n), 2 * LANES
+        one, two = step * orders * a, step * orders * b  # of order 0
+        if code == CONSTANT:
+            for q in range(width):
+                _ball_set(B, numbers, x, share, o, q)
+        elif code == ADD or code == SUBTRACT:
+            sign = 1.0 if code == ADD else -1.0
+            for q in range(width):
+                _ball_sum(B, one + step * n, sign, two + step * n, o, q)
+        elif code == PLUS or code == FROM:
+            sign = 1.0 if code == PLUS else -1.0
+            for q in range(width):
+                _ball_shift(B, sign, one + step * n, numbers, x, share, o, q)
+        elif code == TIMES:
+            for q in range(width):
+                _ball_scale(B, one + step * n, numbers, x, o, q)
+        elif code == DIVIDE:
+            for q in range(width):
+                _ball_copy(B, one + step * n, o, q)
+        elif code == OVER:
+            for q in range(width):
+                _ball_set(B, numbers, x, share, o, q)
+        elif code == MULTIPLY or n > 0:
+            for q in range(width):
+                _ball_set(B, numbers, x, 0.0, o, q)
+        else:
+            for q in range(lanes):
+                B[o + q], B[o + LANES + q] = _function_ball(
+                    code, B[one + q], B[one + LANES + q], number
+                )
+        if code == DIVIDE or code == OVER:
+            for k in range(1, n + 1):
+                before = step * (orders * i + n - k)
+                for q in range(width):
+                    _ball_add(B, two + step * k, before, -1.0, (n + 1) * ROUNDOFF_UP, o, q)
+            for q in range(width):
+                own, low = np.uint64(o + q), np.uint64(two + q)  # else no vector code
+                r, s = own + np.uint64(LANES), low + np.uint64(LANES)
+                wide = B[r] + n * ROUNDOFF_UP * abs(B[own])
+                B[own], B[r] = _quotient(B[own], wide, B[low], B[s])
+        elif code == MULTIPLY:
+            for k in range(n + 1):
+                for q in range(width):
+                    _ball_add(B, one + step * k, two + step * (n - k), 1.0, n * ROUNDOFF_UP, o, q)
+        elif code > OVER and n > 0:
+            for k in range(1, n + 1):
+                rounding = (n + 1) * ROUNDOFF_UP
+                for q in range(width):
+                    _ball_add(B, one + step * k, two + step * (n - k), float(k), rounding, o, q)
+            for q in range(width):
+                _ball_share(B, float(n), o, q)
+        for q in range(width):
+            own = np.uint64(o + q)
+            r = own + np.uint64(LANES)
+            B[r] = B[r] if math.isfinite(B[own]) else math.inf
+
+
+@inline
+def _largest(B, at):
     """The largest of |the ball|, NaN taken for infinity."""
-    size = abs(B[i, n, 0]) + B[i, n, 1]
+    size = abs(B[at]) + B[at + LANES]
     return size if size >= 0.0 else math.inf
 
 
 @kernel
-def ball(p, phi, radius, orders, B):
-    """Fill B (SLOTS, orders, 2) with the Taylor coefficients of every value over the angles within
-    `radius` of phi.
+def balls(p, numbers, known, phi, radius, B):
+    """Fill B, flat (SLOTS, orders, 2, LANES), middles and radii of the Taylor coefficients of every
+    value over the angles within `radius` (lanes) of phi (lanes); `known` ones stand there already.
     """
+    lanes, orders = len(phi), len(B) // (2 * LANES * _count(p, SLOTS))
     for n in range(orders):
-        B[0, n, 0] = p[MIRRORED] * phi if n == 0 else (p[MIRRORED] if n == 1 else 0.0)
-        B[0, n, 1] = radius if n == 0 else 0.0
-        extend_balls(p, B, n)
+        for q in range(lanes):
+            at = 2 * LANES * n + q
+            B[at] = p[MIRRORED] * phi[q] if n == 0 else (p[MIRRORED] if n == 1 else 0.0)
+            B[at + LANES] = radius[q] if n == 0 else 0.0
+        _extend_balls(p, numbers, known, lanes, orders, B, n)
 
 
 @kernel
-def bounds(p, phi, radius, B, out):
-    """Raise `out` (_BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| within `radius` of phi.
-
-    The first two also bound what rounds f and g there, in roundoffs: `steps` takes them for the
-    sizes of their terms.
-    """
-    f, g = int(p[F_AT]), int(p[G_AT])
-    ball(p, phi, 0.0, 1, B)
-    rounded_f, rounded_g = B[f, 0, 1] / ROUNDOFF_UP, B[g, 0, 1] / ROUNDOFF_UP
-    ball(p, phi, radius, 3, B)
-    out[_ON_F] = max(out[_ON_F], rounded_f, 1.0001 * max(_largest(B, f, 0), _largest(B, f, 1)))
-    out[_ON_G] = max(out[_ON_G], rounded_g, 1.0001 * _largest(B, g, 0))
-    out[_ON_DG] = max(out[_ON_DG], 1.0001 * _largest(B, g, 1))
-    out[_ON_DDG] = max(out[_ON_DDG], 2.0001 * _largest(B, g, 2))
+def ball(p, phi, radius, orders, B):
+    """As `balls`, of one lane: B (SLOTS, orders, 2)."""
+    count = _count(p, SLOTS)
+    numbers, flat = np.zeros((2 * count, LANES)), np.zeros(count * orders * 2 * LANES)
+    note(p, numbers, 0, 1)
+    known = np.zeros(count, np.bool_)
+    balls(p, numbers.ravel(), known, np.full(1, phi), np.full(1, radius), flat)
+    for i in range(count):
+        for n in range(orders):
+            at = 2 * LANES * (orders * i + n)
+            B[i, n, 0], B[i, n, 1] = flat[at], flat[at + LANES]
 
 
 @kernel
-def bound_circle(p):
-    """Write bounds over the whole circle into p, within a factor of 2; infinite where no FINEST
-    pieces bound them.
+def raised(p, points, over, q, out):
+    """Raise `out` (_BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| in lane q of the
+    balls `over`, of three orders.
+
+    The first two also bound what rounds f and g at its middle, as the balls `points` of one order
+    have it, in roundoffs: `steps` takes them for the sizes of their terms.
     """
-    B, out, pieces, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(_BOUNDS), COARSEST, False
+    f, g, step = int(p[F_AT]), int(p[G_AT]), 2 * LANES
+    rounded_f, rounded_g = points[step * f + LANES + q], points[step * g + LANES + q]
+    at_f, at_g = 3 * step * f + q, 3 * step * g + q
+    most_f = 1.0001 * max(_largest(over, at_f), _largest(over, at_f + step))
+    out[_ON_F] = max(out[_ON_F], rounded_f / ROUNDOFF_UP, most_f)
+    out[_ON_G] = max(out[_ON_G], rounded_g / ROUNDOFF_UP, 1.0001 * _largest(over, at_g))
+    out[_ON_DG] = max(out[_ON_DG], 1.0001 * _largest(over, at_g + step))
+    out[_ON_DDG] = max(out[_ON_DDG], 2.0001 * _largest(over, at_g + 2 * step))
+
+
+@kernel
+def bounds(p, phi, radius, out):
+    """Raise `out` (_BOUNDS) to bounds within `radius` of phi: see `raised`."""
+    count = _count(p, SLOTS)
+    numbers, known = np.zeros((2 * count, LANES)), np.zeros(count, np.bool_)
+    points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
+    note(p, numbers, 0, 1)
+    at = np.full(1, phi)
+    balls(p, numbers.ravel(), known, at, np.zeros(1), points)
+    balls(p, numbers.ravel(), known, at, np.full(1, radius), over)
+    raised(p, points, over, 0, out)
+
+
+@inline
+def _middles(pieces, out):
+    """Fill out (pieces) with the middles of as many pieces of the circle; returns the radius of one."""
+    half = math.pi / pieces
+    for i in range(pieces):
+        out[i] = (2 * i + 1) * half - math.pi
+    return 1.0001 * half
+
+
+@inline
+def _agree(p, out, first):
+    """Write the bounds `out` into p; are they finite, and near those that p had, if these are not
+    the first?
+    """
+    near = not first
+    for k in range(_BOUNDS):
+        near = near and math.isfinite(out[k]) and p[BOUND_F + k] <= 2.0 * out[k]
+        p[BOUND_F + k] = out[k]
+    return near
+
+
+@splice
+def _bound_finely(p):
+    """Write bounds over the whole circle into p, from the third number of its pieces on."""
+    count, pieces, near = _count(p, SLOTS), 16 * COARSEST, False
+    points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
+    numbers, known, none = np.empty((2 * count, LANES)), np.zeros(count, np.bool_), np.zeros(LANES)
+    note(p, numbers, 0, LANES)
+    out = np.empty(_BOUNDS)
     while not near and pieces <= FINEST:
-        half = math.pi / pieces
-        for k in range(_BOUNDS):
-            out[k] = 0.0
-        for i in range(pieces):
-            bounds(p, (2 * i + 1) * half - math.pi, 1.0001 * half, B, out)
-        near = pieces > COARSEST
-        for k in range(_BOUNDS):
-            near = near and math.isfinite(out[k]) and p[BOUND_F + k] <= 2.0 * out[k]
-            p[BOUND_F + k] = out[k]
+        middles, out[:] = np.empty(pieces), 0.0
+        radii = np.full(LANES, _middles(pieces, middles))
+        for first in range(0, pieces, LANES):
+            phi = middles[first : first + LANES]
+            balls(p, numbers.ravel(), known, phi, none, points)
+            balls(p, numbers.ravel(), known, phi, radii, over)
+            for q in range(LANES):
+                raised(p, points, over, q, out)
+        near = _agree(p, out, False)
         pieces *= 4
 
 
-@kernel
-def _periodic(p, angles):
-    """Are f and g the same, within their rounding, at these angles and 2 pi further on?"""
-    near, far = np.empty((_count(p, SLOTS), 1, 2)), np.empty((_count(p, SLOTS), 1, 2))
-    for phi in angles:
-        ball(p, phi, 0.0, 1, near)
-        ball(p, phi + 2.0 * math.pi, 0.0, 1, far)
+@inline
+def _periodic(p, points, first, many):
+    """Are f and g the same, within their rounding, at angles and 2 pi further on? In `points` these
+    are the lanes of one batch and of the next.
+    """
+    for q in range(first, first + many):
         for at, steep in ((int(p[F_AT]), p[BOUND_F]), (int(p[G_AT]), p[BOUND_DG])):
-            most = 2.0 * (near[at, 0, 1] + far[at, 0, 1]) + 4e-15 * steep
-            if not abs(near[at, 0, 0] - far[at, 0, 0]) <= most:
+            near = 2 * LANES * at + q
+            far = near + many
+            most = 2.0 * (points[near + LANES] + points[far + LANES]) + 4e-15 * steep
+            if not abs(points[near] - points[far]) <= most:
                 return False
     return True
 
 
 @kernel
+def _unchanged(p, last, known):
+    """Fill `known` with which values of the program p are those of the program in `last`."""
+    count = _count(p, SLOTS)
+    for i in range(1, count):
+        known[i] = True
+        for k in range(OPERATIONS + WIDTH * i, OPERATIONS + WIDTH * (i + 1)):
+            known[i] &= p[k] == last[k]
+    found = True
+    while found:  # sin and cos need each other
+        found = False
+        for i in range(1, count):
+            code, a, b, _number = _operation(p, i)
+            of_one = code == CONSTANT or code == OVER or known[a]
+            of_two = code == CONSTANT or code == PLUS or code == FROM or code == TIMES or known[b]
+            if known[i] and not (of_one and of_two):
+                known[i], found = False, True
+
+
+@kernel
 def complete(rows, angles):
-    """Fill in AT_REST and, on a circle, the bounds of programs; NaN where a number is not finite, or
-    f and g have no bounds or, by these angles, not the period 2 pi.
+    """Fill in AT_REST and, on a circle, the bounds of programs, all of one length; NaN where a number
+    is not finite, or f and g have no bounds or, by these angles, not the period 2 pi.
+
+    Bounds are within a factor of 2, of 4 COARSEST pieces of the circle or more: infinite where no
+    FINEST pieces bound f and g. What does not depend on parameters is found once for all rows.
     """
+    if len(rows) == 0:
+        return
+    circle, count = rows[0, ON_CIRCLE] > 0.0, _count(rows[0], SLOTS)
+    # batches: 0; the angles; the pieces of the circle, COARSEST and 4 COARSEST of them
+    batches, many, pieces = 5 if circle else 1, len(angles), 5 * COARSEST
+    at, radii, none = np.zeros(5 * LANES), np.zeros(5 * LANES), np.zeros(LANES)
+    lanes = np.array([1, 2 * many, LANES, LANES, pieces - 2 * LANES])
+    points, over = np.zeros((5, count * 2 * LANES)), np.zeros((5, count * 6 * LANES))
+    numbers, out = np.zeros((2 * count, LANES)), np.empty(_BOUNDS)
+    known, last = np.zeros(count, np.bool_), np.full(rows.shape[1], math.nan)
+    for k in range(many):
+        at[LANES + k], at[LANES + many + k] = angles[k], angles[k] + 2.0 * math.pi
+    first, end = 2 * LANES + COARSEST, 2 * LANES + pieces
+    radii[2 * LANES : first] = _middles(COARSEST, at[2 * LANES : first])
+    radii[first:end] = _middles(4 * COARSEST, at[first:end])
     for p in rows:
         good = True
         for k in range(OPERATIONS, len(p)):
             good &= math.isfinite(p[k])
         if good:
-            B, g = np.empty((_count(p, SLOTS), 1, 2)), int(p[G_AT])
-            ball(p, 0.0, 0.0, 1, B)
-            p[AT_REST] = 1.0 if B[g, 0, 0] == 0.0 and B[g, 0, 1] == 0.0 else 0.0
-            if p[ON_CIRCLE] > 0.0:
-                bound_circle(p)
-                for k in range(_BOUNDS):
-                    good &= math.isfinite(p[BOUND_F + k])
-                good = good and _periodic(p, angles)
+            known[0] = True
+            _unchanged(p, last, known)
+            last[:] = p
+            note(p, numbers, 0, LANES)
+            for k in range(batches):
+                phi = at[k * LANES : k * LANES + lanes[k]]
+                balls(p, numbers.ravel(), known, phi, none, points[k])
+                if k > 1:
+                    balls(p, numbers.ravel(), known, phi, radii[k * LANES :], over[k])
+            g = 2 * LANES * int(p[G_AT])
+            p[AT_REST] = 1.0 if points[0, g] == 0.0 and points[0, g + LANES] == 0.0 else 0.0
+        if good and circle:
+            near = False
+            for first, end in ((0, COARSEST), (COARSEST, pieces)):
+                out[:] = 0.0
+                for q in range(first, end):
+                    k = 2 + q // LANES
+                    raised(p, points[k], over[k], q % LANES, out)
+                near = _agree(p, out, first == 0)
+            if not near:
+                _bound_finely(p)
+            for k in range(_BOUNDS):
+                good &= math.isfinite(p[BOUND_F + k])
+            good = good and _periodic(p, points[1], 0, many)
         if not good:
             p[:] = math.nan
 
@@ -353,13 +550,13 @@ def bound_near(p, phi):
     """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they
     are not finite.
     """
-    B, out, near = np.empty((_count(p, SLOTS), 3, 2)), np.empty(_BOUNDS), False
+    out, near = np.empty(_BOUNDS), False
     p[RADIUS] = min(4.0 * p[RADIUS], 0.5 * (1.0 + abs(phi)))
     while not near:
         p[RADIUS] *= 0.5
         for k in range(_BOUNDS):
             out[k] = 0.0
-        bounds(p, phi, p[RADIUS], B, out)
+        bounds(p, phi, p[RADIUS], out)
         near = math.isfinite(out.sum()) or p[RADIUS] < LEAST_RADIUS
     for k in range(_BOUNDS):
         p[BOUND_F + k] = out[k]
