@@ -50,7 +50,7 @@ class _End:
 
 def followed(function, pieces, grain, first=0):
     """The pieces [(positions (m, 2), errors (m))] of curves function(x) = 0, longer at ends inside
-    the map; those before the `first` only where others meet them.
+    the map; those before the `first` are left out, and no other is followed along them.
 
     Those that meet end to end are one. All pieces are positive on one side, as those of marching
     squares are, so that none is followed along another one.
@@ -76,14 +76,14 @@ def followed(function, pieces, grain, first=0):
         chords = _steps(function, going, ends, chords, grain)
     longer = []
     for i, (x, error) in enumerate(pieces):
-        (first, first_error), (last, last_error) = (end.new for end in ends[2 * i : 2 * i + 2])
+        (before, before_error), (after, after_error) = (end.new for end in ends[2 * i : 2 * i + 2])
         longer.append(
             (
-                np.concatenate([first[::-1], x, last]),
-                np.concatenate([first_error[::-1], error, last_error]),
+                np.concatenate([before[::-1], x, after]),
+                np.concatenate([before_error[::-1], error, after_error]),
             )
         )
-    return _merged(longer)
+    return _merged(longer[first:])
 
 
 def _merged(pieces):

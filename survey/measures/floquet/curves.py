@@ -7,8 +7,8 @@ functions of `bifurcations`. These are known on LINES lines of the map each way,
 on lines FINER times as dense, show where to look (marching squares). Every point is then bracketed
 along an axis by signs of the function itself that are certain within the error bounds of M, and
 curves are followed on from their ends inside the map, into the tips of tongues (see `tips`). A
-tongue that is narrower everywhere than the distance of two of the dense lines may be missed, and
-one that the splines do not show. Curves are drawn wherever a multiplier passes, also where another
+tongue that the splines do not show is found where a function dips below zero between two points of
+the lattice (see `dips`); one that is narrower still may be missed. Curves are drawn wherever a multiplier passes, also where another
 one is outside the circle already: `outside` counts those. `row_count` tells where they do not
 explain how many multipliers are outside, or, by the Maslov index, how often some have passed 1 or
 -1. Along one axis, ALONE points are searched, and `counted_edges` finds what is missing.
@@ -119,6 +119,8 @@ def searched(scene, square, axes, fixed, options):
         passed = {
             kind: one.reshape(number, number) for kind, one in scene.passed(*on_lattice[2:]).items()
         }
+    if scene.FAMILY != "orbit":
+        _add_by_dips(drawing, functions, on_lattice, number)
     counts = row_count.outside(*on_lattice[:2], structure).reshape(number, number)
     if scene.FAMILY != "orbit":
         _add_by_number(drawing, row_count.known(counts))
@@ -157,15 +159,19 @@ class _Drawing:
             self.drawn += [(kind, x[part])] * copies
 
 
-def _zeros(drawing, function, roughly, on_lattice, number):
-    """[(positions (m, 2), errors (m))] of the curves on which a function of M is 0."""
+def _on_lattice(function, on_lattice, number):
+    """The values of a function of M on the lattice (number, lines), NaN where they are noise."""
     values, bars = function(*on_lattice)
-    square = drawing.square
     # where no sign is certain all around, as where the function is 0 throughout, there is only noise
     open_ = ~(abs(values) > bars).reshape(number, -1)
-    around = np.ones((3, 3 if square.across is None else 1))
+    around = np.ones((3, 3 if open_.shape[1] > 1 else 1))
     values = np.where(binary_erosion(open_, around, border_value=1).ravel(), np.nan, values)
-    values = values.reshape(open_.shape)
+    return values.reshape(open_.shape)
+
+
+def _zeros(drawing, function, roughly, on_lattice, number):
+    """[(positions (m, 2), errors (m))] of the curves on which a function of M is 0."""
+    values, square = _on_lattice(function, on_lattice, number), drawing.square
     lines = _lines if square.across is None else partial(_crossings, across=square.across)
 
     def sharp(x):
@@ -197,6 +203,19 @@ def _add_by_indices(drawing, functions, solved, indices, number):
         for x, error in missing:
             drawing.add(kind, x, error + drawing.square.grain)
     return passed
+
+
+def _add_by_dips(drawing, functions, on_lattice, number):
+    """Add the tongues that lie between two points of the lattice, and that are not drawn yet."""
+    for kind, function in functions:
+
+        def sharp(x, function=function):
+            return function(*drawing.matrices(x, RTOL))
+
+        drawn = [x for own, x in drawing.drawn if own == kind]
+        values = _on_lattice(function, on_lattice, number)
+        for x, error in dips.curves(sharp, drawn, drawing.square.grain, values):
+            drawing.add(kind, x, error)
 
 
 def _add_by_number(drawing, counts):
@@ -358,7 +377,7 @@ def _lines(function, grain, values, tried=TRIED):
     found = contourpy.contour_generator(fine, fine, dense).lines(0.0)
     parts = [_thinned(np.asarray(line)[:, ::-1]) for line in found]
     if not parts:
-        return [] if tried is not TRIED else dips.followed(function, [], values, grain)
+        return []
     x = np.concatenate(parts)
     slope = abs(np.stack([spline.ev(*x.T, dx=1), spline.ev(*x.T, dy=1)], axis=1))
     border = (x == 0.0) | (x == 1.0)
@@ -368,10 +387,7 @@ def _lines(function, grain, values, tried=TRIED):
     signs = np.sign(run[:, ::-1]) * [1.0, -1.0]
     signs[abs(run[:, ::-1]) < 0.1 * np.hypot(*run.T)[:, None]] = 0.0
     pieces = _closed_in(function, parts, along, grain, 0.5 / (lines - 1), tried, signs=signs)
-    pieces = [part for one in pieces for part in _smooth(*one)]
-    if tried is not TRIED:  # values that are nearly right show no narrow tongue
-        return tips.followed(function, pieces, grain)
-    return dips.followed(function, pieces, values, grain)
+    return tips.followed(function, [part for one in pieces for part in _smooth(*one)], grain)
 
 
 def _smooth(x, error):

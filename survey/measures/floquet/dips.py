@@ -65,19 +65,19 @@ def _low(before, here, after):
         return abs(here) < 2.0 * abs(depth)
 
 
-def followed(function, pieces, values, grain):
-    """The pieces [(positions (m, 2), errors (m))] of the curves function(x) = 0 on a map, followed by
-    `tips`, with those that its `values` (n, n) on the lattice show to lie between two points.
+def curves(function, drawn, grain, values):
+    """[(positions (m, 2), errors (m))] of curves function(x) = 0 on a map that its `values` (n, n) on
+    the lattice show to lie between two points, but for those that are `drawn` [positions].
     """
-    pieces = tips.followed(function, pieces, grain)
     ticks = np.linspace(0.0, 1.0, len(values))
     seeds = [_Seeds(function, ticks, values, axis, grain) for axis in (0, 1)]
+    known, found = [(x, np.zeros(len(x))) for x in drawn if len(x) > 1], []
     for _ in range(ROUNDS):
-        new = [piece for own in seeds for piece in own.pieces(pieces)]
+        new = [piece for own in seeds for piece in own.pieces(known + found)]
         if not new:
             break
-        pieces = tips.followed(function, pieces + new, grain, first=len(pieces))
-    return pieces
+        found += tips.followed(function, known + found + new, grain, len(known + found))
+    return found
 
 
 class _Seeds:
@@ -156,7 +156,9 @@ class _Seeds:
         return x, width, sure & right & (width < tips.SURE) & (x >= 0.0) & (x <= 1.0)
 
     def _unknown(self, drawn):
-        """Which zeros lie on no piece that is drawn in the same sense?"""
+        """Which zeros lie on no piece that is drawn? Those of one sense may be the other edge's, unless
+        they are at a point of it.
+        """
         if not self.line.size:
             return np.zeros(0, bool)
         along, other = self.axis, 1 - self.axis
@@ -172,13 +174,12 @@ class _Seeds:
             )
             for i in some:
                 tick = self.ticks[self.line[i]]
-                k = np.flatnonzero(
-                    ((first[:, other] - tick) * (last[:, other] - tick) <= 0.0)
-                    & (slope == self.slope[i])
-                )
+                k = np.flatnonzero((first[:, other] - tick) * (last[:, other] - tick) <= 0.0)
                 run = last[k] - first[k]
-                share = (tick - first[k, other]) / run[:, other]
-                known[i] = (abs(first[k, along] + share * run[:, along] - self.t[i]) <= KNOWN).any()
+                with np.errstate(invalid="ignore"):  # a chord along the line
+                    share = (tick - first[k, other]) / run[:, other]
+                    off = abs(first[k, along] + share * run[:, along] - self.t[i])
+                known[i] = (off <= np.where(slope[k] == self.slope[i], KNOWN, tips.SURE)).any()
         return ~known
 
     def _chains(self):
