@@ -112,7 +112,7 @@ def followed(equation, continued, points, reach):
         where, x, T = [], [], []
         for k in range(len(curves.rows)):
             mine = np.flatnonzero(row == first + k)
-            which, *start = curves.starts(k, points[mine, continued.index])
+            which, *start = curves.starts(k, points[mine, continued.index], folds=True)
             where.append(mine[which])
             x.append(start[0])
             T.append(start[1])
