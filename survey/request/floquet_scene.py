@@ -11,13 +11,12 @@ from survey.errors import BadInput
 from survey.measures.floquet import dense, monodromy, motion, probing, stability
 from survey.measures.floquet.compile_ahead import compile_ahead
 from survey.measures.floquet.halves import alike_or_opposite
-from survey.measures.floquet.system import System
+from survey.measures.floquet.system import TRIED, System
 from survey.request.function_scene import refusal
 from survey.request.traced_scene import TracedScene, rebinds
 from survey.scene import plus_minus
 
 LARGEST = 64  # states
-TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])  # of a period: where A is tried as Python
 NODES = 1500  # that a map asks for, roughly
 SOME = 4  # points at which a structure is tried
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
@@ -211,6 +210,10 @@ class FloquetScene(TracedScene):
         system = self._system
         period, edges = self._called(system.ranges, given)
         self._check_filled(given, period)
+        if not np.isfinite(edges).all(axis=1).any():
+            for name, value in (("PERIOD", self.period), ("BREAKS", self.breaks)):
+                if callable(value):
+                    self._defined(name, value, given[0])
         if not len(points):
             if np.isfinite(edges).all():
                 self._called(system.traced, given, edges)
@@ -222,15 +225,21 @@ class FloquetScene(TracedScene):
         known = np.flatnonzero(np.isfinite(edges).all(axis=1))
         groups = self._called(system.traced, given[known], edges[known])
         followed = np.concatenate([[], *(own for own, _ in groups)]).astype(int)
-        for i in np.setdiff1d(np.arange(known.size), followed):
+        rough = np.setdiff1d(np.arange(known.size), followed)
+        for i in rough[[self._is_finite(given[known[i]], period[known[i]]) for i in rough]]:
             self._refuse(
                 f"a branch of the code changes within a period at {self._where(given[known[i]])}",
                 "name the times in BREAKS",
             )
-        traceless = len(groups) > 0
-        for own, programs in groups:
-            for i in known[own]:
-                traceless &= self._compare(programs, given[i], period[i], edges[i])
+        compared = [
+            self._compare(programs, given[i], period[i], edges[i])
+            for own, programs in groups
+            if programs is not None
+            for i in known[own]
+        ]
+        if all(one is None for one in compared):
+            self._refuse_undefined(given, edges, known)
+        traceless = all(one is not False for one in compared)
         if self.conserved is not None:
             self._check_conserved(given[known])
         known = self._called(monodromy.SystemPoints, system, given)
@@ -243,6 +252,23 @@ class FloquetScene(TracedScene):
             )
         if traceless:
             self._suggest_structure(given[:SOME])
+
+    def _is_finite(self, point, period):
+        """Are the matrices finite at TRIED times at the point?"""
+        return all(
+            np.isfinite(self._plain(name, time, point)).all()
+            for name in self.matrices
+            for time in TRIED * period
+        )
+
+    def _refuse_undefined(self, given, edges, known):
+        """Refuse A, which has no finite value at the points `given`, of which `known` have edges."""
+        if known.size:
+            self._called(self._system.recorded, given[known[0]], edges[known[0]])
+        self._refuse(
+            f"A has no finite value at {self._where(given[0])}",
+            "correct it, or the domains of PARAMETERS",
+        )
 
     def _suggest_structure(self, points):
         """Say, once, which structure fits a system without one whose trace is 0: none of its points
@@ -271,7 +297,7 @@ class FloquetScene(TracedScene):
 
     def _compare(self, programs, point, period, edges):
         """Refuse what the recorded operations show: another value than the code's, no period, no
-        structure; is the trace of A 0 throughout?
+        structure; is the trace of A 0 throughout? None where A is not finite.
         """
         n = len(self.states)
         size = 0.0
@@ -288,10 +314,7 @@ class FloquetScene(TracedScene):
             )
         size = max(abs(A).max() for A in recorded)
         if not np.isfinite(size):
-            self._refuse(
-                f"A has no finite value at {self._where(point)}",
-                "correct it, or the domains of PARAMETERS",
-            )
+            return None
         for own, bar, other in zip(recorded, bars, plain, strict=True):
             if other is not None and not (abs(own - np.array(other)) <= SAME * size + bar).all():
                 self._refuse(
@@ -338,7 +361,10 @@ class FloquetScene(TracedScene):
         system, some = self._system, np.arange(len(given))
         w = self._called(system.weights, given)
         points = self._called(monodromy.SystemPoints, system, given)
-        if not (np.isfinite(w).all() and (w != 0.0).any(axis=1).all()):
+        usable = np.isfinite(w).all(axis=1)
+        if not usable.any() and callable(self.conserved):
+            self._defined("CONSERVED", self.conserved, given[0])
+        if not (usable.any() and (w != 0.0).any(axis=1).all()):
             self._refuse(
                 "CONSERVED must be numbers, not all 0", "name the coefficients of the states"
             )

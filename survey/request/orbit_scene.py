@@ -14,7 +14,8 @@ from survey.measures.floquet.compile_ahead import compile_ahead
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
 from survey.measures.floquet.symmetry import Symmetry
-from survey.request.floquet_scene import SAME, TRIED
+from survey.measures.floquet.system import TRIED
+from survey.request.floquet_scene import SAME
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
@@ -27,7 +28,7 @@ BRANCH = Parameter(
     whole=True,
 )  # fmt: skip
 STATUS = {
-    "invalid_parameters": "outside the domain, or the start or the period is not finite, or the period not positive",
+    "invalid_parameters": "outside the domain, or start, period or f there is not finite, or the period not positive",
     "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
     "give a better start, or PERIOD = None if f does not depend on t; or, with CONTINUATION, the point has fewer "
     "orbits than `branch`",
@@ -178,6 +179,10 @@ class OrbitScene(TracedScene):
             given = np.concatenate([given, begin])
         x0, period = self._called(equation.begin, given)
         known = np.isfinite(x0).all(axis=1) & (period > 0) & np.isfinite(period)
+        if not known.any():
+            for name, function in (("START", self.start), ("PERIOD", self.period)):
+                if callable(function):
+                    self._defined(name, function, given[0])
         if len(points) and not known.any():
             ends = (
                 "the guess of the period, the last number of START,"
@@ -190,14 +195,25 @@ class OrbitScene(TracedScene):
                 else f"{ends} is not positive"
             )
             self._refuse(f"{what} at {self._where(points[0])}", "correct it")
-        for point, x, T in zip(given[known], x0[known], period[known], strict=True):
+        tried = list(zip(given[known], x0[known], period[known], strict=True))
+        defined = not tried
+        for point, x, T in tried:
             self._try(point, x)
             self._check_filled(point, x, T)
-            for own, programs in self._called(equation.traced, point[None], x[None]):
-                if own.size and len(points):
-                    self._compare(programs, point, x, T)
+            for _own, programs in self._called(equation.traced, point[None], x[None]):
+                if not len(points):
+                    defined = True
+                elif self._compare(programs, point, x, T):
+                    defined = True
                     if self.symmetry is not None:
                         self._check_symmetry(programs, point, x)
+        if not defined:
+            point, x, _T = tried[0]
+            self._called(equation.recorded, point, x)
+            self._refuse(
+                f"f has no finite value at the start, {self._where(point)}",
+                "correct it, or START, or the domains of PARAMETERS",
+            )
 
     def _check_symmetry(self, programs, point, x):
         """Refuse REVERSED, TRANSVERSE and START where f contradicts them, at states about the start."""
@@ -269,7 +285,7 @@ class OrbitScene(TracedScene):
 
     def _compare(self, programs, point, x, T):
         """Refuse what the recorded operations show: other values than the code's, no period,
-        another Jacobian.
+        another Jacobian; is f finite at the start?
         """
         n = len(self.states)
         here = self._where(point)
@@ -283,7 +299,7 @@ class OrbitScene(TracedScene):
         f = f[:, :, 0]
         size = abs(f).max()
         if not np.isfinite(size):
-            self._refuse(f"f has no finite value at the start, {here}", "correct it, or START")
+            return False
         plain = np.array([self._at(time, x, point) for time in t])
         if not (abs(plain - f) <= SAME * size).all():
             self._refuse(
@@ -311,3 +327,4 @@ class OrbitScene(TracedScene):
                 self._refuse(
                     f"jacobian(t, x, p, out) is not df/dx at {here}", "correct it, or leave it out"
                 )
+        return True

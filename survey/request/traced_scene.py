@@ -78,6 +78,13 @@ class TracedScene(FunctionScene):
             )
         return value
 
+    def _defined(self, name, function, point):
+        """Refuse the function of this name if it fails at the point."""
+        try:
+            function(point)
+        except Exception as error:
+            self._refuse(f"{name}(p) fails ({type(error).__name__}: {reason(error)})", "correct it")
+
     def _called(self, function, *arguments):
         try:
             return function(*arguments)

@@ -16,6 +16,7 @@ Source: H. B. Keller, in Applications of Bifurcation Theory (1977) 359 (pseudo-a
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -37,6 +38,7 @@ MORE, AWAY = 8, 2.0  # states of a box; periods of the motion from the start tha
 CORRECTIONS, CORRECTED, CONTRACTION = 5, 1e-3, 0.5
 GROWTH, LEAST = 1.5, 1e-2  # of steps; the size of a state, relative to the largest one
 NOTHING = 1e-3  # relative to the states from which it is sought: an orbit that is smaller is 0
+NEAR_FOLD = 1e-4  # of l: cubics miss folds by 1e-5 at most, as measured
 # of the tangent in a step, in radians: too much, and so little that steps become longer
 TURN, LITTLE = 0.35, 0.12
 DIFFERENCE = 1e-7  # of l, for derivatives that give directions alone
@@ -86,6 +88,42 @@ class ContinuedCurve:
         )
         u = _bisected(c[:, piece, -1], values[which], ends[piece, part], ends[piece, part + 1])
         return which, _cubic(c[:, piece], u[:, None])
+
+    def beside_folds(self, values):
+        """Points on both sides of the folds that l has near the values (V): their numbers, and y (C, m).
+
+        Cubics may not reach a value next to a fold, or meet it on the wrong side; from these points
+        Newton's method does, and comes nearer to either orbit by half in each step.
+        """
+        at, y = self._folds
+        fold, which = np.nonzero(abs(at[:, None] - values) <= NEAR_FOLD)
+        return np.repeat(which, 2), y[fold].reshape(-1, self.y.shape[1])
+
+    @cached_property
+    def _folds(self):
+        """l at the folds (F), and points before and after them (F, 2, m), at NEAR_FOLD in l, or
+        half-way to the next fold.
+        """
+        c = self._pieces()
+        ends = _monotonic(c[:, :, -1])
+        piece, part = np.nonzero(ends[:, 1:] > ends[:, :-1])
+        u = np.stack([ends[piece, part], ends[piece, part + 1]], axis=1)
+        at_ends = _cubic(c[:, piece, -1, None], u)
+        rises = at_ends[:, 1] > at_ends[:, 0]
+        turns = np.flatnonzero(rises[1:] != rises[:-1]) + 1
+        bounds = np.concatenate([[0], turns, [len(u)]])  # parts between folds
+        depth = np.minimum(
+            NEAR_FOLD, 0.5 * abs(at_ends[bounds[1:] - 1, 1] - at_ends[bounds[:-1], 0])
+        )
+        y = np.empty((turns.size, 2, self.y.shape[1]))
+        for k, turn in enumerate(turns):
+            for side, own in ((0, np.arange(bounds[k], turn)), (1, np.arange(turn, bounds[k + 2]))):
+                wanted = at_ends[turn, 0] + np.where(rises[turn], 1.0, -1.0) * depth[k + side]
+                inside = (at_ends[own].min(axis=1) <= wanted) & (wanted <= at_ends[own].max(axis=1))
+                i = own[inside][-1 if side == 0 else 0]
+                at = _bisected(c[:, piece[i : i + 1], -1], np.array([wanted]), *u[i][:, None])
+                y[k, side] = _cubic(c[:, piece[i]], at)
+        return at_ends[turns, 0], y
 
 
 def _monotonic(c):
@@ -213,13 +251,15 @@ class ContinuedCurves:
                 return True
         return False
 
-    def starts(self, row, values):
-        """The curves of a row at values of the parameter (V): numbers of the values, states,
-        periods (C each).
+    def starts(self, row, values, folds=False):
+        """The curves of a row at values of the parameter (V), and perhaps beside their folds: numbers
+        of the values, states, periods (C each).
         """
         shares = (values - self.continued.low) / (self.continued.high - self.continued.low)
         n, m = self.equation.n, self.equation.n + self.free + 1
         found = [curve.crossings(shares) for curve in self.of_row[row]]
+        if folds:
+            found += [curve.beside_folds(shares) for curve in self.of_row[row]]
         which = np.concatenate([np.zeros(0, int), *(one for one, _y in found)])
         y = np.concatenate([np.zeros((0, m)), *(y for _one, y in found)])
         return which, y[:, :n], y[:, n] if self.free else np.full(len(y), np.nan)

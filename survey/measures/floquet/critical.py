@@ -100,7 +100,7 @@ class Critical(Equation):
         points[:, list(self.varied)] = y[:, self.parameters_at :]
         return points
 
-    def _trace(self, point, x0):
+    def recorded(self, point, x0):
         n = self.n
         graph = Graph([float(x) for x in point], 0.25)
         y = self._symbols(graph, len(point), x0)

@@ -8,10 +8,11 @@ on lines FINER times as dense, show where to look (marching squares). Every poin
 along an axis by signs of the function itself that are certain within the error bounds of M, and
 curves are followed on from their ends inside the map, into the tips of tongues (see `tips`). A
 tongue that the splines do not show is found where a function dips below zero between two points of
-the lattice (see `dips`); one that is narrower still may be missed. Curves are drawn wherever a multiplier passes, also where another
-one is outside the circle already: `outside` counts those. `row_count` tells where they do not
-explain how many multipliers are outside, or, by the Maslov index, how often some have passed 1 or
--1. Along one axis, ALONE points are searched, and `counted_edges` finds what is missing.
+the lattice (see `dips`); one that is narrower still may be missed. Curves are drawn wherever a
+multiplier passes, also where another one is outside the circle already: `outside` counts those.
+`row_count` tells where they do not explain how many multipliers are outside, or, by the Maslov
+index, how often some have passed 1 or -1. Along one axis, ALONE points are searched, and
+`counted_edges` finds what is missing.
 """
 
 from functools import partial

@@ -10,7 +10,7 @@ from survey.kernels.floquet.flow import ORDER, flow
 from survey.kernels.math.roundoff import ROUNDOFF
 from survey.measures.floquet import trace
 from survey.measures.floquet.symmetry import SHARE, Symmetry
-from survey.measures.floquet.system import KEPT, Raised
+from survey.measures.floquet.system import KEPT, TRIED, Raised, is_undefined
 from survey.measures.floquet.trace import Graph, Unsupported
 
 MOST_STEPS = 2_000  # of an orbit
@@ -48,8 +48,11 @@ class Equation:
         return self.n - self.free if self.symmetry is None else self.symmetry.judged
 
     def begin(self, points):
-        """Guesses of the state (N, n) and of the period (N), which is what it is where it is known."""
+        """Guesses of the state (N, n) and of the period (N), which is what it is where it is known;
+        NaN where they are undefined.
+        """
         guess = np.array([self._row("START(p)", self.start, p, self.n + self.free) for p in points])
+        guess = guess.reshape(len(points), self.n + self.free)
         if self.free:
             return guess[:, :-1], guess[:, -1]
         return guess, self.periods(points)
@@ -70,7 +73,13 @@ class Equation:
 
     def _row(self, name, value, p, size):
         try:
-            row = np.atleast_1d(np.asarray(value(p) if callable(value) else value, dtype=float))
+            row = value(p) if callable(value) else value
+        except (ArithmeticError, ValueError):
+            return np.full(size, np.nan)
+        except Exception as error:
+            raise Raised(name) from error
+        try:
+            row = np.atleast_1d(np.asarray(row, dtype=float))
         except Exception as error:
             raise Raised(name) from error
         if row.shape != (size,):
@@ -87,7 +96,9 @@ class Equation:
         return row
 
     def traced(self, points, x0):
-        """[(indices, Programs)] of the points; raises Unsupported or Raised."""
+        """[(indices, Programs)] of the points, but for those where f is undefined; raises Unsupported
+        or Raised.
+        """
         left = np.arange(len(points))
         found = []
         with LOCK:
@@ -100,7 +111,13 @@ class Equation:
                     left = left[~inside]
             if not left.size:
                 break
-            known = [self._trace(points[left[0]], x0[left[0]])]
+            try:
+                known = [self.recorded(points[left[0]], x0[left[0]])]
+            except (Unsupported, Raised) as error:
+                if not is_undefined(error):
+                    raise
+                left, known = left[1:], []
+                continue
             with LOCK:
                 self._traces.extend(known)
                 del self._traces[:-KEPT]
@@ -109,7 +126,17 @@ class Equation:
                 left = left[1:]
         return found
 
-    def _trace(self, point, x0):
+    def defined(self, points, x, T):
+        """Where (N) f at the states x (N, n) is finite at TRIED shares of the periods T (N)."""
+        found = np.zeros(len(points), bool)
+        for inside, programs in self.traced(points, x):
+            numbers = programs.numbers(points[inside])
+            every = [programs.slopes(numbers, s * T[inside], x[inside])[0] for s in TRIED]
+            found[inside] = np.isfinite(every).all(axis=(0, 2))
+        return found
+
+    def recorded(self, point, x0):
+        """The Programs, as the code runs at this point and state; raises Unsupported or Raised."""
         graph = Graph([float(x) for x in point], 0.25)
         x = self._symbols(graph, len(point), x0)
         rows = self._called(graph, graph.time, x.copy(), graph.parameters)
@@ -141,7 +168,7 @@ class Equation:
         except ArithmeticError as error:
             raise Unsupported(
                 f"f(t, x, p, out): {error}, while its operations are recorded"
-            ) from None
+            ) from error
         except Exception as error:
             raise Raised("f(t, x, p, out)") from error
         if out.shape != (n,):

@@ -123,7 +123,9 @@ def _angles(X, goal):
         @ np.swapaxes(np.linalg.solve(np.swapaxes(Z.conj(), 1, 2), np.swapaxes(Z, 1, 2)), 1, 2)
         @ U.T
     )
-    value = np.linalg.eigvals(W)
+    known = np.isfinite(W).all(axis=(1, 2))  # X may be finite, and overflow in Z
+    sure[sure] = known
+    value = np.linalg.eigvals(W[known])
     angles[sure] = np.angle(value) % (2.0 * np.pi)
     sure[sure] = (abs(abs(value) - 1.0) < UNITARY).all(axis=1) & (abs(value - 1.0) > CLOSE).all(
         axis=1

@@ -64,8 +64,13 @@ class SystemPoints:
         self.scale = np.ones((len(points), self.n))
         self.growth = np.zeros((2, len(points)))
         self.groups = []
+        if system.conserved is not None:
+            valid &= np.isfinite(system.weights(points)).all(axis=1)
         where = np.flatnonzero(valid)
         for inside, programs in system.traced(points[where], edges[where]):
+            if programs is None:
+                self.rough[where[inside]], self.size[where[inside]] = False, np.nan
+                continue
             for own, found in self._alike(where[inside], programs):
                 self._measure(own, programs, found)
         self.valid = valid & np.isfinite(self.size).all(axis=1) & ~self.rough

@@ -89,6 +89,9 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
     out["status"] = np.where(known, out["status"], status.INVALID_PARAMETERS).astype(
         out["status"].dtype
     )
+    without = np.flatnonzero([not one for one in order])
+    undefined = without[~_defined(equation, different[without])]
+    out["status"][np.flatnonzero(known)[np.isin(row_of, undefined)]] = status.INVALID_PARAMETERS
     if NUMBER.name in wanted:
         out[NUMBER.name] = np.full(len(points), NUMBER.fill)
         out[NUMBER.name][known] = np.array([len(one) for one in order], int)[row_of]
@@ -109,7 +112,7 @@ def followed(equation, continued, points, reach):
         where, x, T = [], [], []
         for k in range(len(curves.rows)):
             mine = np.flatnonzero(row == first + k)
-            which, *start = curves.starts(k, points[mine, continued.index])
+            which, *start = curves.starts(k, points[mine, continued.index], folds=True)
             where.append(mine[which])
             x.append(start[0])
             T.append(start[1])
@@ -155,6 +158,15 @@ def _near(a, b):
     return abs(a - b) <= SAME * (a + b)
 
 
+def _defined(equation, points):
+    """Where (N) f is finite at the start."""
+    found = np.zeros(len(points), bool)
+    guess, period = equation.begin(points)
+    some = np.flatnonzero(np.isfinite(guess).all(axis=1) & np.isfinite(period))
+    found[some] = equation.defined(points[some], guess[some], period[some])
+    return found
+
+
 def _chunk(equation, points, method, rtol, wanted):
     N, n = len(points), equation.n
     known = np.isfinite(points).all(axis=1)
@@ -162,6 +174,8 @@ def _chunk(equation, points, method, rtol, wanted):
     guess[known], period[known] = equation.begin(points[known])
     known &= np.isfinite(guess).all(axis=1) & np.isfinite(period) & (period > 0)
     found = shown(equation, points, guess, period, method, rtol)
+    without = np.flatnonzero(known & ~found.good)
+    known[without] = equation.defined(points[without], guess[without], period[without])
     return found.outputs(known, rtol, wanted, callable(equation.period))
 
 

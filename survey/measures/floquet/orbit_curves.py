@@ -441,12 +441,15 @@ def mirror_of(equation, square, varied, given):
         return out
 
     here = f(t, x)
+    usable = np.isfinite(here).all(axis=1)
+    if not usable.any():
+        return None
     for signs in product((-1.0, 1.0), repeat=n):
         S = np.array(signs)
         if (S > 0).all():
             continue
-        off = abs(f(t + 0.5 * T, S * x) - S * here)
-        if (off <= ODD * (abs(here).max(axis=1, keepdims=True) + 1e-300)).all():
+        off = abs(f(t + 0.5 * T, S * x) - S * here)[usable]
+        if (off <= ODD * (abs(here[usable]).max(axis=1, keepdims=True) + 1e-300)).all():
             return signs
     return None
 

@@ -19,6 +19,8 @@ from survey.measures.floquet.trace import ONE, Graph, Symbol, Unsupported
 KEPT = 256  # traces
 SMALL = 0.1  # a pivot, relative to the largest entry of its row
 RECORDED = 64  # points from which on it pays to record PERIOD
+# of a period: where functions are tried as Python, and must be finite
+TRIED = np.array([0.0, 0.11, 0.29, 0.47, 0.62, 0.83])
 LOCK = threading.Lock()
 
 
@@ -28,6 +30,11 @@ class Raised(Exception):
     def __init__(self, name):
         super().__init__(name)
         self.name = name
+
+
+def is_undefined(error):
+    """Does an Unsupported or Raised tell of the one point, at which the function has no value?"""
+    return isinstance(error.__cause__, (ArithmeticError, ValueError))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +64,9 @@ class System:
         return self.n - (self.conserved is not None)
 
     def weights(self, points):
-        """What is `conserved` at the points: w (N, n)."""
+        """What is `conserved` at the points: w (N, n), NaN where it is undefined."""
         rows = [self._value("CONSERVED", self.conserved, p) for p in points]
+        rows = [np.full(self.n, np.nan) if row is np.nan else row for row in rows]
         try:
             return np.array(rows, dtype=float).reshape(len(points), self.n)
         except (TypeError, ValueError) as error:
@@ -71,7 +79,7 @@ class System:
 
     def ranges(self, points):
         """Period (N) and the edges of the pieces (N, P + 1), the last one repeated where a point
-        has fewer.
+        has fewer; NaN where one of them is undefined.
         """
         each = points[:1] if self.same_ranges else points
         period = self.periods(each)
@@ -81,8 +89,9 @@ class System:
         rows = []
         for p, length in zip(each, period, strict=True):
             inside = np.atleast_1d(self._value("BREAKS", self.breaks, p)).astype(float)
-            inside = np.unique(inside[(inside > 0) & (inside < length)])
-            rows.append([0.0, *inside, length])
+            last = np.nan if np.isnan(inside).any() else length
+            inside = np.unique(inside[(inside > 0) & (inside < last)])
+            rows.append([0.0, *inside, last])
         most = max(map(len, rows), default=2)
         edges = np.array([[*row, *[row[-1]] * (most - len(row))] for row in rows]).reshape(
             len(rows), most
@@ -125,6 +134,8 @@ class System:
     def _value(self, name, value, p):
         try:
             return value(p) if callable(value) else value
+        except (ArithmeticError, ValueError):
+            return np.nan
         except Exception as error:
             raise Raised(f"{name}(p)") from error
 
@@ -139,7 +150,8 @@ class System:
         """[(indices, [program of each piece])] of the points (N, parameters); raises Unsupported or
         Raised.
 
-        Points in no group, whose branches change within a piece, are rough.
+        Points in no group, whose branches change within a piece, are rough; those where A is
+        undefined have None for the programs.
         """
         left = np.arange(len(points))
         found = []
@@ -155,7 +167,14 @@ class System:
                     left = left[inside != 1]
             if not left.size:
                 break
-            programs = self._trace(points[left[0]], edges[left[0]])
+            try:
+                programs = self.recorded(points[left[0]], edges[left[0]])
+            except (Unsupported, Raised) as error:
+                if not is_undefined(error):
+                    raise
+                found.append((left[:1], None))
+                left, known = left[1:], []
+                continue
             with LOCK:
                 self._traces.append(programs)
                 del self._traces[:-KEPT]
@@ -173,8 +192,10 @@ class System:
             out = np.minimum(out, program.holds(points, edges[:, k], edges[:, k + 1]))
         return out
 
-    def _trace(self, point, edges):
-        """The program of each piece, as the code runs in its middle at this point."""
+    def recorded(self, point, edges):
+        """The program of each piece, as the code runs in its middle at this point; raises
+        Unsupported or Raised.
+        """
         return [self._program(point, 0.5 * (low + high)) for low, high in pairwise(edges)]
 
     def _program(self, point, time):
@@ -197,7 +218,7 @@ class System:
         except ArithmeticError as error:
             raise Unsupported(
                 f"{name}(t, p, out): {error}, while its operations are recorded"
-            ) from None
+            ) from error
         except Exception as error:
             raise Raised(f"{name}(t, p, out)") from error
         if out.shape != (size, size):
@@ -344,5 +365,5 @@ def _pivot(work, left, columns, graph):
         raise Unsupported(
             "M(t, p, out) is singular",
             "give every coordinate a mass, or leave M out: it is the identity",
-        )
+        ) from np.linalg.LinAlgError("singular matrix")
     return min(found)[3:]

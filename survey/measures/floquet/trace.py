@@ -684,15 +684,15 @@ class Program:
                     x, y = values[:, o[0]], values[:, o[1]]
                     v = np.power(x, y)
                     e = (
-                        abs(y * v / x) * errors[:, o[0]]
-                        + abs(v * np.log(abs(x))) * errors[:, o[1]]
+                        _carried(y * v / x, errors[:, o[0]])
+                        + _carried(v * np.log(abs(x)), errors[:, o[1]])
                         + 8 * u * abs(v)
                     )
                 else:
                     x = np.ascontiguousarray(values[:, o[0]])
                     function, slope = FUNCTIONS[operation]
                     v = function(x)
-                    e = abs(slope(x)) * errors[:, o[0]] + (
+                    e = _carried(slope(x), errors[:, o[0]]) + (
                         1 if operation == "sqrt" else 8
                     ) * u * abs(v)
                 values[:, k], errors[:, k] = v, e
@@ -852,6 +852,11 @@ class Program:
 
     def _decided(self, symbol):
         return symbol.is_number and self.graph.is_constant(symbol.terms[ONE])
+
+
+def _carried(slope, error):
+    """What errors (N) become by a function of these slopes (N), which are infinite at sqrt 0."""
+    return np.where(error == 0.0, 0.0, abs(slope) * error)
 
 
 class _Math:

@@ -173,3 +173,69 @@ def test_bad_ranges(given):
 
 def test_outside_the_range():
     assert survey.evaluate(scene(), F=1.0, w=[0.5, 1.0]).status.values.tolist() == [1, 0]
+
+
+def after_a_period(omega, F, zeta, x, v, step=0.12, order=26):
+    """x, v and their derivatives by both, of Duffing's oscillator with a force, a period later: Taylor
+    series with mpmath.
+    """
+    period = 2 * mpmath.pi / omega
+    number = int(mpmath.ceil(period / step))
+    h = period / number
+    state = [[x, v], [mpmath.mpf(1), mpmath.mpf(0)], [mpmath.mpf(0), mpmath.mpf(1)]]
+    for k in range(number):
+        force = [F * mpmath.cos(omega * k * h + j * mpmath.pi / 2) for j in range(4)]
+        rows = [([one], [two]) for one, two in state]
+        square = []
+        for n in range(order):
+            base = rows[0][0]
+            square.append(mpmath.fdot(base, base[::-1]))
+            for m, (one, two) in enumerate(rows):
+                cubed = (1 if m == 0 else 3) * mpmath.fdot(square, one[::-1])
+                push = force[n % 4] * omega**n / mpmath.factorial(n) if m == 0 else 0
+                slope = push - 2 * zeta * two[n] - one[n] - cubed
+                one.append(two[n] / (n + 1))
+                two.append(slope / (n + 1))
+        powers = [h**j for j in range(order + 1)]
+        state = [[mpmath.fdot(row, powers) for row in pair] for pair in rows]
+    return state[0], mpmath.matrix([[state[1][0], state[2][0]], [state[1][1], state[2][1]]])
+
+
+def orbit_near(omega, F, zeta, x, v):
+    """The orbit near x, v by Newton's method, to 20 digits or so, and its multipliers."""
+    with mpmath.workdps(30):
+        omega, F, zeta, x, v = (mpmath.mpf(float(one)) for one in (omega, F, zeta, x, v))
+        for _ in range(4):
+            end, M = after_a_period(omega, F, zeta, x, v)
+            step = mpmath.lu_solve(M - mpmath.eye(2), mpmath.matrix([x - end[0], v - end[1]]))
+            x, v = x + step[0], v + step[1]
+        assert mpmath.norm(step) < 1e-15
+        half, det = (M[0, 0] + M[1, 1]) / 2, M[0, 0] * M[1, 1] - M[0, 1] * M[1, 0]
+        root = mpmath.sqrt(half**2 - det)
+        return (x, v), (half + root, half - root)
+
+
+@pytest.mark.parametrize(
+    ("F", "near", "inward"),
+    [(0.3, 1.38, -1.0), (0.5, 1.42, 1.0), (0.5, 1.66, -1.0), (0.7, 1.9, -1.0)],
+)
+def test_both_orbits_are_found_next_to_a_fold(F, near, inward):
+    """Down to 1e-7 of the range, where cubics between points of the curve miss the fold by 1e-5."""
+    folds = survey.edge(scene(), along="w", near=near, F=F).edge.values
+    fold = float(folds[abs(folds - near).argmin()])
+    assert abs(fold - near) < 0.01
+    for d in (1e-5, 1e-6, 1e-7):
+        ds = survey.evaluate(scene(), F=F, w=fold + 3.2 * d * inward, branch=[1, 2, 3])
+        assert (ds.status == 0).all() and (ds.orbits == 3).all()
+        verdicts = []
+        for k in range(3):
+            one = ds.isel(branch=k)
+            exact, multipliers = orbit_near(one.w, F, 0.1, *one.x0.values)
+            off = [abs(x - mpmath.mpf(float(y))) for x, y in zip(exact, one.x0.values, strict=True)]
+            assert all(o <= bar for o, bar in zip(off, one.x0_error.values, strict=True))
+            assert (one.x0_error < 1e-8).all()
+            verdicts.append(int(one.verdict))
+            assert verdicts[-1] in (-1, int(max(abs(m) for m in multipliers) < 1))
+        assert verdicts.count(1) == 2 and verdicts.count(0) == 1  # none is undecided
+        beyond = survey.evaluate(scene(), F=F, w=fold - 3.2 * d * inward, branch=1)
+        assert int(beyond.orbits) == 1

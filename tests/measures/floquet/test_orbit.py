@@ -278,6 +278,133 @@ def test_invalid_points():
     assert status(ds) == [1, 0]
 
 
+def refuses(p):
+    if p[0] < 0.0:
+        raise ValueError("negative")
+    return p[0]
+
+
+def inverse(p):
+    return 1.0 / p[0] if p[0] != 0.0 else 1 / 0
+
+
+def driven(g, given):
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], -x[0] - 0.2 * x[1] - g(p) * x[0] ** 3 + math.cos(2 * t)
+
+    return survey.orbit(
+        f, **({"start": (0.0, 0.0)} | given), states=("x", "v"), parameters="a", period=math.pi
+    )
+
+
+def driven_linearly(g, given):
+    def A(t, p, out):
+        out[0, 1], out[1, 0], out[1, 1] = 1.0, -g(p) - 0.1 * math.cos(2 * t), -0.05
+
+    return survey.floquet(A, **({"period": math.pi} | given), parameters="a", states=("x", "v"))
+
+
+@pytest.mark.parametrize("made", [driven, driven_linearly])
+@pytest.mark.parametrize(
+    ("g", "given", "invalid"),
+    [
+        (lambda p: math.sqrt(p[0]), {}, [-1]),
+        (lambda p: p[0] ** 0.5, {}, [-1]),
+        (lambda p: math.log(p[0]), {}, [-1, 0]),
+        (lambda p: 1.0 / p[0], {}, [0]),
+        (lambda p: math.floor(math.sqrt(p[0])) + 0.3, {}, [-1]),
+        (inverse, {}, [0]),
+        (refuses, {}, [-1]),
+    ],
+)
+def test_a_function_that_is_undefined_at_some_points(made, g, given, invalid):
+    """The others have what they have alone, to the bit."""
+    a = [-1.0, 0.0, 1.0, 2.0]
+    ds = survey.evaluate(made(g, given), a=a)
+    assert status(ds) == [int(x in invalid) for x in a]
+    for x in set(a) - set(invalid):
+        alone = survey.evaluate(made(g, given), a=[x]).isel(a=0)
+        for name in ("multiplier_re", "multiplier_re_error", "multiplier_im", "verdict"):
+            assert np.array_equal(alone[name], ds[name].sel(a=x)), (x, name)
+    with pytest.raises(survey.errors.BadInput, match=r"no finite value|fails|while its operations"):
+        survey.evaluate(made(g, given), a=invalid[-1:])
+
+
+def root(p):
+    return math.sqrt(p[0])
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        driven(lambda p: p[0], {"start": lambda p: (root(p), 0.0)}),
+        driven_linearly(lambda p: p[0], {"period": lambda p: math.pi + 0.0 * root(p)}),
+        driven_linearly(lambda p: p[0], {"breaks": lambda p: [0.1 + root(p)]}),
+        driven(root, {"continuation": ("a", -1.0, 2.0)}),
+        survey.orbit(
+            lambda t, x, p, out: out.__setitem__(slice(None), [x[1], (p[1] - x[0] ** 2) * x[1] - x[0] * root(p)]),
+            states=("x", "v"), period=None, parameters=("a", "mu"), start=(2.0, 0.0, 6.3),
+        ),
+    ],
+)  # fmt: skip
+def test_a_start_a_period_or_breaks_that_are_undefined_at_some_points(scene):
+    others = {"mu": 0.5} if len(scene.own) > 1 else {}
+    ds = survey.evaluate(scene, a=[-1.0, -0.5, 1.0, 2.0], **others)
+    assert status(ds) == [1, 1, 0, 0]
+
+
+def test_coordinates_without_mass_are_invalid_where_they_have_none():
+    def M(t, p, out):
+        out[0, 0] = p[0]
+
+    def K(t, p, out):
+        out[0, 0] = 1.0 + 0.1 * math.cos(2 * t)
+
+    scene = survey.floquet(M=M, K=K, states=("x",), parameters="a", period=math.pi)
+    assert status(survey.evaluate(scene, a=[-1.0, 0.0, 1.0])) == [0, 1, 0]
+
+
+def test_a_large_map_of_a_function_that_is_undefined_on_a_part():
+    def A(t, p, out):
+        out[0, 1], out[1, 0] = 1.0, -math.sqrt(p[0]) - p[1] * math.cos(2 * t)
+
+    a, b = np.linspace(-1.0, 2.0, 90), np.linspace(0.1, 2.0, 80)
+    scene = survey.floquet(
+        A, period=math.pi, parameters=("a", "b"), states=("x", "v"), structure="symplectic"
+    )
+    ds = survey.evaluate(scene, a=a, b=b)
+    assert (ds.status == (ds.a < 0.0)).all()
+    mathieu = survey.hill(
+        lambda u, p: p[0] + p[1] * math.cos(2 * u), period=math.pi, parameters=("root", "b")
+    )
+    other = survey.evaluate(mathieu, root=np.sqrt(a[a >= 0.0]), b=b)
+    mine, theirs = (
+        np.array(x.attrs["flag_meanings"].split())[np.searchsorted(x.attrs["flag_values"], x)]
+        for x in (ds.verdict[a >= 0.0], other.verdict)
+    )
+    same = mine == theirs
+    assert same.mean() > 0.99
+    assert ((mine == "undecided") | (theirs == "undecided"))[~same].all()
+
+
+def test_boundaries_of_a_function_that_is_undefined_on_a_part():
+    def f(t, x, p, out):
+        out[0], out[1] = x[1], -0.2 * x[1] - x[0] - root(p) * x[0] ** 3 + 1.2 * math.cos(1.6 * t)
+
+    given = {"states": ("x", "v"), "period": 2 * math.pi / 1.6, "start": (0.0, 0.0)}
+    scene = survey.orbit(f, parameters="a", continuation=("a", -1.0, 2.0), **given)
+    all_of_it = survey.edge(scene, along="a", near=0.2)
+
+    def g(t, x, p, out):
+        out[0], out[1] = x[1], -0.2 * x[1] - x[0] - p[0] * x[0] ** 3 + 1.2 * math.cos(1.6 * t)
+
+    scene = survey.orbit(g, parameters="root", continuation=("root", 0.01, 2.0), **given)
+    parts = [
+        float(survey.edge(scene, along="root", near=x).edge[k]) for x, k in ((0.3, 0), (0.3, -1))
+    ]
+    assert all_of_it.edge.values == pytest.approx(np.square(parts), rel=1e-9)
+
+
 def test_bits_do_not_depend_on_the_block():
     mu = np.linspace(0.2, 1.4, 41)
     whole = survey.evaluate(van_der_pol(), mu=mu)
