@@ -87,13 +87,13 @@ def at_angles(results, good, back):
     nothing = np.broadcast_to(np.nan, results["status"].shape)
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), TURNING)):
         here = status == code
-        some, all_ = here.any(), here.all()
+        some, every = here.any(), here.all()
         for name, value, bar in zip(
             names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True
         ):
             for key, at in ((name, value), (f"{name}_error", bar)):
                 values = floats[..., at]
-                values = values if all_ else np.where(here, values, np.nan) if some else None
+                values = values if every else np.where(here, values, np.nan) if some else None
                 results[key] = nothing if values is None else back(values)
     return results
 
