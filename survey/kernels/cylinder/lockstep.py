@@ -154,18 +154,8 @@ def _begin(T, state):
 _low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
 
 
-@unroll
-def _vary(T, fixed, i):
-    """Series of f and g', and of the variations: u' = f u + z, z' = g' u; of lane i."""
-    p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
-    s, c = [T[SIN + n, i] for n in range(LOW + 1)], [T[COS + n, i] for n in range(LOW + 1)]
-    f, dg = [], []
-    for n in range(LOW + 1):
-        squares = _product(s, s, n)
-        double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
-        f.append(p12 * c[n] - p31 * s[n])
-        dg.append(-pd * double - p2 * s[n] - p3 * c[n])
-        T[F_ + n, i], T[DG + n, i] = f[n], dg[n]
+def vary(T, f, dg, i):
+    """Series of the variations of lane i, u' = f u + z, z' = g' u, from those of f and g'."""
     for first, u, z in ((U1, [1.0], [-f[0]]), (U2, [0.0], [1.0])):
         for n in range(LOW):
             r = 1.0 / (n + 1)
@@ -175,6 +165,21 @@ def _vary(T, fixed, i):
             z.append(gu * r)
         for n in range(LOW + 1):
             T[first + n, i], T[first + LOW + 1 + n, i] = u[n], z[n]
+
+
+@unroll
+def _vary(T, fixed, i):
+    """Series of f and g', and of the variations, of lane i."""
+    p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
+    s, c = [T[SIN + n, i] for n in range(LOW + 1)], [T[COS + n, i] for n in range(LOW + 1)]
+    f, dg = [], []
+    for n in range(LOW + 1):
+        squares = _product(s, s, n)
+        double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
+        f.append(p12 * c[n] - p31 * s[n])
+        dg.append(-pd * double - p2 * s[n] - p3 * c[n])
+        T[F_ + n, i], T[DG + n, i] = f[n], dg[n]
+    vary(T, f, dg, i)
 
 
 @inline

@@ -40,8 +40,6 @@ from survey.kernels.cylinder.lockstep import (
     TIME_LOW,
     TURN,
     TURNS,
-    U1,
-    U2,
     V,
     W,
     coefficients,
@@ -319,17 +317,8 @@ def _bound(p, N, phi, radius, row, points, over, known, out, found, width):
 
 @unroll
 def _vary(T, i):
-    """Series of the variations of lane i: u' = f u + z, z' = g' u; as in `lockstep`."""
-    f, dg = [T[F_ + n, i] for n in range(LOW + 1)], [T[DG + n, i] for n in range(LOW + 1)]
-    for first, u, z in ((U1, [1.0], [-f[0]]), (U2, [0.0], [1.0])):
-        for n in range(LOW):
-            r = 1.0 / (n + 1)
-            fu = sum((f[k] * u[n - k] for k in range(1, n + 1)), f[0] * u[n])
-            gu = sum((dg[k] * u[n - k] for k in range(1, n + 1)), dg[0] * u[n])
-            u.append((fu + z[n]) * r)
-            z.append(gu * r)
-        for n in range(LOW + 1):
-            T[first + n, i], T[first + LOW + 1 + n, i] = u[n], z[n]
+    """Series of the variations of lane i, from those of f and g' in T."""
+    lockstep.vary(T, *([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG)), i)
 
 
 @unroll
