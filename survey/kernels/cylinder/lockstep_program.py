@@ -232,6 +232,27 @@ def _decoded(p, operations):
     )
 
 
+@splice
+def _tables(p, of_angle):
+    """(operations, numbers, S, K, degree) of the lanes that run the program p: see `_decoded`,
+    `program.note`, `_extend` and `_degrees`.
+    """
+    slots = max(1, int(p[SLOTS]))
+    operations, degree = np.zeros((slots + 2, 3), np.int64), np.zeros(slots + 2, np.int64)
+    _decoded(p, operations)
+    _degrees(operations, of_angle, degree)
+    S = np.zeros((slots + 2) * SERIES * LANES)
+    return operations, np.zeros((2 * slots, LANES)), S, np.zeros_like(S), degree
+
+
+@splice
+def _ball_tables(p):
+    """(points, over, known, out, found), as `_bound` takes them."""
+    slots = max(1, int(p[SLOTS]))
+    points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
+    return points, over, np.zeros(slots, np.bool_), np.empty(4), np.empty((4, LANES))
+
+
 @kernel
 def _extend(operations, N, degree, S, K, n, first, last, width):
     """Fill S[i, n], order n of the values from `first` to `last` - 1, and K[i, n], n times as much,
@@ -421,16 +442,11 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
     work = np.zeros((lockstep.ROWS, LANES))
     T, state, before, fixed, found, fate = lockstep.split(work)
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
-    circle, slots = p[ON_CIRCLE] > 0.0, max(1, int(p[SLOTS]))
-    numbers, S = np.zeros((2 * slots, LANES)), np.zeros((slots + 2) * SERIES * LANES)
-    N, K, degree = numbers.ravel(), np.zeros_like(S), np.zeros(slots + 2, np.int64)
-    operations = np.zeros((slots + 2, 3), np.int64)
-    _decoded(p, operations)
-    width = min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
-    _degrees(operations, ORDER, degree)
+    circle = p[ON_CIRCLE] > 0.0
+    operations, numbers, S, K, degree = _tables(p, ORDER)
+    N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
-    points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
-    known, out, bounds = np.zeros(slots, np.bool_), np.empty(4), np.empty((4, LANES))
+    points, over, known, out, bounds = _ball_tables(p)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, free = np.int64(lead), True
     while True:
@@ -532,23 +548,18 @@ def _enter_far(
 def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, status):
     """As `lockstep_phi.abels`, of the rows of P that have the program `lead`."""
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
-    circle, slots = p[ON_CIRCLE] > 0.0, max(1, int(p[SLOTS]))
+    circle = p[ON_CIRCLE] > 0.0
     work = np.zeros((far.TABLE + 2 * far.STATE + far.STEP + far.FIXED, LANES))
     second = far.TABLE + far.STATE
     third = second + far.STATE
     fourth = third + far.STEP
     T, state, before = work[: far.TABLE], work[far.TABLE : second], work[second:third]
     step, fixed = work[third:fourth], work[fourth:]
-    numbers, S = np.zeros((2 * slots, LANES)), np.zeros((slots + 2) * SERIES * LANES)
-    N, K, degree = numbers.ravel(), np.zeros_like(S), np.zeros(slots + 2, np.int64)
-    operations = np.zeros((slots + 2, 3), np.int64)
-    _decoded(p, operations)
-    width = min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
-    _degrees(operations, 1, degree)
+    operations, numbers, S, K, degree = _tables(p, 1)
+    N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     forms = np.zeros((2 * far.ORDER, LANES))
     radius = np.ones(LANES)
-    points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
-    known, out, bounds = np.zeros(slots, np.bool_), np.empty(4), np.empty((4, LANES))
+    points, over, known, out, bounds = _ball_tables(p)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
     goal, block = np.zeros(LANES), np.zeros(5 * far.BLOCK)
     waiting, free, ended = np.int64(lead), True, np.zeros(LANES, dtype=np.bool_)
@@ -843,16 +854,11 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, floats,
     work, block = np.zeros((lockstep.ROWS, LANES)), np.zeros(8 * near.BLOCK)
     T, state, before, fixed, _found, fate = lockstep.split(work)
     p, tolerance = P[lead].copy(), min(tolerance, lockstep.COARSEST)
-    circle, slots = p[ON_CIRCLE] > 0.0, max(1, int(p[SLOTS]))
-    numbers, S = np.zeros((2 * slots, LANES)), np.zeros((slots + 2) * SERIES * LANES)
-    N, K, degree = numbers.ravel(), np.zeros_like(S), np.zeros(slots + 2, np.int64)
-    operations = np.zeros((slots + 2, 3), np.int64)
-    _decoded(p, operations)
-    width = min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
-    _degrees(operations, ORDER, degree)
+    circle = p[ON_CIRCLE] > 0.0
+    operations, numbers, S, K, degree = _tables(p, ORDER)
+    N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
-    points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
-    known, out, bounds = np.zeros(slots, np.bool_), np.empty(4), np.empty((4, LANES))
+    points, over, known, out, bounds = _ball_tables(p)
     row, sizes, column = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     doubt, goal, delay = np.full(LANES, -1), np.zeros(LANES), np.zeros(LANES)
     started, calm = np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)

@@ -93,8 +93,9 @@ def at_angles(results, good, back):
         ):
             for key, at in ((name, value), (f"{name}_error", bar)):
                 values = floats[..., at]
-                values = values if every else np.where(here, values, np.nan) if some else None
-                results[key] = nothing if values is None else back(values)
+                if some and not every:
+                    values = np.where(here, values, np.nan)
+                results[key] = back(values) if some else nothing
     return results
 
 

@@ -244,8 +244,8 @@ def met(results, rtol):
 def missed(results, rtol):
     """Where the answer misses the requested accuracy, or there is none."""
     floats, status = results[0], results[-1]
-    points = floats.reshape(-1, floats.shape[-1])
     out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
+    points = floats.reshape(-1, floats.shape[-1])
     for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
         wide = np.flatnonzero(~(points[:, bar] <= rtol))  # as a rule, few
         if wide.size:
