@@ -50,7 +50,7 @@ from survey.kernels.unroll import summed, unroll
 
 ORDER = 16
 VARIED = 4  # order of the integral of g / w^2
-# Rows of the series: f / w0 and g / w0^2, omega, q, r, and the integral of r.
+# Rows of the series: f / w0 and g / w0^2, or what they are made of; omega, q, r, and the integral of r.
 F_, G_, OMEGA = 0, ORDER, 2 * ORDER
 Q, R = OMEGA + ORDER + 1, OMEGA + 2 * ORDER + 1
 INTEGRAL = R + ORDER + 1
@@ -67,12 +67,16 @@ FAR = 2.0  # phi is the variable while w^2 is greater than this times the bound 
 SURE = 1e-3  # and while the error bound of w is smaller than this share of it
 BLOCK = 8
 _SHORT = 1.0 / 8.0  # as in `lockstep`
+# bits of numbers: those of the exponent, those of 1, and 15 / 16 of the latter
+_EXPONENT, _ONE, _ROOT_OF_1 = (
+    np.uint64(bits) for bits in (0x7FF0000000000000, 0x3FF0000000000000, 0x3BF1000000000000)
+)
 
 
 @unroll
 def _functions(T, fixed, i, s, c, inverse):
-    """Series of f / w0 and g / w0^2 from sin and cos of psi and 1 / w0; the first coefficients of
-    the others.
+    """The first two coefficients of f / w0 and of both harmonics of g / w0^2, from sin and cos of psi
+    and 1 / w0.
     """
     b12, b31, d, c23, s2, s3 = (fixed[row, i] for row in (B12, B31, D, C23, S2, S3))
     f = [(b12 * c - b31 * s) * inverse, -(b12 * s + b31 * c) * inverse]
@@ -80,40 +84,84 @@ def _functions(T, fixed, i, s, c, inverse):
     one = [(s2 * c - s3 * s) * square, -(s2 * s + s3 * c) * square]
     product, double = s * c, (c - s) * (c + s)  # sin 2 psi / 2 and cos 2 psi
     two = [-(d * product + c23 * double) * square, (4.0 * c23 * product - d * double) * square]
-    for n in range(2, ORDER):
-        share = 1.0 / (n * (n - 1))
-        f.append(-share * f[n - 2])
-        one.append(-share * one[n - 2])
-        two.append(-4.0 * share * two[n - 2])
-    for n in range(ORDER):
-        T[F_ + n, i], T[G_ + n, i] = f[n], one[n] + two[n]
-    T[OMEGA, i], T[R, i], T[INTEGRAL, i] = 1.0, 1.0, 1.0
+    for n in range(2):
+        T[F_ + n, i], T[G_ + n, i], T[G_ + 2 + n, i] = f[n], one[n], two[n]
 
 
-def _orders(first, last):
-    """What adds the coefficients `first` to `last` - 1 of q, and those one higher of omega and r,
-    of a lane.
-    """
+def _of_harmonics(T, i, first, last):
+    """The coefficients `first` to `last` - 1 of f / w0 and g / w0^2, from `_functions`."""
+    f, one, two = ([T[row, i], T[row + 1, i]] for row in (F_, G_, G_ + 2))
+    shares = {n: (-1.0) ** (n // 2) / math.factorial(n) for n in range(first, last)}
+    return {n: share * f[n % 2] for n, share in shares.items()}, {
+        n: share * one[n % 2] + share * 4.0 ** (n // 2) * two[n % 2] for n, share in shares.items()
+    }
+
+
+def given(T, i, first, last):
+    """Likewise, where they are in the rows F_ and G_ themselves."""
+    return tuple({n: T[row + n, i] for n in range(first, last)} for row in (F_, G_))
+
+
+def _orders(first, last, functions):
+    """What adds the coefficients `first` to `last` - 1 of q, and those one higher of omega, of a lane."""
 
     @unroll
     def expand(T, i):
-        omega, r = ([T[row + n, i] for n in range(first + 1)] for row in (OMEGA, R))
-        q = [T[Q + n, i] for n in range(first)]
+        f, g = functions(T, i, first, last)
+        omega, q = [T[OMEGA + n, i] for n in range(first + 1)], [T[Q + n, i] for n in range(first)]
         for n in range(first, last):
-            q.append(
-                T[G_ + n, i] - summed(omega[k] * q[n - k] for k in range(1, n + 1))
-                if n
-                else T[G_, i]
-            )
-            omega.append((T[F_ + n, i] + q[n]) * (1.0 / (n + 1)))
-            r.append(-summed(omega[k] * r[n + 1 - k] for k in range(1, n + 2)))
-            T[Q + n, i], T[OMEGA + n + 1, i], T[R + n + 1, i] = q[n], omega[n + 1], r[n + 1]
-            T[INTEGRAL + n + 1, i] = r[n + 1] * (1.0 / (n + 2))
+            # what is known last comes last: else each sum would wait for the one before
+            order = sorted(range(1, n + 1), key=lambda k: max(k, n - k))
+            q.append(g[n] - summed(omega[k] * q[n - k] for k in order) if n else g[n])
+            omega.append((f[n] + q[n]) * (1.0 / (n + 1)))
+            T[Q + n, i], T[OMEGA + n + 1, i] = q[n], omega[n + 1]
 
     return expand
 
 
-_low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
+def _inverses(first, last):
+    """What adds the coefficients `first` + 1 to `last` of r, and of its integral, of a lane."""
+
+    @unroll
+    def expand(T, i):
+        omega, r = (
+            [T[OMEGA + n, i] for n in range(last + 1)],
+            [T[R + n, i] for n in range(first + 1)],
+        )
+        for n in range(first, last):
+            r.append(-summed(omega[k] * r[n + 1 - k] for k in range(n + 1, 0, -1)))
+            T[R + n + 1, i], T[INTEGRAL + n + 1, i] = r[n + 1], r[n + 1] * (1.0 / (n + 2))
+
+    return expand
+
+
+def expansion(functions):
+    """What fills omega, q, r and its integral of all lanes, from what `functions` makes of F_ and G_.
+
+    In several loops, since one has more numbers than there are registers.
+    """
+    low, middle, high = (_orders(*ends, functions) for ends in ((0, 7), (7, 12), (12, ORDER)))
+    low_inverses, high_inverses = _inverses(0, 11), _inverses(11, ORDER)
+
+    @inline
+    def expand(T):
+        for i in range(LANES):
+            T[OMEGA, i], T[R, i], T[INTEGRAL, i] = 1.0, 1.0, 1.0
+        for i in range(LANES):
+            low(T, i)
+        for i in range(LANES):
+            middle(T, i)
+        for i in range(LANES):
+            high(T, i)
+        for i in range(LANES):
+            low_inverses(T, i)
+        for i in range(LANES):
+            high_inverses(T, i)
+
+    return expand
+
+
+_expand = expansion(_of_harmonics)
 
 
 @inline
@@ -131,12 +179,7 @@ def _series(T, state, fixed):
     for i in range(LANES):
         s, c = sine_cosine(state[AT, i])
         _functions(T, fixed, i, s, c, 1.0 / state[W, i])
-    for i in range(LANES):
-        _low_orders(T, i)
-    for i in range(LANES):
-        _middle_orders(T, i)
-    for i in range(LANES):
-        _high_orders(T, i)
+    _expand(T)
 
 
 def _coefficients(row, size):
@@ -181,6 +224,15 @@ def _contracted(q, r, h):
 
 
 @inline
+def _root(x):
+    """The 16th root of x > 0, to 1 %: the bits of a number are nearly its logarithm."""
+    bits = (np.float64(x).view(np.uint64) >> np.uint64(4)) + _ROOT_OF_1
+    power = np.uint64(bits & _EXPONENT).view(np.float64)
+    rest = np.uint64((bits & ~_EXPONENT) | _ONE).view(np.float64)
+    return power * (0.68632 + rest * (0.34316 * rest - 0.02948))
+
+
+@inline
 def _advance(T, state, before, step, fixed, tolerance):
     """One step of every lane; `before` keeps the state before it."""
     for k in range(STATE):
@@ -201,7 +253,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         size = max(max(last, third * guess * guess) * relative, last_r)
         size = max(size, max(max(previous, fourth * guess * guess) * relative, previous_r) * guess)
         size = size * max(1.0, _SHORT * guess) / tolerance
-        rate = max(math.sqrt(math.sqrt(math.sqrt(math.sqrt(size)))), max(least, 0.25))
+        rate = max(_root(size), max(least, 0.25))
         end = psi + 1.0 / rate
         h = end - psi
         v = w + w * _rise(omega, h)

@@ -544,6 +544,9 @@ def _enter_far(
     return waiting
 
 
+_expand = far.expansion(far.given)
+
+
 @kernel
 def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, status):
     """As `lockstep_phi.abels`, of the rows of P that have the program `lead`."""
@@ -592,14 +595,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, stat
         for n in range(far.ORDER):
             for i in range(LANES):
                 T[far.F_ + n, i], T[far.G_ + n, i] = forms[n, i], forms[far.ORDER + n, i]
-        for i in range(LANES):
-            T[far.OMEGA, i], T[far.R, i], T[far.INTEGRAL, i] = 1.0, 1.0, 1.0
-        for i in range(LANES):
-            far._low_orders(T, i)
-        for i in range(LANES):
-            far._middle_orders(T, i)
-        for i in range(LANES):
-            far._high_orders(T, i)
+        _expand(T)
         far._advance(T, state, before, step, fixed, tolerance)
         for i in range(LANES):
             x = state[far.AT, i] + state[far.TURNED, i] * TWO_PI
