@@ -1,18 +1,22 @@
 """Saddle connections on a map of two parameters: where an unstable branch of a saddle is a stable
 branch of a saddle.
 
-Three kinds are looked for: those on which w keeps its sign, over at most a turn; those with one
-turning point (a loop, or a way back to another saddle); and loops with two, one to either side of
-the saddle, which surround both equilibria beside it. There are no other loops: a closed curve
-that is not wound round the cylinder has two turning points, and does not meet its copies a turn
-away. Ways from one saddle to the other with more turning points are not looked for; no cycle is
-born in them.
+Four kinds are looked for: those on which w keeps its sign, over at most a turn; those with one
+turning point (a loop, or a way back to another saddle); loops with two, one to either side of
+the saddle, which surround both equilibria beside it; and ways from one saddle to the other with 2
+to `TURNINGS` turning points. There are no other loops: a closed curve that is not wound round the
+cylinder has two turning points, and does not meet its copies a turn away. For the same reason a
+branch that passes the copy of its saddle does not turn any more. So on a way with more turning
+points than one the branch of one saddle winds inward, between the saddle and its copy, round the
+other saddle and the equilibria beside it; in reversed time, if it is the stable one. Ways with more
+than `TURNINGS` are not looked for. They are many where damping is weak; no cycle is born in them.
 
 For each, a function of the parameters says by how much both branches miss each other: the
 difference of w where they pass the same equilibrium, or of their turning points. It is continuous,
 and beyond the angle that a branch does not reach it is continued by how far from it the branch
-turns. Its zeros are found as those of `survey.measures.contours`, and followed on from where the
-lattice loses them, as where folds and points of codimension two are near (`survey.measures.tips`).
+turns; not where a branch winds, there it ends at the curve with one turning point less. Its zeros
+are found as those of `survey.measures.contours`, and followed on from where the lattice loses them,
+as where folds and points of codimension two are near (`survey.measures.tips`).
 
 Saddles are told apart by their V; where two have the same the labels change, and a jump there is
 not a zero.
@@ -42,10 +46,13 @@ RIGHT, LEFT = (cn.ITSELF, cn.REVERSED), (cn.MIRRORED, cn.BOTH)
 
 @dataclass(frozen=True)
 class Connection:
-    """The branches (system, saddle) of a connection, and miss(rows of both) -> (value, error bound)."""
+    """The branches (system, saddle) of a connection, miss(rows of both) -> (value, error bound), and
+    behind how many turning points that needs each of them.
+    """
 
     branches: tuple
     miss: Callable
+    turnings: tuple = (1, 1)
 
     @property
     def kind(self):
@@ -62,6 +69,14 @@ def _every():
         )
     for sides, saddle in product((UPPER, LOWER), (HIGH, LOW)):
         yield Connection(((sides[0], saddle), (sides[1], saddle)), _returning)
+    for turnings in range(2, cn.TURNINGS + 1):
+        pairs = (RIGHT, LEFT) if turnings % 2 else (UPPER, LOWER)
+        for sides, one, winding in product(pairs, (HIGH, LOW), (0, 1)):
+            yield Connection(
+                ((sides[0], one), (sides[1], 1 - one)),
+                partial(_winding, turnings, winding),
+                tuple(turnings if k == winding else 1 for k in (0, 1)),
+            )
 
 
 def found(plane):
@@ -76,7 +91,9 @@ def curves(plane):
     """[(Connection, positions (m, 2), errors (m))] of the curves."""
     if plane.conservative:
         return  # every branch is part of a connection, see `separatrices`
-    everything = _traced(plane, contours.lattice(LINES, plane.square.across), np.ones((4, 2)))
+    everything = _traced(
+        plane, contours.lattice(LINES, plane.square.across), np.full((4, 2), float(cn.TURNINGS))
+    )
     for connection in _every():
         values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
         # on a line a sign may change beyond the last node before a fold
@@ -85,21 +102,25 @@ def curves(plane):
             function = partial(missed, plane, connection)
             halvings = contours.HALVINGS if alone else HALVINGS
             pieces = contours.lines(function, plane.square, LINES, values, halvings)
+            pieces = _continuous(function, pieces)
             if not alone:
-                pieces = tips.followed(function, _continuous(function, pieces), plane.square.grain)
-            for x, error in _continuous(function, pieces):
+                longer = tips.followed(function, pieces, plane.square.grain)
+                pieces = _continuous(function, longer, pieces)
+            for x, error in pieces:
                 yield connection, x, error
 
 
-def _continuous(function, pieces):
+def _continuous(function, pieces, known=()):
     """The pieces [(positions (m, 2), errors (m))] of curves without points where the function jumps
-    rather than vanishes.
+    rather than vanishes; it vanishes at those of the pieces that are `known`.
     """
-    return [
-        (x[part], error[part])
-        for x, error in pieces
-        for part in contours.runs(_smooth(function, x, error))
-    ]
+    zeros = {point.tobytes() for x, _error in known for point in x}
+    found = []
+    for x, error in pieces:
+        good = np.array([point.tobytes() in zeros for point in x])
+        good[~good] = _smooth(function, x[~good], error[~good])
+        found += [(x[part], error[part]) for part in contours.runs(good)]
+    return found
 
 
 def _traced(plane, x, wanted):
@@ -118,8 +139,8 @@ def missed(plane, connection, x):
     error bound.
     """
     wanted = np.zeros((4, 2))
-    for branch in connection.branches:
-        wanted[branch] = 1.0
+    for branch, turnings in zip(connection.branches, connection.turnings, strict=True):
+        wanted[branch] = turnings
     out = _traced(plane, x, wanted)
     return connection.miss(*(out[:, *branch] for branch in connection.branches))
 
@@ -194,6 +215,14 @@ def _returning(one, two):
     v, w = one[:, cn.BACK], two[:, cn.BACK]
     value = np.where((v < 0.0) & (w < 0.0), np.nan, v - w)
     return value, one[:, cn.BACK_BAR] + two[:, cn.BACK_BAR]
+
+
+def _winding(turnings, which, *rows):
+    """For two branches of which this one winds round the saddle of the other: |w| where it passes,
+    behind so many turning points, the equilibrium next to that saddle.
+    """
+    column, other = cn.WINDING + 2 * (turnings - 2), rows[1 - which]
+    return rows[which][:, column] - other[:, 0], rows[which][:, column + 1] + other[:, 1]
 
 
 def _turning(first_own, second_own, one, two):
