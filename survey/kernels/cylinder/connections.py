@@ -226,8 +226,9 @@ def like(p, q):
 
 
 @inline
-def connections(setting, begin, at, P, wanted, tolerance, out):
-    """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V.
+def connections(setting, begin, at, P, wanted, tolerance, cut, out):
+    """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V; for
+    the next one to the right of the angle `cut` and the other, if it is not NaN.
 
     Branches are followed behind so many turning points as are `wanted` (4, 2), 0 not at all. Rows
     are NaN where there are none, or an equilibrium is degenerate.
@@ -246,7 +247,10 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
         for k in range(count):
             if eqs[k, KIND] == SADDLE:
                 saddles += 1
-                own = height(P[i], eqs[k, ANGLE])
+                if math.isnan(cut):
+                    own = height(P[i], eqs[k, ANGLE])
+                else:
+                    own = -P[i, BOUND_G] * ((eqs[k, ANGLE] - cut) % TWO_PI)
                 if high < 0 or own - level > SAME * P[i, BOUND_G]:
                     high, level = k, own
         if hidden or count == 0 or 2 * saddles != count:

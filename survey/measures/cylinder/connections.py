@@ -18,18 +18,20 @@ turns; not where a branch winds, there it ends at the curve with one turning poi
 are found as those of `survey.measures.contours`, and followed on from where the lattice loses them,
 as where folds and points of codimension two are near (`survey.measures.tips`).
 
-Saddles are told apart by their V; where two have the same the labels change, and a jump there is
-not a zero.
+Saddles are told apart by their V, for loops, and by which one lies next to the right of an angle at
+which no saddle is on the map, if there is one, for ways from one to the other: with weak damping
+these lie where both have the same V. Where the labels change a jump is not a zero.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
 
 import numpy as np
 
 from survey.kernels.cylinder import connections as cn
+from survey.kernels.cylinder.flow import TWO_PI
 from survey.measures import contours, tips
 from survey.methods import taylor
 
@@ -38,7 +40,7 @@ TOLERANCE = 1e-17  # truncation of one step
 BESIDE = 1e-5  # of the map: a jump is as high there as next to the point
 # of the map, from a fold to where its equilibria are told apart; and their distance (rad) there
 STEPS, CLOSE = 1e-12 * 4.0 ** np.arange(12), 0.05
-HIGH, LOW = range(2)  # saddles, by V
+HIGH, LOW = range(2)  # saddles, by V, or the first and the second from an angle on
 # (unstable, stable): the systems in which both branches leave to the right
 UPPER, LOWER = (cn.ITSELF, cn.BOTH), (cn.MIRRORED, cn.REVERSED)
 RIGHT, LEFT = (cn.ITSELF, cn.REVERSED), (cn.MIRRORED, cn.BOTH)
@@ -47,12 +49,13 @@ RIGHT, LEFT = (cn.ITSELF, cn.REVERSED), (cn.MIRRORED, cn.BOTH)
 @dataclass(frozen=True)
 class Connection:
     """The branches (system, saddle) of a connection, miss(rows of both) -> (value, error bound), and
-    behind how many turning points that needs each of them.
+    behind how many turning points that needs each of them; the `cut` from which saddles are counted.
     """
 
     branches: tuple
     miss: Callable
     turnings: tuple = (1, 1)
+    cut: float = np.nan
 
     @property
     def kind(self):
@@ -82,7 +85,9 @@ def _every():
 def found(plane):
     """[(class, parameters (m, 2), errors (m), {name: (value, error)})] of the connections on the map."""
     for connection, x, error in curves(plane):
-        row = _traced(plane, x, np.zeros((4, 2)))[:, cn.ITSELF, connection.branches[0][1]]
+        row = _traced(plane, x, np.zeros((4, 2)), connection.cut)[
+            :, cn.ITSELF, connection.branches[0][1]
+        ]
         known = {"equilibrium_phi": (row[:, cn.FROM], row[:, cn.FROM_BAR])}
         yield connection.kind, plane.square.parameters(x), error, known
 
@@ -94,8 +99,13 @@ def curves(plane):
     everything = _traced(
         plane, contours.lattice(LINES, plane.square.across), np.full((4, 2), float(cn.TURNINGS))
     )
+    cut = _far_from_saddles(everything)
+    rows = {"homoclinic": everything, "heteroclinic": _counted_from(cut, everything)}
     for connection in _every():
-        values = connection.miss(*(everything[:, *branch] for branch in connection.branches))[0]
+        if connection.kind == "heteroclinic":
+            connection = replace(connection, cut=cut)
+        own = rows[connection.kind]
+        values = connection.miss(*(own[:, *branch] for branch in connection.branches))[0]
         # on a line a sign may change beyond the last node before a fold
         alone = plane.square.across is not None
         if alone or np.nanmin(values, initial=0.0) < 0.0 < np.nanmax(values, initial=0.0):
@@ -108,6 +118,23 @@ def curves(plane):
                 pieces = _continuous(function, longer, pieces)
             for x, error in pieces:
                 yield connection, x, error
+
+
+def _far_from_saddles(rows):
+    """The angle farthest from all saddles of flows that have two, or NaN."""
+    angles = rows[:, cn.ITSELF, :, cn.FROM]
+    angles = np.sort(angles[np.isfinite(angles).all(axis=1)].ravel())
+    if not angles.size:
+        return np.nan
+    gaps = np.diff(angles, append=angles[0] + TWO_PI)
+    widest = np.argmax(gaps)
+    return angles[widest] + 0.5 * gaps[widest]
+
+
+def _counted_from(cut, rows):
+    """The rows (m, 4, 2, ROW) with saddles in the order of their angles from the cut on, rather than of V."""
+    first, second = ((rows[:, cn.ITSELF, :, cn.FROM] - cut) % TWO_PI).T
+    return np.where((second < first)[:, None, None, None], rows[:, :, ::-1], rows)
 
 
 def _continuous(function, pieces, known=()):
@@ -123,13 +150,13 @@ def _continuous(function, pieces, known=()):
     return found
 
 
-def _traced(plane, x, wanted):
-    """The branches (m, 4, 2, ROW) of the systems at positions x (m, 2)."""
+def _traced(plane, x, wanted, cut=np.nan):
+    """The branches (m, 4, 2, ROW) of the systems at positions x (m, 2), saddles by V, or from the `cut` on."""
     out, P = np.full((len(x), 4, 2, cn.ROW), np.nan), plane.flows(x)
     good = np.flatnonzero(np.isfinite(P).all(axis=1))
     for some in np.array_split(good, 1 + len(good) // 1000):
         found = np.empty((len(some), 4, 2, cn.ROW))
-        taylor.flow_connections(np.ascontiguousarray(P[some]), wanted, TOLERANCE, found)
+        taylor.flow_connections(np.ascontiguousarray(P[some]), wanted, TOLERANCE, cut, found)
         out[some] = found
     return out
 
@@ -141,7 +168,7 @@ def missed(plane, connection, x):
     wanted = np.zeros((4, 2))
     for branch, turnings in zip(connection.branches, connection.turnings, strict=True):
         wanted[branch] = turnings
-    out = _traced(plane, x, wanted)
+    out = _traced(plane, x, wanted, connection.cut)
     return connection.miss(*(out[:, *branch] for branch in connection.branches))
 
 

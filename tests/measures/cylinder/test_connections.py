@@ -121,7 +121,7 @@ def wound(six, phi, columns, turnings):
 
 
 def miss(connection, x):
-    out = connections._traced(PLANE, x[None], np.ones((4, 2)))[0]
+    out = connections._traced(PLANE, x[None], np.ones((4, 2)), connection.cut)[0]
     s2, d = SQUARE.parameters(x)
     six = [mp.mpf(v) for v in (0.7, -0.4, float(d), 0.3, float(s2), -0.2)]
     rows = [
@@ -176,13 +176,6 @@ def equilibria(six):
     return np.array(found), signs[cells + 1]
 
 
-def level(six, phi):
-    """V, g = -V'."""
-    _b12, _b31, d, c23, s2, s3 = six
-    s, c = np.sin(phi), np.cos(phi)
-    return 0.5 * d * s * s + c23 * s * c - s2 * s - s3 * c
-
-
 def at_focus(own, system, saddle, turnings):
     """|w| where the branch that leaves a saddle, of `own` parameters, to the right in this system
     passes the equilibrium ahead next to the other saddle, behind so many turning points, by DOP853.
@@ -229,11 +222,12 @@ def test_a_branch_that_winds_reaches_the_other_saddle_by_scipy(monkeypatch):
                 s2, d = SQUARE.parameters(x[at] + side * (error[at] + 1e-10) * axis)
                 six = [0.7, -0.4, d, 0.3, s2, -0.2]
                 angles, saddles = equilibria(six)
-                high, low = sorted(angles[saddles], key=lambda phi: -level(six, phi))
+                own = angles[saddles]
+                own = own[np.argsort((own - connection.cut) % (2.0 * np.pi))]
                 sides.append(
                     np.subtract(
                         *(
-                            at_focus(six, system, (high, low)[saddle], turns if turns > 1 else 0)
+                            at_focus(six, system, own[saddle], turns if turns > 1 else 0)
                             for (system, saddle), turns in zip(
                                 connection.branches, connection.turnings, strict=True
                             )
@@ -261,6 +255,23 @@ def test_connections_explain_where_branches_go():
     assert (found.verdict == 1).all()
     assert changed.sum() == 5
     assert np.array_equal(changed, np.array(inside) > 0)
+
+
+def test_a_way_next_to_where_saddles_have_the_same_height_is_found():
+    """Both saddles have the same V between the same two points of the lattice, on one line; there
+    a change of labels hid the zero.
+    """
+    system = {"b12": 0.00685, "b31": -0.0975, "d": 0.89, "s2": 0.225, "s3": -0.573}
+    range_of = (-1.609, 3.391)
+    edges = survey.edge("gyrostat", question="portrait", along="c23", c23=range_of, **system).edge
+    near = edges.values[abs(edges.values - 0.39) < 0.03]
+    assert near.size == 1
+    sides = survey.evaluate(
+        "gyrostat", question="portrait", c23=near + np.array([-1e-7, 1e-7]), **system
+    )
+    assert (sides.verdict == 1).all()
+    one, two = sides.branch_end.values
+    assert (one != two).sum() == 1
 
 
 def test_a_cycle_is_born_in_a_homoclinic_connection():
