@@ -228,9 +228,9 @@ def flow_pieces(p, start, edges, falls, eqs, count, kind, cell, top, scale, tole
 
 
 @kernel
-def flow_connections(P, wanted, tolerance, out):
+def flow_connections(P, wanted, tolerance, cut, out):
     """See `connections.connections`."""
-    connections.connections(flow_setting, flow_begin, flow_at, P, wanted, tolerance, out)
+    connections.connections(flow_setting, flow_begin, flow_at, P, wanted, tolerance, cut, out)
 
 
 @kernel

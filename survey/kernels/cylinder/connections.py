@@ -1,5 +1,6 @@
-"""Branches of the saddles up to their first turning points, and from there back to the angle of
-their saddle: what shows whether one saddle is connected with another.
+"""Branches of the saddles up to their first turning points, from there back to the angle of their
+saddle, and those that wind round another saddle behind further turning points: what shows whether
+one saddle is connected with another.
 
 Each branch is followed as an unstable one that leaves to the right, w > 0, in one of four systems:
 the system itself; that of S1, (b, w, t) -> -(b, w, t), where branches are stable; that of S2, (phi,
@@ -50,11 +51,15 @@ ITSELF, REVERSED, MIRRORED, BOTH = range(4)
 # turn further; then the turning point, its bound, the number of those equilibria before it, the
 # angle of the saddle, its bound, their number, -w where a branch that turned behind one equilibrium
 # passes the angle of its saddle on its way back, or minus the distance by which it turns before,
-# its bound, and how far to the right of the saddle the equilibria are.
+# its bound, and how far to the right of the saddle the equilibria are; then |w| and its bound where
+# a branch that winds round the equilibria between the saddle and its copy next passes one, behind
+# each turning point from the second on.
 TURN, TURN_BAR, PASSED, FROM, FROM_BAR, COLUMNS, BACK, BACK_BAR, OFFSETS = range(
     2 * MOST, 2 * MOST + 9
 )
-ROW = OFFSETS + MOST
+WINDING = OFFSETS + MOST
+TURNINGS = 6  # turning points behind which a branch is followed at most
+ROW = WINDING + 2 * (TURNINGS - 1)
 LIMIT = 600  # steps
 # difference of V, in units of its own, up to which the first of two saddles counts as the higher
 SAME = 1e-12
@@ -63,8 +68,10 @@ NEAR = 1e-10  # velocities, in those of the system, at which a branch counts as 
 
 
 @inline
-def first_turn(setting, begin, at, p, start, tolerance, row):
-    """Fill w, TURN, PASSED and BACK of `row`, whose other columns are filled."""
+def first_turn(setting, begin, at, p, start, tolerance, turnings, row):
+    """Fill w, TURN, PASSED, BACK and, behind so many `turnings`, WINDING of `row`, whose other
+    columns are filled.
+    """
     T = table()
     how = setting(p, start[rc.START_W], tolerance)
     phi, w, n, k = start[rc.START_PHI], start[rc.START_W], 0, 0
@@ -97,6 +104,8 @@ def first_turn(setting, begin, at, p, start, tolerance, row):
             row[TURN], row[TURN_BAR], row[PASSED] = x1 - row[FROM], bar(n, saa) + 1e-15, k
             if k == 1 and row[COLUMNS] == 4.0:
                 way_back(setting, begin, at, p, x1, (n, saa, sab, sbb), tolerance, row)
+            if k == 3 and row[COLUMNS] == 4.0:
+                winding(setting, begin, at, p, x1, (n, saa, sab, sbb), tolerance, turnings, row)
             return
         if w < least:
             return
@@ -137,6 +146,50 @@ def way_back(setting, begin, at, p, phi, error, tolerance, row):
             return
 
 
+@inline
+def winding(setting, begin, at, p, phi, error, tolerance, turnings, row):
+    """Fill WINDING of `row`, from the first turning point phi on, which is behind the third of four
+    equilibria, until the branch turns without having passed all three, or leaves them; `error` as
+    in `way_back`.
+    """
+    T = table()
+    how = setting(p, 0.0, tolerance)
+    n, saa, sab, sbb = error
+    w, last, turned, met = 0.0, n + turnings * LIMIT, 1, False
+    least = NEAR * (p[BOUND_F] + math.sqrt(p[BOUND_DG]))
+    middle = row[FROM] + row[OFFSETS + 1]
+    while n < last and turned <= turnings:
+        right = turned % 2 == 0
+        sign = 1.0 if right else -1.0
+        next_one = row[FROM] + row[OFFSETS if right else OFFSETS + 2]
+        h = expand(begin, p, phi, w, how, T)
+        n += 1
+        h, x1, w1, turns = until_turning(at, p, T, h, sign)
+        if not (h > 0.0 and math.isfinite(w1)) or x1 <= row[FROM]:
+            return
+        if turned > 1 and not met and sign * (x1 - next_one) >= 0.0:
+            met = True
+            dt = passage(at, p, T, next_one, right, h)
+            x, v, _e, _y = at(p, T, dt)
+            aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
+            f, g, _dg = values(p, x)
+            slope = (f * v + g) / v
+            column = WINDING + 2 * (turned - 2)
+            row[column] = abs(v)
+            row[column + 1] = bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0))
+            row[column + 1] += abs(slope) * 4e-15
+            if turned == turnings:
+                return
+        saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
+        phi, w = x1, w1
+        if turns:
+            if sign * (phi - middle) < 0.0:
+                return
+            w, turned, met = 0.0, turned + 1, False
+        elif abs(w) < least:
+            return
+
+
 @kernel
 def changed(p, system, q):
     """Fill q with the coefficients of one of the four systems."""
@@ -173,11 +226,12 @@ def like(p, q):
 
 
 @inline
-def connections(setting, begin, at, P, wanted, tolerance, out):
-    """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V.
+def connections(setting, begin, at, P, wanted, tolerance, cut, out):
+    """Fill out (rows, 4, 2, ROW) for the four systems and the saddles of higher and of lower V; for
+    the next one to the right of the angle `cut` and the other, if it is not NaN.
 
-    Only branches that are `wanted` (4, 2) are followed. Rows are NaN where there are none, or an
-    equilibrium is degenerate.
+    Branches are followed behind so many turning points as are `wanted` (4, 2), 0 not at all. Rows
+    are NaN where there are none, or an equilibrium is degenerate.
     """
     eqs = np.zeros((MOST, EQUILIBRIUM_SIZE))
     turned = np.zeros((MOST, EQUILIBRIUM_SIZE))
@@ -193,7 +247,10 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
         for k in range(count):
             if eqs[k, KIND] == SADDLE:
                 saddles += 1
-                own = height(P[i], eqs[k, ANGLE])
+                if math.isnan(cut):
+                    own = height(P[i], eqs[k, ANGLE])
+                else:
+                    own = -P[i, BOUND_G] * ((eqs[k, ANGLE] - cut) % TWO_PI)
                 if high < 0 or own - level > SAME * P[i, BOUND_G]:
                     high, level = k, own
         if hidden or count == 0 or 2 * saddles != count:
@@ -221,4 +278,13 @@ def connections(setting, begin, at, P, wanted, tolerance, out):
                     # a start behind the next equilibrium would be taken for the passage of it
                     reach = min(FURTHEST, 0.5 * row[OFFSETS])
                     unstable(like(P[i], q), turned[k : k + 1], 1, starts, reach)
-                    first_turn(setting, begin, at, like(P[i], q), starts[1], tolerance, row)
+                    first_turn(
+                        setting,
+                        begin,
+                        at,
+                        like(P[i], q),
+                        starts[1],
+                        tolerance,
+                        wanted[system, label],
+                        row,
+                    )

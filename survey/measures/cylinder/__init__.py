@@ -103,7 +103,7 @@ METHODS = {
         ),
         "flow_connections": Function(
             "fill out (rows, 4, 2, ROW) with branches of the saddles, see `kernels.cylinder.connections.connections`",
-            ("P", "wanted", "tolerance", "out"),
+            ("P", "wanted", "tolerance", "cut", "out"),
         ),
         "flow_setting": Function(
             "what controls the steps of one solution", ("p", "w", "tolerance")
