@@ -172,7 +172,12 @@ class FloquetScene(TracedScene):
         return f"all multipliers are simple and on the unit circle, within their error bars: the system is {kind}"
 
     def _why_never(self, answer):
-        """What to state of a system whose multipliers have the product 1, so that none is stable without."""
+        """What to state of a system whose multipliers have the product 1, so that none is stable without,
+        or may meet on the unit circle.
+        """
+        if self.structure == "reversible" and self._met(answer):
+            words = "multipliers meet on the unit circle, where only Krein signs tell"
+            return f'; {words}: state "symplectic" if the system is Hamiltonian'
         if (
             self.structure != "none"
             or self.conserved is not None
@@ -223,6 +228,8 @@ class FloquetScene(TracedScene):
                 f"PERIOD is not a positive number at {self._where(points[0])}", "make it positive"
             )
         known = np.flatnonzero(np.isfinite(edges).all(axis=1))
+        if not known.size:
+            self._refuse(f"BREAKS has no finite value at {self._where(given[0])}", "correct it")
         groups = self._called(system.traced, given[known], edges[known])
         followed = np.concatenate([[], *(own for own, _ in groups)]).astype(int)
         rough = np.setdiff1d(np.arange(known.size), followed)
@@ -263,8 +270,12 @@ class FloquetScene(TracedScene):
 
     def _refuse_undefined(self, given, edges, known):
         """Refuse A, which has no finite value at the points `given`, of which `known` have edges."""
-        if known.size:
-            self._called(self._system.recorded, given[known[0]], edges[known[0]])
+        first, here = known[0], self._where(given[known[0]])
+        try:
+            self._called(self._system.recorded, given[first], edges[first])
+        except BadInput as error:
+            what, _, remedy = str(error).partition("; ")
+            raise BadInput(f"{what} at {here}; {remedy}") from None
         self._refuse(
             f"A has no finite value at {self._where(given[0])}",
             "correct it, or the domains of PARAMETERS",

@@ -506,9 +506,15 @@ def skewed(t, x, p, out):
     out[0, 1], out[1, 0] = 1.0, 1.0
 
 
+def right_at_rest(t, x, p, out):
+    out[0, 1], out[1, 0], out[1, 1] = 1.0, -1.0 - 0.1 * x[0], -p[0]
+
+
 @pytest.mark.parametrize(
     "changes, words",
     [
+        ({"start": (1j, 0.0)}, "start must be 2 numbers"),
+        ({"start": (0.0, 0.0), "jacobian": right_at_rest}, "is not df/dx"),
         ({"f": lambda t, x, p: 0}, "four arguments"),
         ({"f": branches}, "a branch depends on t or on a state"),
         ({"f": short}, "indexes beyond an array"),
