@@ -175,7 +175,7 @@ class FloquetScene(TracedScene):
         """What to state of a system whose multipliers have the product 1, so that none is stable without,
         or may meet on the unit circle.
         """
-        if self.structure == "reversible" and self._met(answer):
+        if self.structure == "reversible" and self._met(answer, upper=True):
             words = "multipliers meet on the unit circle, where only Krein signs tell"
             return f'; {words}: state "symplectic" if the system is Hamiltonian'
         if (
@@ -191,12 +191,14 @@ class FloquetScene(TracedScene):
             return ""
         return '; their product is 1: state the structure if the system is Hamiltonian ("symplectic") or "reversible"'
 
-    def _met(self, answer):
-        """Do the error bars of two multipliers meet?"""
+    def _met(self, answer, upper=False):
+        """Do the error bars of two multipliers meet, or of two in the upper half-plane?"""
         if "multiplier_re_error" not in answer:
             return False
         value = np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"])
         bar = np.asarray(answer["multiplier_re_error"])
+        if upper:
+            value, bar = value[value.imag > bar], bar[value.imag > bar]
         one = np.eye(value.size, dtype=bool)
         return bool((~one & (abs(value[:, None] - value) <= bar[:, None] + bar)).any())
 

@@ -339,6 +339,20 @@ def test_a_file_without_its_names_is_one_line(tmp_path):
             survey.evaluate(str(path), delta=1.0, epsilon=0.3, zeta=0.1)
 
 
+def test_equal_reversible_oscillators_are_told_what_decides():
+    def equal(t, p, out):
+        out[0, 0] = out[1, 1] = p[0] + p[1] * math.cos(2 * t)
+
+    given = {"K": equal, "period": math.pi, "parameters": ("a", "q"), "states": ("x", "y")}
+    ds = survey.evaluate(survey.floquet(structure="reversible", **given), a=1.7, q=0.3)
+    assert int(ds.verdict) == -1
+    assert 'state "symplectic" if the system is Hamiltonian' in ds.survey.point().why
+    assert (
+        int(survey.evaluate(survey.floquet(structure="symplectic", **given), a=1.7, q=0.3).verdict)
+        == 1
+    )
+
+
 def test_reversible_systems_of_one_coordinate_are_stable_on_the_circle():
     ds = survey.evaluate(
         survey.floquet(K=K, period=math.pi, parameters=("delta", "epsilon"), states="x", structure="reversible"),
