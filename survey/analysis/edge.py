@@ -53,9 +53,10 @@ def edge(
     -------
     xarray.Dataset along the dimension `place`, ascending: `edge` (in the unit of the parameter), `edge_error`, a bound,
     `edge_class`, and `edge_index` where boundaries have numbers (of tongues). The attribute `searched` is the range
-    (low, high) that was searched; `complete` is 1 where it is shown that there are no others in it, 0 where not, and
-    absent where this is not known. A closed gap is two boundaries at one place; where a motion is marginal at a single
-    value between two sides of the same verdict, such as `rho` = 0 of an oblate satellite's librations, there is none.
+    (low, high) that was searched, parts included where parameters are invalid; `complete` is 1 where it is shown that
+    there are no others in it, 0 where not, and absent where this is not known. A closed gap is two boundaries at one
+    place; where a motion is marginal at a single value between two sides of the same verdict, such as `rho` = 0 of an
+    oblate satellite's librations, there is none.
 
     Raises
     ------

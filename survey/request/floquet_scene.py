@@ -172,7 +172,12 @@ class FloquetScene(TracedScene):
         return f"all multipliers are simple and on the unit circle, within their error bars: the system is {kind}"
 
     def _why_never(self, answer):
-        """What to state of a system whose multipliers have the product 1, so that none is stable without."""
+        """What to state of a system whose multipliers have the product 1, so that none is stable without,
+        or may meet on the unit circle.
+        """
+        if self.structure == "reversible" and self._met(answer, upper=True):
+            words = "multipliers meet on the unit circle, where only Krein signs tell"
+            return f'; {words}: state "symplectic" if the system is Hamiltonian'
         if (
             self.structure != "none"
             or self.conserved is not None
@@ -186,12 +191,14 @@ class FloquetScene(TracedScene):
             return ""
         return '; their product is 1: state the structure if the system is Hamiltonian ("symplectic") or "reversible"'
 
-    def _met(self, answer):
-        """Do the error bars of two multipliers meet?"""
+    def _met(self, answer, upper=False):
+        """Do the error bars of two multipliers meet, or of two in the upper half-plane?"""
         if "multiplier_re_error" not in answer:
             return False
         value = np.asarray(answer["multiplier_re"]) + 1j * np.asarray(answer["multiplier_im"])
         bar = np.asarray(answer["multiplier_re_error"])
+        if upper:
+            value, bar = value[value.imag > bar], bar[value.imag > bar]
         one = np.eye(value.size, dtype=bool)
         return bool((~one & (abs(value[:, None] - value) <= bar[:, None] + bar)).any())
 
@@ -223,6 +230,8 @@ class FloquetScene(TracedScene):
                 f"PERIOD is not a positive number at {self._where(points[0])}", "make it positive"
             )
         known = np.flatnonzero(np.isfinite(edges).all(axis=1))
+        if not known.size:
+            self._refuse(f"BREAKS has no finite value at {self._where(given[0])}", "correct it")
         groups = self._called(system.traced, given[known], edges[known])
         followed = np.concatenate([[], *(own for own, _ in groups)]).astype(int)
         rough = np.setdiff1d(np.arange(known.size), followed)
@@ -263,8 +272,12 @@ class FloquetScene(TracedScene):
 
     def _refuse_undefined(self, given, edges, known):
         """Refuse A, which has no finite value at the points `given`, of which `known` have edges."""
-        if known.size:
-            self._called(self._system.recorded, given[known[0]], edges[known[0]])
+        first, here = known[0], self._where(given[known[0]])
+        try:
+            self._called(self._system.recorded, given[first], edges[first])
+        except BadInput as error:
+            what, _, remedy = str(error).partition("; ")
+            raise BadInput(f"{what} at {here}; {remedy}") from None
         self._refuse(
             f"A has no finite value at {self._where(given[0])}",
             "correct it, or the domains of PARAMETERS",

@@ -91,7 +91,7 @@ import stat
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import product, zip_longest
 from pathlib import Path
 from types import CodeType, ModuleType
@@ -332,9 +332,10 @@ def orbit(
 ) -> OrbitScene:
     """The scene of the periodic orbits of x' = f(t, x, p), for `survey.evaluate` and `survey.run`.
 
-    Outputs are the state `x0` at t = 0, the period, and those of `survey.floquet` for motions next
-    to the orbit. Every orbit is shown to exist within its error bars; `status` is no_orbit where
-    that fails. Where f does not depend on t, x0 is in the plane through the start that f is normal
+    Outputs are the state `x0` at t = 0, the period (the least one, where it is not given), and
+    those of `survey.floquet` for motions next to the orbit. Every orbit is shown to exist within its
+    error bars; `status` is no_orbit where that fails. Where f does not depend on t, x0 is in the
+    plane through the start that f is normal
     to there, or, where no orbit is found from it, through the state that the motion has 32 periods
     later, and the multipliers do not include the +1 that every orbit has then. Where there are
     several orbits, the start decides.
@@ -813,7 +814,7 @@ def _orbit(
     needed = len(names) + (period is None)
     if not callable(start):
         try:
-            start = tuple(float(x) for x in np.atleast_1d(start))
+            start = tuple(float(x) for x in np.atleast_1d(start).tolist())
         except (TypeError, ValueError):
             start = ()
         if len(start) != needed or not np.isfinite(start).all():
@@ -975,12 +976,12 @@ def _checked_breaks(breaks: Any, period: Any, time: str, refuse: Callable[[str],
         _of_parameters(key, function, refuse)
     if callable(breaks):
         return breaks
-    try:
-        breaks = tuple(float(u) for u in np.atleast_1d(breaks))
-    except (TypeError, ValueError):
+    given = np.atleast_1d(np.asarray(breaks, dtype=object)).tolist()
+    if not all(is_number(u) for u in given):
         refuse(
             f"BREAKS = {breaks!r}: it must be number(s) in [0, PERIOD], or a function of p that returns them"
         )
+    breaks = tuple(float(u) for u in given)
     outside = [
         b for b in breaks if not 0 <= b <= (np.inf if callable(period) else period * (1 + SAME))
     ]
@@ -1068,8 +1069,11 @@ def _bits(value: Any, seen: tuple[int, ...] = ()) -> bytes:
         if code is not value:
             names = [value.__globals__.get(name) for name in _names(code)]
             cells = [cell.cell_contents for cell in value.__closure__ or ()]
-            parts += [_bits([*names, *cells, *(value.__defaults__ or ())], seen)]
+            own = getattr(getattr(value, "__self__", None), "__dict__", {})  # of a method
+            parts += [_bits([*names, *cells, *(value.__defaults__ or ()), *own.items()], seen)]
         return b"<" + b";".join(parts) + b">"
     if isinstance(value, np.ndarray):
         return value.tobytes()
+    if isinstance(value, partial):
+        return _bits([value.func, value.args, *value.keywords.items()], seen)
     return (value.__name__ if inspect.ismodule(value) else repr(value)).encode()

@@ -2,6 +2,7 @@
 one line.
 """
 
+import functools
 import math
 
 import numba
@@ -232,6 +233,7 @@ def wrong(t, p, out):
         ({"structure": "hamiltonian"}, "must be one of 'none', 'symplectic', 'reversible'"),
         ({"period": 0.0}, "it must be a positive number"),
         ({"breaks": 9.0}, "lies outside"),
+        ({"breaks": "1"}, r"breaks = '1': it must be number\(s\)"),
         ({"parameters": ("spectral_radius",)}, "neither an output"),
         ({"parameters": ("row",)}, "neither an output"),
     ],
@@ -262,6 +264,44 @@ def endless(t, p, out):
     out[0, 0] = math.log(-p[0])
 
 
+def massless(t, p, out):
+    out[0, 0] = p[1] - 0.3
+
+
+class Modulated:
+    """A system whose functions are methods, and need what the object knows."""
+
+    def __init__(self, strength):
+        self.strength = strength
+
+    def K(self, t, p, out):
+        out[0, 0] = p[0] + self.strength * math.cos(2 * t)
+
+    def helped(self, t, p, out):
+        self.K(t, p, out)
+
+
+def modulated(strength, t, p, out):
+    out[0, 0] = p[0] + strength * math.cos(2 * t)
+
+
+def test_methods_and_partial_functions_are_functions():
+    def ours(K):
+        return survey.floquet(K=K, period=math.pi, parameters="delta", states="x")
+
+    expected = survey.evaluate("mathieu", a=1.5, q=-0.2)  # delta + 0.4 cos 2 t
+    for make in (lambda s: Modulated(s).K, lambda s: functools.partial(modulated, s)):
+        found = survey.evaluate(ours(make(0.4)), delta=1.5)
+        trace = float(found.multiplier_re.sum())
+        bar = float(found.multiplier_re_error.sum() + expected.discriminant_error)
+        assert abs(trace - float(expected.discriminant)) <= bar
+        assert ours(make(0.4)).HASH == ours(make(0.4)).HASH != ours(make(0.5)).HASH
+    with pytest.raises(
+        BadInput, match="math in a method that another one calls, where numpy serves"
+    ):
+        survey.evaluate(ours(Modulated(0.4).helped), delta=1.5)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -278,6 +318,11 @@ def endless(t, p, out):
         ({"period": lambda p: 1 / 0}, r"period\(p\) fails \(ZeroDivisionError"),
         ({"structure": "symplectic"}, "J A is not symmetric"),
         ({"structure": "reversible"}, "no signs R"),
+        ({"breaks": lambda p: None}, "breaks has no finite value at delta = 1"),
+        (
+            {"M": massless},
+            r"M\(t, p, out\) is singular at delta = 1, epsilon = 0.3, zeta = 0.1; give every",
+        ),
     ],
 )
 def test_wrong_functions_are_one_line(given, words):
@@ -292,6 +337,20 @@ def test_a_file_without_its_names_is_one_line(tmp_path):
         path.write_text("\n".join(line for line in SCENE.splitlines() if not line.startswith(name)))
         with pytest.raises(BadInput, match=f"{name} is missing; write {name} ="):
             survey.evaluate(str(path), delta=1.0, epsilon=0.3, zeta=0.1)
+
+
+def test_equal_reversible_oscillators_are_told_what_decides():
+    def equal(t, p, out):
+        out[0, 0] = out[1, 1] = p[0] + p[1] * math.cos(2 * t)
+
+    given = {"K": equal, "period": math.pi, "parameters": ("a", "q"), "states": ("x", "y")}
+    ds = survey.evaluate(survey.floquet(structure="reversible", **given), a=1.7, q=0.3)
+    assert int(ds.verdict) == -1
+    assert 'state "symplectic" if the system is Hamiltonian' in ds.survey.point().why
+    assert (
+        int(survey.evaluate(survey.floquet(structure="symplectic", **given), a=1.7, q=0.3).verdict)
+        == 1
+    )
 
 
 def test_reversible_systems_of_one_coordinate_are_stable_on_the_circle():

@@ -156,6 +156,13 @@ class CriticalPoints:
             values[:, -1] = 0.0
         return rows, values
 
+    def _with_conditions(self, y, rows, values):
+        """These rows and values after those of the conditions about y."""
+        own_rows, own_values = self.conditions(y)
+        return np.concatenate([own_rows, rows], axis=1), np.concatenate(
+            [own_values, values], axis=1
+        )
+
     def held(self, y, coordinate):
         """The row that holds this coordinate (N) where it is, and its value."""
         row = np.zeros((len(y), 1, y.shape[1]))
@@ -164,16 +171,12 @@ class CriticalPoints:
 
     def solved(self, y, rows, values):
         """Newton's method from y, under these conditions too: (y, which are found)."""
-        own_rows, own_values = self.conditions(y)
-        rows, values = (
-            np.concatenate([own_rows, rows], axis=1),
-            np.concatenate([own_values, values], axis=1),
-        )
-        y, good, _slope, _size = self.newton(y, rows, values)
-        # to rounding
+        y, good, _slope, _size = self.newton(y, *self._with_conditions(y, rows, values))
+        # to rounding, under the conditions about what is found, as `shown` has them
         near = np.flatnonzero(good)
+        both = self._with_conditions(y[near], rows[near], values[near])
         how = {"reach": self.reach, "tolerance": ROUNDOFF}
-        fine, found, _slope, _size = self.newton(y[near], rows[near], values[near], how, CONVERGED)
+        fine, found, _slope, _size = self.newton(y[near], *both, how, CONVERGED)
         y[near], good[near] = fine, found
         return y, good
 
@@ -211,11 +214,7 @@ class CriticalPoints:
         N, size = y.shape
         out = ShownCritical(np.zeros(N, bool), np.full((N, size), np.inf), *np.full((2, N, n, n), np.nan),
                     *np.full((2, N, n), np.nan))  # fmt: skip
-        own_rows, own_values = self.conditions(y)
-        rows, values = (
-            np.concatenate([own_rows, rows], axis=1),
-            np.concatenate([own_values, values], axis=1),
-        )
+        rows, values = self._with_conditions(y, rows, values)
         points = self.parameters(y)
         for some, programs in self.critical.traced(points, y):
             for i in range(0, some.size, CHUNK):

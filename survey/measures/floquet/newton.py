@@ -20,6 +20,8 @@ FARTHEST = 0.2  # a step of it, relative to the orbit and the period
 ACROSS = 0.1  # how fast the plane is passed, relative to the start: equilibria are no orbits
 # periods; the time in which an orbit comes back; how near, relative to it
 RELAXED, RETURN, NEAR = 32.0, 3.0, 0.2
+# by what a period that is found may be a multiple of the least; how near the state is then, relative
+MULTIPLES, CLOSED = (2, 3, 5), 1e-7
 
 
 def chosen(numbers, those):
@@ -47,6 +49,7 @@ def located(equation, points, reach, x, T, relax=True):
 
     With `relax`, those that are not found are looked for again from the state after a long time,
     unless these orbits are symmetric, as those of conservative systems, which attract nothing.
+    Periods that are unknown are the least ones: an orbit passed twice is no other orbit.
     """
     found = LocatedOrbits(
         *(np.full(np.shape(a), np.nan) for a in (x, T, x, x, x)), np.zeros(len(x), int)
@@ -63,9 +66,10 @@ def located(equation, points, reach, x, T, relax=True):
             those = np.sort(
                 np.concatenate([those, orbits.restarted(np.setdiff1d(np.arange(own.size), those))])
             )
-        found.x[own], found.T[own], found.guess[own] = orbits.x, orbits.T, orbits.guess
         if equation.free:
+            orbits.shorten(those)
             found.phase[own] = orbits.phase
+        found.x[own], found.T[own], found.guess[own] = orbits.x, orbits.T, orbits.guess
         numbers = chosen(orbits.numbers, those)
         span = equation.share * orbits.T[those]
         X, _M, size, steps = programs.flow(numbers, orbits.x[those], span, reach, derived=False)
@@ -110,6 +114,22 @@ class Newton:
         for name in ("x", "T", "guess", *(("phase",) if free else ())):
             getattr(self, name)[to[found]] = getattr(other, name)[found]
         return to[found]
+
+    def shorten(self, those):
+        """Make the periods of the orbits at these points the least ones."""
+        symmetry = self.equation.symmetry
+        ends = slice(None) if symmetry is None else symmetry.ends
+        for factor in MULTIPLES:
+            left = those
+            while left.size:
+                numbers, x, T = chosen(self.numbers, left), self.x[left], self.T[left]
+                span = self.equation.share * T / factor
+                X = self.programs.flow(numbers, x, span, self.reach, derived=False)[0]
+                off = (X - x if symmetry is None else X)[:, ends]
+                f = self.programs.slopes(numbers, np.zeros(left.size), x)[0]
+                # a small orbit far from 0 is small beside its states, but not beside its path
+                left = left[abs(off).max(axis=1) <= CLOSED * T * abs(f).max(axis=1)]
+                self.T[left] /= factor
 
     def _return(self, numbers, x, T):
         """When the motions from x (N, n) first come back near x, from behind; NaN: not in RETURN T."""

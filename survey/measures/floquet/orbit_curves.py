@@ -90,6 +90,9 @@ class _Map:
         self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
         self._numbers = None  # of orbits along a line, by the continuation
+        self._missed = (
+            False  # has a multiplier passed 1 or -1 on a line where no orbit is found to have it?
+        )
         self.kinds = [
             Criticality(kind)
             for kind in KINDS
@@ -172,9 +175,13 @@ class _Map:
             yield x, T if self.equation.free else self.equation.periods(points)
 
     def lacks(self, found):
-        """Does the number of orbits along a line change by what no fold in `found` explains?"""
-        if self._numbers is None or len(self.varied) > 1:
+        """Along a line by itself: is a multiplier known to pass 1 or -1 where none is `found`, or does the
+        number of orbits change by what no fold in it explains?
+        """
+        if len(self.varied) > 1:
             return False
+        if self._numbers is None:
+            return self._missed
         folds = [
             (PLUS_ONE, at)
             for kind, parameters, *_rest in found
@@ -183,7 +190,7 @@ class _Map:
         ]
         ticks = np.linspace(0.0, 1.0, len(self._numbers))
         explained = along(self._numbers, ticks, folds, {PLUS_ONE: 2}, optional=(PLUS_ONE,))
-        return not all(explained.values())
+        return self._missed or not all(explained.values())
 
     def _of_curve(self, curves, row, y, axis):
         """The same of one curve of orbits."""
@@ -205,11 +212,19 @@ class _Map:
                 continue
             near = orbits(y[at] + share * (y[at + 1] - y[at]))
             own = self._mirrored(*near)
+            passed = 0
             for how in self.kinds:
                 some = own if how.mirror else ~own
                 if how.kind == kind and some.any():
                     start = self._near(how, *(one[some] for one in near))
-                    yield how, self._located(how, start, 1 - axis)
+                    located = self._located(how, start, 1 - axis)
+                    passed += len(located)
+                    yield how, located
+            if kind != NEIMARK_SACKER:  # real multipliers may have the product 1 too
+                ends = np.stack([orbits(y[k])[0][:, self.varied] for k in (at, at + 1)])
+                here = self.positions(ends.reshape(2 * at.size, -1))[:, axis].reshape(2, -1)
+                inside = (here.min(axis=0) > 0.0) & (here.max(axis=0) < 1.0)
+                self._missed |= passed < inside.sum()
 
     def _mirrored(self, points, x, T):
         """Which orbits are their own mirror images, nearly."""

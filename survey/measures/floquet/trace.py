@@ -19,8 +19,8 @@ rounding error.
 import builtins
 import math
 import operator
-from functools import cached_property
-from types import CellType, CodeType, FunctionType, ModuleType
+from functools import cached_property, partial
+from types import CellType, CodeType, FunctionType, MethodType, ModuleType
 
 import numpy as np
 
@@ -246,7 +246,8 @@ class Symbol:
 
     def __float__(self):
         raise Unsupported(
-            "it needs the value of t or of a parameter (float, int, or an array without dtype=object)"
+            "it needs the value of t or of a parameter (float, int, an array without dtype=object, or math "
+            "in a method that another one calls, where numpy serves)"
         )
 
     __int__ = __index__ = __complex__ = __float__
@@ -889,6 +890,12 @@ def lifted(value, seen=None):
         return _Math()
     if isinstance(value, FunctionType):
         return _lifted_function(value, seen)
+    if isinstance(value, MethodType):
+        return MethodType(lifted(value.__func__, seen), value.__self__)
+    if isinstance(value, partial):
+        return partial(lifted(value.func, seen), *value.args, **value.keywords)
+    if isinstance(vars(type(value)).get("__call__"), FunctionType):  # an object that is called
+        return lifted(value.__call__, seen)
     name = getattr(value, "__name__", "")
     if callable(value) and value is getattr(math, name, None):
         return _Call(name)

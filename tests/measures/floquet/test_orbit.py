@@ -221,6 +221,43 @@ def test_limit_cycle_in_closed_form():
     assert (ds.period_error < 1e-12).all()
 
 
+@pytest.mark.parametrize("times", [2.02, 2.98, 4.03, 5.01, 6.02])
+def test_the_period_is_the_least_one(times):
+    """From guesses of multiples, which Newton's method converges to; the multiplier is that of one period."""
+    a, w = 0.05, 1.3
+    given = {"states": ("x", "y", "z"), "period": None, "parameters": ("a", "w")}
+    start = (1.02, 0.0, 0.6, times * 2 * math.pi / w)
+    ds = survey.evaluate(survey.orbit(circle, start=start, **given), a=a, w=w)
+    T = 2 * mpmath.pi / mpmath.mpf(w)
+    assert contained(ds.period, [T], ds.period_error)
+    assert contained(
+        ds.multiplier_re[0], [mpmath.exp(-2 * mpmath.mpf(a) * T)], ds.multiplier_re_error[0]
+    )
+
+
+def test_an_orbit_passed_twice_is_counted_once():
+    """Two circles of radii 1 and sqrt(a): Newton's method meets one of them with twice its period."""
+
+    def circles(t, x, p, out):
+        square = x[0] ** 2 + x[1] ** 2
+        rate, speed = -0.2 * (square - 1) * (square - p[0]), 1 + p[1] * square
+        out[:] = rate * x[0] - speed * x[1], rate * x[1] + speed * x[0]
+
+    scene = survey.orbit(
+        circles, states=("x", "y"), period=None, parameters=("a", "b"), start=(1.5, 0.0, 6.3),
+        continuation=("a", 0.1, 3.0),
+    )  # fmt: skip
+    a, b = 0.6, 0.3643
+    ds = survey.evaluate(scene, a=a, b=b, branch=[1, 2])
+    assert ds.orbits.values.tolist() == [2, 2]
+    assert contained(
+        ds.period,
+        [2 * mpmath.pi / (1 + mpmath.mpf(b) * r) for r in (mpmath.mpf(a), 1)],
+        ds.period_error,
+    )
+    assert ds.verdict.values.tolist() == [0, 1]
+
+
 def test_the_zero_solution_of_a_linear_system():
     """Its multipliers are those that `survey.floquet` gives."""
 
@@ -469,9 +506,15 @@ def skewed(t, x, p, out):
     out[0, 1], out[1, 0] = 1.0, 1.0
 
 
+def right_at_rest(t, x, p, out):
+    out[0, 1], out[1, 0], out[1, 1] = 1.0, -1.0 - 0.1 * x[0], -p[0]
+
+
 @pytest.mark.parametrize(
     "changes, words",
     [
+        ({"start": (1j, 0.0)}, "start must be 2 numbers"),
+        ({"start": (0.0, 0.0), "jacobian": right_at_rest}, "is not df/dx"),
         ({"f": lambda t, x, p: 0}, "four arguments"),
         ({"f": branches}, "a branch depends on t or on a state"),
         ({"f": short}, "indexes beyond an array"),

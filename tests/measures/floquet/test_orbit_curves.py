@@ -78,6 +78,23 @@ def test_a_fold_of_limit_cycles_in_closed_form():
     assert (ds.curve_angle.values[fold] == 0).all() and (ds.curve_outside.values[fold] == 0).all()
 
 
+@pytest.mark.parametrize("eps, a", [(0.897, 3.718), (0.711, 3.805), (0.564, 2.929)])
+def test_folds_of_limit_cycles_that_are_no_circles(eps, a):
+    """On one side of a fold there are two cycles, on the other side none."""
+
+    def lienard(t, x, p, out):
+        out[0], out[1] = x[1], -x[0] - p[0] * (x[0] ** 4 - p[1] * x[0] ** 2 + p[2]) * x[1]
+
+    scene = survey.orbit(
+        lienard, states=("x", "v"), period=None, parameters=("eps", "a", "b"), start=(2.0, 0.0, 6.3),
+        continuation=("b", 0.05, 2.0),
+    )  # fmt: skip
+    found = survey.edge(scene, along="b", eps=eps, a=a)
+    assert found.sizes["place"] == 1
+    b = float(found.edge[0]) + 1e-6 * np.array([-1.0, 1.0])
+    assert survey.evaluate(scene, eps=eps, a=a, b=b).orbits.values.tolist() == [2, 0]
+
+
 def test_period_doubling_in_closed_form():
     """x' = R(t) diag(a, -1) R(-t) x, R turns by half a circle in a period: the multipliers are -e^a
     and -1 / e.
@@ -290,6 +307,27 @@ def test_a_line_says_where_numbers_of_orbits_have_no_fold_between_them(monkeypat
     monkeypatch.setattr(orbit_curves, "KINDS", ())
     found = survey.edge(NARROW_CUSP, along="q", q=(0.0, 1.0), l=1e-3)
     assert found.edge.size == 0 and found.attrs["complete"] == 0
+
+
+def crossed(t, x, p, out):
+    """x' = x (l - x) and y' = -y: the orbits 0 and l exchange their stability at l = 0, which is no fold."""
+    out[0], out[1] = x[0] * (p[0] - x[0]) + 0.0 * math.cos(t), math.cos(t) - x[1]
+
+
+@pytest.mark.parametrize("continuation", [None, ("l", -0.5, 0.7)])
+def test_a_line_says_where_curves_of_orbits_cross(continuation):
+    scene = survey.orbit(
+        crossed,
+        states=("x", "y"),
+        parameters=("l", "m"),
+        period=2 * math.pi,
+        start=(0.0, 0.5),
+        continuation=continuation,
+    )
+    ds = survey.evaluate(scene, l=[-0.2, 0.2], m=0.0)
+    if continuation is None:
+        assert ds.verdict.values.tolist() == [1, 0]
+    assert survey.edge(scene, along="l", l=(-0.5, 0.7), m=0.0).attrs["complete"] == 0
 
 
 def test_where_there_are_none():
