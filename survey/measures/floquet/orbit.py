@@ -121,29 +121,33 @@ def followed(equation, continued, points, reach):
 
 
 class KnownOrbit(NamedTuple):
-    """An orbit that was found at a point: the mean square of its states, x0, T, and its number."""
+    """An orbit that was found at a point: the mean square of its states, x0, T, its number, and the
+    bars of x0.
+    """
 
     square: float
     x0: tuple
     T: float
     number: int
+    bars: tuple
 
     @classmethod
     def of(cls, found, i, number):
         """Orbit i of OrbitResults."""
-        return cls(found.square[i], tuple(found.x[i]), found.T[i], number)
+        return cls(found.square[i], tuple(found.x[i]), found.T[i], number, tuple(found.dx[i]))
 
 
 def numbered(orbits, free):
     """The numbers of the different ones among KnownOrbits, by the mean squares of their states, then x0."""
     kept = []
     for one in sorted(orbits):
-        size = SAME * one.square**0.5
-        alike = [other for other in kept if _near(one.square, other.square)]
         if free:
-            same = (abs(one.T - other.T) <= SAME * one.T for other in alike)
+            same = (
+                _near(one.square, other.square) and abs(one.T - other.T) <= SAME * one.T
+                for other in kept
+            )
         else:
-            same = (abs(np.subtract(one.x0, other.x0)).max() <= size for other in alike)
+            same = (_is_same(one, other) for other in kept)
         if not any(same):
             kept.append(one)
     for i in range(1, len(kept)):
@@ -152,6 +156,13 @@ def numbered(orbits, free):
             if _near(after.square, before.square) and after.x0 < before.x0:
                 kept[k - 1], kept[k] = after, before
     return [one.number for one in kept]
+
+
+def _is_same(one, other):
+    """Do two forced orbits start at the same state, or within each other's bars, as where both are 0?"""
+    apart = abs(np.subtract(one.x0, other.x0))
+    alike = _near(one.square, other.square) and apart.max() <= SAME * one.square**0.5
+    return alike or (apart <= np.add(one.bars, other.bars)).all()
 
 
 def _near(a, b):

@@ -156,6 +156,27 @@ def test_the_orbit_that_is_zero_from_a_start_that_is_not():
     assert (abs(twice.x0).max("state") > 0.1).all()  # once
 
 
+def test_the_orbit_that_is_zero_is_counted_once():
+    """Newton's method ends at 0, at 2e-69, at 9e-69: without a force the energy falls, so that there is no other."""
+
+    def f(t, x, p, out):
+        out[0] = x[1]
+        out[1] = p[1] * math.cos(t) - 0.3 * x[1] - p[0] * x[0] - x[0] ** 3
+
+    forced = survey.orbit(
+        f,
+        states=("x", "v"),
+        period=2 * math.pi,
+        parameters=("k", "F"),
+        start=(0.0, 0.0),
+        continuation=("F", -1.0, 1.0),
+    )
+    ds = survey.evaluate(forced, k=[0.3, 0.5, 0.9], F=[-0.3, 0.0, 1e-12])
+    assert (ds.status == 0).all()
+    assert (ds.orbits.sel(F=[0.0, 1e-12]) == 1).all()
+    assert (ds.sel(k=0.3, F=-0.3).orbits == 3).item()
+
+
 def test_branches_that_are_no_numbers():
     ds = survey.evaluate(scene(), F=1.0, w=1.9, branch=[1.0, 1.5, 4.0])
     assert ds.status.values.tolist() == [0, 1, 16]
