@@ -11,7 +11,9 @@ by itself, ALONE, along which their number must be what folds explain. Where det
 - 1), det(M + 1) or the product of all l_i l_j - 1 changes its sign there, Newton's method on the
 equations of `critical` finds the orbit that has the multiplier, and the curve is followed from it
 in the space of all unknowns, in which folds of orbits and cusps of their curves are nothing
-special. Every point that is kept is shown to exist, with bounds of its parameters
+special. Where curves of orbits cross, as that of an orbit that is always 0 and another, these
+equations are singular: on a line by itself the parameter is bracketed there by two orbits of a
+curve. Every point that is kept is shown to exist, with bounds of its parameters
 (`critical_points`). Curves that none of the lines meets are not found. Curves belong to all orbits
 that are followed.
 """
@@ -23,7 +25,7 @@ import numpy as np
 
 from survey.kernels.math.roundoff import EPS
 from survey.measures import contours
-from survey.measures.floquet import bifurcations, existence, monodromy
+from survey.measures.floquet import bifurcations, existence, monodromy, orbit
 from survey.measures.floquet.continuation import (
     SEEDS,
     ContinuedCurves,
@@ -37,7 +39,7 @@ from survey.measures.floquet.critical import Critical
 from survey.measures.floquet.critical_points import RTOL, CriticalPoints
 from survey.measures.floquet.critical_walk import NEAREST, Walk
 from survey.measures.floquet.multipliers import MINUS_ONE, NEIMARK_SACKER, PLUS_ONE
-from survey.measures.floquet.newton import bordered
+from survey.measures.floquet.newton import CONVERGED, bordered
 from survey.measures.segments import along
 
 KINDS = (NEIMARK_SACKER, PLUS_ONE, MINUS_ONE)  # in the order in which they are followed
@@ -47,6 +49,9 @@ SAME, ALIKE = 3e-4, 0.05  # of the map; of the orbit, relative: what lies on a c
 OWN_IMAGE = 1e-3  # relative: what is its own mirror image
 MOST_SIGNS, TRIED, ODD = 8, 24, 1e-12  # states; points at which symmetry is tried; relative
 NOISE, EDGE = 1e-7, 1e-9  # of M's entries; of the map
+# a crossing is closed in on from both sides, to 2^-NEARER of what is left, some times; by how much
+# states may change more than along a straight curve
+NEARER, CLOSER, STRAIGHT = 20, 6, 4.0
 
 
 def searched(scene, square, axes, fixed):
@@ -66,6 +71,7 @@ def searched(scene, square, axes, fixed):
             found += on_map.shown(points, y, border)
             for other in on_map.at_ends(how):
                 seeds[other] += on_map.beside(points, y, other)
+    found += on_map.crossings
     order = {kind: k for k, kind in enumerate((PLUS_ONE, MINUS_ONE, NEIMARK_SACKER))}
     return sorted(found, key=lambda one: order[one[0]]), on_map.lacks(found)
 
@@ -90,9 +96,9 @@ class _Map:
         self.reach = monodromy.method_of("auto").floquet_reach(RTOL)
         self._points, self.mirror = {}, mirror_of(equation, square, self.varied, given)
         self._numbers = None  # of orbits along a line, by the continuation
-        self._missed = (
-            False  # has a multiplier passed 1 or -1 on a line where no orbit is found to have it?
-        )
+        self.crossings = []  # as `shown` gives points, of a line by itself
+        # has a multiplier passed 1 or -1 on a line where no orbit is found to have it?
+        self._missed = False
         self.kinds = [
             Criticality(kind)
             for kind in KINDS
@@ -212,19 +218,85 @@ class _Map:
                 continue
             near = orbits(y[at] + share * (y[at + 1] - y[at]))
             own = self._mirrored(*near)
-            passed = 0
-            for how in self.kinds:
-                some = own if how.mirror else ~own
-                if how.kind == kind and some.any():
-                    start = self._near(how, *(one[some] for one in near))
-                    located = self._located(how, start, 1 - axis)
-                    passed += len(located)
-                    yield how, located
-            if kind != NEIMARK_SACKER:  # real multipliers may have the product 1 too
-                ends = np.stack([orbits(y[k])[0][:, self.varied] for k in (at, at + 1)])
-                here = self.positions(ends.reshape(2 * at.size, -1))[:, axis].reshape(2, -1)
-                inside = (here.min(axis=0) > 0.0) & (here.max(axis=0) < 1.0)
-                self._missed |= passed < inside.sum()
+            # each by itself, on a line by itself: is it found?
+            alone = kind != NEIMARK_SACKER and len(self.varied) < 2
+            for group in np.eye(at.size, dtype=bool) if alone else np.ones((1, at.size), bool):
+                found = 0
+                for how in self.kinds:
+                    some = group & (own if how.mirror else ~own)
+                    if how.kind == kind and some.any():
+                        start = self._near(how, *(one[some] for one in near))
+                        located = self._located(how, start, 1 - axis)
+                        found += len(located)
+                        yield how, located
+                if alone and not found:
+                    k = at[group][0]
+                    self._close_in(orbits, y[k : k + 2], kind)
+
+    def _close_in(self, orbits, ends, kind):
+        """Add to `crossings` where a multiplier passes 1 or -1 between two orbits of a line by itself, y (2,
+        size) as in `_of_curve`; or note that it is not found.
+        """
+        method, n = monodromy.method_of("auto"), self.equation.n
+
+        def at(y):
+            """The orbits near y, the determinant, 0 where its sign is not certain, and M."""
+            points, x, T = orbits(y)
+            found = orbit.shown(self.equation, points, x, T, method, RTOL, relax=False)
+            M = found.others.M
+            value, bar = bifurcations.functions(M.shape[1], "none")[kind](M, found.others.E)
+            y = y.copy()
+            y[found.good, :n] = found.x[found.good]
+            if self.equation.free:
+                y[found.good, n] = found.T[found.good]
+            return y, np.where(found.good & (abs(value) > bar), value, 0.0), M
+
+        def places(y):
+            return self.positions(orbits(y)[0][:, self.varied])[:, 0]
+
+        begin = places(ends)
+        if not ((begin > 0.0) & (begin < 1.0)).all():
+            return
+        first = known = at(ends)
+        if not known[1][0] * known[1][1] < 0.0:
+            self._missed = True
+            return
+        ways = 0.5 ** np.arange(1, NEARER + 1)
+        for _ in range(CLOSER):
+            (low, high), value, _M = known
+            zero = value[0] / (value[0] - value[1])
+            share = np.concatenate([zero - zero * ways, zero + (1.0 - zero) * ways[::-1]])
+            inside = at(low + share[:, None] * (high - low))
+            both = [np.concatenate([a[:1], b, a[1:]]) for a, b in zip(known, inside, strict=True)]
+            # next to a crossing Newton's method may go over to the other curve, with the other sign
+            one, two = (np.flatnonzero(np.sign(both[1]) == side) for side in np.sign(value))
+            nearest = [one[one < two[0]][-1], two[two > one[-1]][0]]
+            known = [a[nearest] for a in both]
+        place = places(known[0])
+        before, moved = (abs(np.diff(y[:, :n], axis=0)[0]) for y in (first[0], known[0]))
+        share = abs(np.diff(place) / np.diff(begin))
+        size = floored(abs(first[0][:, :n]).max(axis=0)[None])[0]
+        if (moved > STRAIGHT * share * before + CONVERGED * size).any():
+            self._missed = True  # not on one curve, but on two that meet at a fold
+            return
+        self._cross(kind, place, known[2][0])
+
+    def _cross(self, kind, place, M):
+        """Add to `crossings` what lies between these positions (2) of a line; M is that of an orbit there."""
+        at, parameters = np.zeros((1, 2)), np.zeros((1, 2))
+        at[0, 0] = place.mean()
+        parameters[:, 0] = self.square.parameters(at)[:, 0]
+        error = 0.5 * abs(np.diff(place)) * (1.0 + 1e-9) + self.square.grain
+        for other, x, bar, _known in self.crossings:  # along the other curve
+            apart = abs(self.square.positions(x)[0, 0] - at[0, 0])
+            if other == kind and apart <= bar[0] + error[0]:
+                return
+        goal, angle = (1.0, 0.0) if kind == PLUS_ONE else (-1.0, np.pi)
+        multipliers = np.linalg.eigvals(M)
+        others = np.delete(multipliers, abs(multipliers - goal).argmin())
+        outside = np.array([float((abs(others) > 1.0).sum())])
+        known = {"angle": (np.array([angle]), np.zeros(1)), "outside": (outside, np.zeros(1))}
+        self.crossings.append((kind, parameters, error, known))
 
     def _mirrored(self, points, x, T):
         """Which orbits are their own mirror images, nearly."""

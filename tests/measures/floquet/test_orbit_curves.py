@@ -310,24 +310,27 @@ def test_a_line_says_where_numbers_of_orbits_have_no_fold_between_them(monkeypat
 
 
 def crossed(t, x, p, out):
-    """x' = x (l - x) and y' = -y: the orbits 0 and l exchange their stability at l = 0, which is no fold."""
-    out[0], out[1] = x[0] * (p[0] - x[0]) + 0.0 * math.cos(t), math.cos(t) - x[1]
+    """The orbit x = 0, of the multiplier exp(2 pi (l + 0.7 m / 1.3)), exchanges its stability with another."""
+    out[0] = x[0] * (p[0] + 0.4 * math.cos(t) + 0.7 * x[1] - x[0])
+    out[1] = p[1] + math.cos(t) - 1.3 * x[1]
 
 
-@pytest.mark.parametrize("continuation", [None, ("l", -0.5, 0.7)])
-def test_a_line_says_where_curves_of_orbits_cross(continuation):
+@pytest.mark.parametrize("start", [(0.0, 0.5), (0.6, 0.1)])
+@pytest.mark.parametrize("continuation", [None, ("l", -0.9, 0.8), ("m", -1.0, 1.0)])
+def test_a_line_shows_where_curves_of_orbits_cross(start, continuation):
+    """There is no fold: on one curve each side has an orbit."""
     scene = survey.orbit(
         crossed,
         states=("x", "y"),
         parameters=("l", "m"),
         period=2 * math.pi,
-        start=(0.0, 0.5),
+        start=start,
         continuation=continuation,
     )
-    ds = survey.evaluate(scene, l=[-0.2, 0.2], m=0.0)
-    if continuation is None:
-        assert ds.verdict.values.tolist() == [1, 0]
-    assert survey.edge(scene, along="l", l=(-0.5, 0.7), m=0.0).attrs["complete"] == 0
+    found = survey.edge(scene, along="l", l=(-0.8, 0.7), m=0.4)
+    assert found.edge_class.values.tolist() == [1]  # once
+    off = abs(float(found.edge[0]) + 0.7 * 0.4 / 1.3)
+    assert off <= found.edge_error[0] < 1e-6
 
 
 def test_where_there_are_none():
