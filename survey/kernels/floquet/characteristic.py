@@ -39,7 +39,7 @@ def answer(
     series,
     doubts,
     x,
-    table,
+    places,
     near,
     starts,
     outputs,
@@ -53,39 +53,37 @@ def answer(
     crossing,
     missed,
 ):
-    """Answer the points `outputs` (R, L) of rows at x (R): columns of `floats`, `signs`, ... as in
-    `stability.Answers`.
+    """Answer the points `outputs` (R, L) of rows at x (R), columns at `places` (L): columns of `floats`,
+    `signs`, ... as in `stability.Answers`.
 
-    series (n1, K m), of K coefficients, m terms along the row each; table (m, L or more, a multiple
-    of LANES): T_k at the points of a row. near (R + L): the part of each row, then of each column,
-    of which each node has PARTS; doubts (K, parts, parts): how well the coefficients are known
-    there; starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d coefficients the last d are
-    those of the Krein form.
+    series (n1, K m), of K coefficients, m terms along the row each. near (R + L): the part of each
+    row, then of each column, of which each node has PARTS; doubts (K, parts, parts): how well the
+    coefficients are known there; starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d
+    coefficients the last d are those of the Krein form.
     """
-    K, m, d, R, L = len(doubts), len(table), starts.shape[2], len(x), outputs.shape[1]
-    work, own = np.empty((2, K * m)), np.empty((1, K * m))
+    K, m, d, R, L = len(doubts), starts.shape[1], starts.shape[2], len(x), outputs.shape[1]
+    rows, table = np.empty((R, K * m)), np.empty((m, LANES))
+    restrict(series, x, np.empty((2, K * m)), rows)
     c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
     z, y = np.empty((d, LANES)), np.empty((d, LANES))
-    for r in range(R):
-        restrict(series, x[r : r + 1], work, own)
-        for first in range(0, L, LANES):
-            count = min(LANES, L - first)
-            for k in range(K):
-                sums = c[k]
-                sums[:] = 0.0
-                for j in range(m - 1, -1, -1):
-                    weight, one = own[0, k * m + j], table[j, first : first + LANES]
-                    for lane in range(LANES):
-                        sums[lane] += weight * one[lane]
+    needed = d if _is_short(n, asked) else K
+    for first in range(0, L, LANES):
+        count = min(LANES, L - first)
+        for lane in range(LANES):
+            table[0, lane] = 1.0
+            if m > 1:
+                table[1, lane] = places[first + min(lane, count - 1)]
+        _polynomials(table)
+        for r in range(R):
+            for k in range(needed):
+                _sum(rows[r, k * m : (k + 1) * m], table, c[k])
             for lane in range(LANES):
-                column, own_places[lane] = (
-                    first + min(lane, count - 1),
-                    outputs[r, first + min(lane, count - 1)],
-                )
+                column = first + min(lane, count - 1)
+                own_places[lane] = outputs[r, column]
                 one, two = near[r], near[R + column]
-                for k in range(K):
+                for k in range(needed):
                     bars[k, lane] = doubts[k, one, two]
-                for i in range(d):
+                for i in range(d if d > 2 else 0):
                     z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
                     y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
             answer_lanes(
@@ -105,6 +103,28 @@ def answer(
                 crossing,
                 missed,
             )
+
+
+@inline
+def _is_short(n, asked):
+    """Is all that is asked answered by `_of_two`?"""
+    return n == 2 and not (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN])
+
+
+@inline
+def _sum(weights, table, sums):
+    """Fill `sums` with those of the weights times the rows of `table`."""
+    sums[:] = 0.0
+    fours = len(weights) - len(weights) % 4
+    for j in range(len(weights) - 1, fours - 1, -1):
+        w, t = weights[j], table[j]
+        for lane in range(LANES):
+            sums[lane] += w * t[lane]
+    for j in range(fours - 4, -1, -4):  # four at once: sums are read and written less often
+        w0, w1, w2, w3 = weights[j], weights[j + 1], weights[j + 2], weights[j + 3]
+        t0, t1, t2, t3 = table[j], table[j + 1], table[j + 2], table[j + 3]
+        for lane in range(LANES):
+            sums[lane] += (w0 * t0[lane] + w1 * t1[lane]) + (w2 * t2[lane] + w3 * t3[lane])
 
 
 @kernel
@@ -134,6 +154,7 @@ def answer_points(
     across, along, part = np.empty((n1, LANES)), np.empty((m, LANES)), np.empty(LANES)
     c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
     z, y = np.empty((d, LANES)), np.empty((d, LANES))
+    needed = d if _is_short(n, asked) else K
     for first in range(0, N, LANES):
         count = min(LANES, N - first)
         for lane in range(LANES):
@@ -144,14 +165,14 @@ def answer_points(
             if m > 1:
                 along[1, lane] = x[1, p]
             one, two = near[0, p], near[1, p]
-            for k in range(K):
+            for k in range(needed):
                 bars[k, lane] = doubts[k, one, two]
-            for i in range(d):
+            for i in range(d if d > 2 else 0):
                 z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
                 y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
         _polynomials(across)
         _polynomials(along)
-        for k in range(K):
+        for k in range(needed):
             sums = c[k]
             sums[:] = 0.0
             for j in range(m - 1, -1, -1):
@@ -204,7 +225,7 @@ def answer_lanes(
     within `bars`, and roots z + i y (d, LANES), nearly (of no use where d < 3).
     """
     K, d = len(c), len(z)
-    if n == 2 and not (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
+    if _is_short(n, asked):
         _of_two(c, bars, outputs, count, paired, asked, rtol, floats, verdict, crossing, missed)
         return
     w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))

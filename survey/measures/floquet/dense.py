@@ -220,17 +220,11 @@ def _scaled(values, panel, side):
 def _answer(key, panel, x, y, outputs, answer):
     """Answer the points of a panel at x (rows), y (columns), between -1 and 1."""
     n1, K = len(panel.series), len(panel.doubts)
-    n2 = panel.series.shape[1] // K
-    lanes = characteristic.LANES
-    table = np.zeros((n2, -(-y.size // lanes) * lanes))
-    table[0, : y.size], table[1, : y.size] = 1.0, y
-    for k in range(2, n2):
-        table[k] = 2.0 * table[1] * table[k - 1] - table[k - 2]
-    near = np.concatenate([_part(x, n1), _part(y, n2)])
+    near = np.concatenate([_part(x, n1), _part(y, panel.series.shape[1] // K)])
     characteristic.answer(
-        panel.series, panel.doubts, np.ascontiguousarray(x), table, near, panel.starts, np.ascontiguousarray(outputs),
-        key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
-        answer.verdict, answer.crossing, answer.missed,
+        panel.series, panel.doubts, *map(np.ascontiguousarray, (x, y)), near, panel.starts,
+        np.ascontiguousarray(outputs), key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats,
+        answer.signs, answer.verdict, answer.crossing, answer.missed,
     )  # fmt: skip
 
 
@@ -289,23 +283,26 @@ def _panel(key, sides, budget):
     """
     middle = tuple(0.5 * (a + b) for a, b in sides)
     radius = tuple(0.5 * (b - a) for a, b in sides)
-    degrees, spent = _degrees(key, middle, radius, budget)
+    degrees, spent, known = _degrees(key, middle, radius, budget)
     if degrees is None:
         return None, spent, None
     longest = int(np.argmax(degrees))
     if degrees[longest] > DEGREES[-1]:
         return None, spent, longest
-    sizes = [int(DEGREES[np.searchsorted(DEGREES, n)]) for n in degrees]
-    if spent + np.prod(sizes) > budget:
-        return None, spent, None
+    # the nodes of a line by itself that have shown the degree serve as they are
+    alone = len(degrees) == 1
+    sizes = [PROBED] if alone else [int(DEGREES[np.searchsorted(DEGREES, n)]) for n in degrees]
     x = np.stack(
         np.meshgrid(*map(chebyshev.symmetric_nodes, sizes), indexing="ij"), axis=-1
     ).reshape(-1, len(sizes))
     tried = TRIED[:, : len(sizes)]
-    known = _coefficients(key, middle, radius, np.concatenate([x, tried]))
-    spent += len(x) + len(tried)
-    if known is None:
-        return None, spent, None
+    if not alone:
+        if spent + np.prod(sizes) > budget:
+            return None, spent, None
+        known = _coefficients(key, middle, radius, np.concatenate([x, tried]))
+        spent += len(x) + len(tried)
+        if known is None:
+            return None, spent, None
     values, bars = known
     panel = _expanded(key, middle, radius, sizes, values[: len(x)], bars[: len(x)])
     if panel is None:
@@ -321,21 +318,23 @@ def _panel(key, sides, budget):
 
 
 def _degrees(key, middle, radius, budget):
-    """The number of nodes that each side asks for, beyond DEGREES if none is enough; and the points
-    solved.
+    """The number of nodes that each side asks for, beyond DEGREES if none is enough; the points
+    solved; and, on a line by itself, what `_coefficients` gives at its PROBED nodes and at TRIED.
     """
     sides = len(middle)
     ends = [np.zeros(1)] if sides == 1 else [np.array([-0.97, 0.97])]
     if 2.0 * PROBED * sides * len(ends[0]) > budget:
-        return None, 0
+        return None, 0, None
     x = chebyshev.symmetric_nodes(PROBED)
     needed = []
     lines = [np.stack([x if k == side else np.full(PROBED, end) for k in range(sides)], axis=1)
              for side in range(sides) for end in ends[0]]  # fmt: skip
-    known = _coefficients(key, middle, radius, np.concatenate(lines))
+    given = np.concatenate([*lines, TRIED[:, :1]] if sides == 1 else lines)
+    known = _coefficients(key, middle, radius, given)
     if known is None:
-        return None, len(lines) * PROBED
-    values, bars = (part.reshape(sides, -1, PROBED, part.shape[1]) for part in known)
+        return None, len(given), None
+    nodes = PROBED * len(lines)
+    values, bars = (part[:nodes].reshape(sides, -1, PROBED, part.shape[1]) for part in known)
     for side in range(sides):
         most = 0
         for line, bar in zip(values[side], bars[side], strict=True):
@@ -344,7 +343,7 @@ def _degrees(key, middle, radius, budget):
             noise = np.maximum(noise, 1e-3 * key.rtol * (1.0 + abs(line).min(axis=0)))
             most = max(most, 1 + int(np.flatnonzero((series > noise).any(axis=1)).max(initial=0)))
         needed.append(most + 4 if most < PROBED - 4 else 10 * PROBED)
-    return np.array(needed), len(lines) * PROBED
+    return np.array(needed), len(given), known
 
 
 def _coefficients(key, middle, radius, x):

@@ -15,10 +15,8 @@ def answered(coefficients, doubts, starts, n, paired, rtol=1.0, multipliers=True
     """The Answers of one point, as a series of one term."""
     answer = Answers(1, n)
     series = np.array(coefficients, dtype=float).reshape(1, -1)
-    table = np.zeros((1, characteristic.LANES))
-    table[0, 0] = 1.0
     characteristic.answer(
-        series, np.array(doubts, dtype=float).reshape(-1, 1, 1), np.zeros(1), table, np.zeros(2, np.int64),
+        series, np.array(doubts, dtype=float).reshape(-1, 1, 1), np.zeros(1), np.zeros(1), np.zeros(2, np.int64),
         np.stack([starts.real, starts.imag], axis=-1).reshape(1, 1, -1, 2), np.zeros((1, 1), np.int64), n, paired,
         np.array([multipliers, True, True, False, False]), rtol, answer.floats, answer.signs,
         answer.verdict, answer.crossing, answer.missed,
