@@ -36,7 +36,7 @@ PROBED = 48  # nodes of the lines that show the degrees that are needed
 POINTS_PER_NODE = 4  # a panel pays if there are this many points for each that it solves
 SMALLEST = 16  # points of an axis
 FEWEST = 4096  # points on their own from which on series pay
-BEST = 1e-14  # accuracy of M at the nodes
+BEST, SHARE = 1e-14, 1e-3  # accuracy of M at the nodes; of the requested one, where that is less
 MOST_DEEP = 12  # halvings
 LEAST = 0.5  # the share of those that their own bounds answer, below which cutting is of no use
 MOST = 0.9  # the share of the nodes answered to the requested accuracy from which on a panel serves
@@ -353,12 +353,12 @@ def _coefficients(key, middle, radius, x):
     points = key.points(
         *(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True)))
     )
-    return at_points(key.system, key.structure, points)
+    return at_points(key.system, key.structure, points, max(BEST, SHARE * key.rtol))
 
 
-def at_points(system, structure, points):
-    """Coefficients (N, K) of the polynomial at the points (N, parameters), and their bounds; None
-    where no series serves.
+def at_points(system, structure, points, accuracy):
+    """Coefficients (N, K) of the polynomial at the points (N, parameters), from M to this accuracy, and
+    their bounds; None where no series serves.
     """
     if not system.smooth(points[0]):
         return None
@@ -382,7 +382,8 @@ def at_points(system, structure, points):
             ):
                 out[:, some] = np.nan  # each point for itself
 
-        monodromy.solve(own, monodromy.method_of("auto"), BEST, np.ones(len(points)), every, finish)
+        method = monodromy.method_of("auto")
+        monodromy.solve(own, method, accuracy, np.ones(len(points)), every, finish)
     return out if np.isfinite(out).all() else None
 
 
