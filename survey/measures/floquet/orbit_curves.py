@@ -274,9 +274,10 @@ class _Map:
             known = [a[nearest] for a in both]
         place = places(known[0])
         before, moved = (abs(np.diff(y[:, :n], axis=0)[0]) for y in (first[0], known[0]))
-        share = abs(np.diff(place) / np.diff(begin))
+        with np.errstate(all="ignore"):
+            share = abs(np.diff(place) / np.diff(begin))
         size = floored(abs(first[0][:, :n]).max(axis=0)[None])[0]
-        if (moved > STRAIGHT * share * before + CONVERGED * size).any():
+        if not (moved <= STRAIGHT * share * before + CONVERGED * size).all():
             self._missed = True  # not on one curve, but on two that meet at a fold
             return
         self._cross(kind, place, known[2][0])
