@@ -144,7 +144,7 @@ def _floquet(workflow, names, fixed):
         points = np.tile(np.array(others), (x.size * y.size, 1))
         points[:, columns.index(names[0])] = np.repeat(x, y.size)
         points[:, columns.index(names[1])] = np.tile(y, x.size)
-        known = scene._called(dense.at_points, system, scene.structure, points)
+        known = scene._called(dense.at_points, system, scene.structure, points, dense.BEST)
         if known is None:
             return np.full((2, number, x.size, y.size), np.nan)
         return tuple(part[:, :number].T.reshape(number, x.size, y.size) for part in known)
