@@ -335,10 +335,9 @@ def orbit(
     Outputs are the state `x0` at t = 0, the period (the least one, where it is not given), and
     those of `survey.floquet` for motions next to the orbit. Every orbit is shown to exist within its
     error bars; `status` is no_orbit where that fails. Where f does not depend on t, x0 is in the
-    plane through the start that f is normal
-    to there, or, where no orbit is found from it, through the state that the motion has 32 periods
-    later, and the multipliers do not include the +1 that every orbit has then. Where there are
-    several orbits, the start decides.
+    plane through the start that f is normal to there, or, where no orbit is found from it, through
+    the state that the motion has 32 periods later, and the multipliers do not include the +1 that
+    every orbit has then. Where there are several orbits, the start decides.
 
     Parameters
     ----------

@@ -68,6 +68,19 @@ NEAR = 1e-10  # velocities, in those of the system, at which a branch counts as 
 
 
 @inline
+def passed(at, p, T, angle, right, h, n, saa, sab, sbb):
+    """(w, its bound at that angle, dw/dphi) where a step, behind n others, passes an angle; saa, sab,
+    sbb: the error ellipse at its start.
+    """
+    dt = passage(at, p, T, angle, right, h)
+    x, v, _e, _y = at(p, T, dt)
+    aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
+    f, g, _dg = values(p, x)
+    slope = (f * v + g) / v
+    return v, bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0)), slope
+
+
+@inline
 def first_turn(setting, begin, at, p, start, tolerance, turnings, row):
     """Fill w, TURN, PASSED, BACK and, behind so many `turnings`, WINDING of `row`, whose other
     columns are filled.
@@ -88,15 +101,9 @@ def first_turn(setting, begin, at, p, start, tolerance, turnings, row):
             h = time_of_turning(at, p, T, h)
             x1, w1, _e, _y = at(p, T, h)
         while k < row[COLUMNS] and row[FROM] + row[OFFSETS + k] <= x1:
-            dt = passage(at, p, T, row[FROM] + row[OFFSETS + k], True, h)
-            x, v, _e, _y = at(p, T, dt)
-            aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
-            f, g, _dg = values(p, x)
-            slope = (f * v + g) / v
-            row[2 * k] = v
-            row[2 * k + 1] = bar(
-                n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0)
-            ) + 4e-16 * abs(slope)
+            target = row[FROM] + row[OFFSETS + k]
+            v, wide, slope = passed(at, p, T, target, True, h, n, saa, sab, sbb)
+            row[2 * k], row[2 * k + 1] = v, wide + 4e-16 * abs(slope)
             k += 1
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = x1, w1
@@ -128,14 +135,8 @@ def way_back(setting, begin, at, p, phi, error, tolerance, row):
         if not (h > 0.0 and math.isfinite(w1)):
             return
         if x1 <= row[FROM]:
-            dt = passage(at, p, T, row[FROM], False, h)
-            x, v, _e, _y = at(p, T, dt)
-            aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
-            f, g, _dg = values(p, x)
-            slope = (f * v + g) / v
-            row[BACK] = -v
-            row[BACK_BAR] = bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0))
-            row[BACK_BAR] += abs(slope) * (4e-16 + row[FROM_BAR])
+            v, wide, slope = passed(at, p, T, row[FROM], False, h, n, saa, sab, sbb)
+            row[BACK], row[BACK_BAR] = -v, wide + abs(slope) * (4e-16 + row[FROM_BAR])
             return
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w = x1, w1
@@ -169,15 +170,9 @@ def winding(setting, begin, at, p, phi, error, tolerance, turnings, row):
             return
         if turned > 1 and not met and sign * (x1 - next_one) >= 0.0:
             met = True
-            dt = passage(at, p, T, next_one, right, h)
-            x, v, _e, _y = at(p, T, dt)
-            aa, ab, bb = carried(p, T, dt, v, saa, sab, sbb)
-            f, g, _dg = values(p, x)
-            slope = (f * v + g) / v
+            v, wide, slope = passed(at, p, T, next_one, right, h, n, saa, sab, sbb)
             column = WINDING + 2 * (turned - 2)
-            row[column] = abs(v)
-            row[column + 1] = bar(n + 1, max(bb - 2.0 * slope * ab + slope * slope * aa, 0.0))
-            row[column + 1] += abs(slope) * 4e-15
+            row[column], row[column + 1] = abs(v), wide + abs(slope) * 4e-15
             if turned == turnings:
                 return
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
