@@ -221,7 +221,7 @@ class Page:
         self.document.add_timeout_callback(call, SOON)
 
     def changed(self):
-        """Apply what the user has chosen, update the link, and draw it."""
+        """Apply what the user has chosen, and draw it."""
         view, plot, ds = self.view, self.plot, self.map.ds
         view.name, view.boundaries = self.variable.value, self.edges.active
         view.window = [(ends.start, ends.end) for ends in (plot.x_range, plot.y_range)]
@@ -230,7 +230,6 @@ class Page:
             slider.visible = dim in (*ds.status.dims, *ds[view.name].dims)
         for curve in self.curves.values():
             curve.visible = view.boundaries
-        plot.name = self.map.link(view)
         if self.finer_of != self._key():
             self.finer, self.finer_of, self.not_finer = None, None, ""
         self.soon(self.draw)
@@ -262,8 +261,8 @@ class Page:
         self.soon(self.describe)
 
     def draw(self):
-        """Draw the visible window of the map and its legend, explain the pixels, and go on reading
-        if necessary.
+        """Draw the visible window of the map and its legend, explain the pixels, update the link, and
+        go on reading if necessary.
         """
         layer = self.map.layer(self.view)
         try:
@@ -309,6 +308,7 @@ class Page:
             caption = f"an overview, {self.share:.0%} of {layer.variable.size:,} points read; {caption} ..."
             self.soon(self.refine)
         self.caption.update(text=html.escape(caption), visible=bool(caption))
+        self.plot.name = self.map.link(self.view)
 
     def refine(self):
         """Read some more of the map, and draw it again."""

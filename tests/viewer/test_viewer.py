@@ -449,8 +449,8 @@ def test_in_a_browser_a_point_is_described_and_clicked_and_its_link_shows_the_sa
             )
         )
         afresh = "this window is solved afresh, 240 × 160 points"
-        picture.wait(driver, lambda: any(afresh in text for text in driver.execute_script(TEXTS)))
         picture.wait(driver, lambda: "x=0.8,0.81&y=0.7,0.72" in driver.current_url)
+        picture.wait(driver, lambda: any(afresh in text for text in driver.execute_script(TEXTS)))
         before = driver.current_url
         picture.act(driver, 0.803, 0.711, click=True)
         picture.wait(driver, lambda: driver.current_url != before)
