@@ -25,7 +25,9 @@ from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
 LANES = 32
 PARTS = 4  # of what is nearest to a node, along each side
-ITERATIONS = 7
+ITERATIONS = 5  # from roots near by
+MOST = 60  # from a circle
+CLOSE = 1e-4  # a correction, relative to the largest root, from which they converge as from nearby
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1  # as in measures.floquet.multipliers, and so are those below
 PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = 1, 2, 3, 4
 MULTIPLIERS, RADIUS, VERDICT, CROSSING, KREIN = range(5)  # columns of `asked`
@@ -66,6 +68,9 @@ def answer(
     restrict(series, x, np.empty((2, K * m)), rows)
     c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
     z, y = np.empty((d, LANES)), np.empty((d, LANES))
+    # of points whose roots are not found from those of the node
+    others, other_places, waiting = np.empty((2, K, LANES)), np.empty(LANES, np.int64), 0
+    found = np.empty(LANES, np.bool_)
     needed = d if _is_short(n, asked) else K
     for first in range(0, L, LANES):
         count = min(LANES, L - first)
@@ -86,23 +91,13 @@ def answer(
                 for i in range(d if d > 2 else 0):
                     z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
                     y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
-            answer_lanes(
-                c,
-                bars,
-                z,
-                y,
-                own_places,
-                count,
-                n,
-                paired,
-                asked,
-                rtol,
-                floats,
-                signs,
-                verdict,
-                crossing,
-                missed,
-            )
+            waiting = _answer_nearby(
+                c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
+                found, others, other_places, waiting,
+            )  # fmt: skip
+    _answer_others(
+        others, z, y, other_places, waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+    )  # fmt: skip
 
 
 @inline
@@ -154,6 +149,9 @@ def answer_points(
     across, along, part = np.empty((n1, LANES)), np.empty((m, LANES)), np.empty(LANES)
     c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
     z, y = np.empty((d, LANES)), np.empty((d, LANES))
+    # of points whose roots are not found from those of the node
+    others, other_places, waiting = np.empty((2, K, LANES)), np.empty(LANES, np.int64), 0
+    found = np.empty(LANES, np.bool_)
     needed = d if _is_short(n, asked) else K
     for first in range(0, N, LANES):
         count = min(LANES, N - first)
@@ -177,35 +175,78 @@ def answer_points(
             sums[:] = 0.0
             for j in range(m - 1, -1, -1):
                 part[:] = 0.0
-                for i in range(terms[k, j] - 1, 0, -2):  # two at a time: half the stores
+                fours = terms[k, j] - terms[k, j] % 4
+                for i in range(terms[k, j] - 1, fours - 1, -1):
                     weight, one = series[i, k * m + j], across[i]
-                    other, two = series[i - 1, k * m + j], across[i - 1]
                     for lane in range(LANES):
-                        part[lane] += weight * one[lane] + other * two[lane]
-                if terms[k, j] % 2:
-                    weight = series[0, k * m + j]
+                        part[lane] += weight * one[lane]
+                for i in range(fours - 4, -1, -4):  # four at once, as in `_sum`
+                    at = k * m + j
+                    w0, w1, w2, w3 = (
+                        series[i, at],
+                        series[i + 1, at],
+                        series[i + 2, at],
+                        series[i + 3, at],
+                    )
+                    t0, t1, t2, t3 = across[i], across[i + 1], across[i + 2], across[i + 3]
                     for lane in range(LANES):
-                        part[lane] += weight
+                        part[lane] += (w0 * t0[lane] + w1 * t1[lane]) + (
+                            w2 * t2[lane] + w3 * t3[lane]
+                        )
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
-        answer_lanes(
-            c,
-            bars,
-            z,
-            y,
-            own_places,
-            count,
-            n,
-            paired,
-            asked,
-            rtol,
-            floats,
-            signs,
-            verdict,
-            crossing,
-            missed,
-        )
+        waiting = _answer_nearby(
+            c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
+            found, others, other_places, waiting,
+        )  # fmt: skip
+    _answer_others(
+        others, z, y, other_places, waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+    )  # fmt: skip
+
+
+@kernel
+def _answer_nearby(
+    c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
+    found, others, other_outputs, waiting,
+):  # fmt: skip
+    """As `answer_lanes`, from roots z + i y at the nearest node. Points whose roots are not found from
+    these, as where real ones have become complex, are added to the `waiting` ones of `others`
+    (coefficients and bounds) and `other_outputs`; returns how many wait.
+    """
+    answer_lanes(
+        c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed, found
+    )  # fmt: skip
+    for lane in range(count if len(z) > 2 else 0):
+        if found[lane]:
+            continue
+        for k in range(len(c)):
+            others[0, k, waiting], others[1, k, waiting] = c[k, lane], bars[k, lane]
+        other_outputs[waiting] = outputs[lane]
+        waiting += 1
+        if waiting == LANES:
+            _answer_others(
+                others, z, y, other_outputs, waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+            )  # fmt: skip
+            waiting = 0
+    return waiting
+
+
+@kernel
+def _answer_others(
+    others, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+):
+    """Answer the points that wait, from roots on a circle."""
+    if count == 0:
+        return
+    c, bars, found = others[0], others[1], np.empty(LANES, np.bool_)
+    for lane in range(count, LANES):
+        for k in range(len(c)):
+            c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
+    from_circle(c, len(z), z, y)
+    answer_lanes(
+        c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed, found
+    )  # fmt: skip
 
 
 @kernel
@@ -219,10 +260,11 @@ def _polynomials(table):
 
 @kernel
 def answer_lanes(
-    c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
-):
+    c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed, found
+):  # fmt: skip
     """Answer the first `count` of LANES points from their coefficients c (K, LANES), known to
-    within `bars`, and roots z + i y (d, LANES), nearly (of no use where d < 3).
+    within `bars`, and roots z + i y (d, LANES), nearly (of no use where d < 3). `found`
+    (LANES): has each root a disc of its own, which no step more would narrow much?
     """
     K, d = len(c), len(z)
     if _is_short(n, asked):
@@ -234,19 +276,20 @@ def answer_lanes(
     size, angle, order = np.empty(n), np.empty(n), np.empty(n, np.int64)
     form = np.empty((2, d))
     _roots(c, d, z, y, parts)
-    _corrections(c, d, bars, z, y, w, gap, parts)
+    _corrections(c, d, bars, z, y, w, gap, parts, found)
     for lane in range(count):
         p = outputs[lane]
         widest = 0.0
         for i in range(d):
             widest = max(widest, w[i, lane]) if w[i, lane] >= 0.0 else math.inf
-        clear = True
+        clear = widest < math.inf
         for i in range(d):
             clear = clear and gap[i, lane] > 2.0 * d * (w[i, lane] + widest)
             rho[i] = w[i, lane] * (1.0 + (d - 1) * min(1.0, 2.0 * widest / gap[i, lane]))
             lane_z[i, 0], lane_z[i, 1] = z[i, lane], y[i, lane]
         verdict[p], crossing[p], missed[p] = UNDECIDED, UNDECIDED, True
-        if not clear or not widest < math.inf:
+        found[lane] = found[lane] and clear
+        if not clear:
             continue
         open_signs = False
         if paired:
@@ -363,6 +406,60 @@ def improve(c, d, z, y, parts):
 
 
 @kernel
+def from_circle(c, d, z, y):
+    """Weierstrass's iteration from points of a circle until it converges as from near by, and two
+    steps more.
+    """
+    before, parts = np.empty((2, d, LANES)), np.empty((6, LANES))
+    for lane in range(LANES):
+        radius = 1e-3
+        for k in range(d):
+            radius = max(radius, abs(c[k, lane]) ** (1.0 / (k + 1)))
+        for i in range(d):
+            angle = (2.0 * math.pi * i + 1.0) / d  # no mirror images
+            z[i, lane], y[i, lane] = radius * math.cos(angle), radius * math.sin(angle)
+    converged = np.zeros(LANES, np.bool_)
+    for _ in range(MOST):
+        before[0], before[1] = z, y
+        improve(c, d, z, y, parts)
+        left = False
+        for lane in range(LANES):
+            moved = largest = 0.0
+            for i in range(d):
+                if converged[lane]:  # what follows depends on no neighbour
+                    z[i, lane], y[i, lane] = before[0, i, lane], before[1, i, lane]
+                moved = max(moved, abs(z[i, lane] - before[0, i, lane]))
+                moved = max(moved, abs(y[i, lane] - before[1, i, lane]))
+                largest = max(largest, abs(z[i, lane]), abs(y[i, lane]))
+            converged[lane] = moved < CLOSE * largest
+            left = left or not converged[lane]
+        if not left:
+            break
+    for _ in range(2):
+        improve(c, d, z, y, parts)
+
+
+@kernel
+def roots(c):
+    """The roots (N, d, 2), nearly, of the polynomials with coefficients c (N, d); 0 where d < 3, as
+    they are of no use there.
+    """
+    N, d = c.shape
+    out = np.zeros((N, d, 2))
+    own, z, y = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((d, LANES))
+    for first in range(0, N if d > 2 else 0, LANES):
+        count = min(LANES, N - first)
+        for lane in range(LANES):
+            for k in range(d):
+                own[k, lane] = c[first + min(lane, count - 1), k]
+        from_circle(own, d, z, y)
+        for lane in range(count):
+            for i in range(d):
+                out[first + lane, i, 0], out[first + lane, i, 1] = z[i, lane], y[i, lane]
+    return out
+
+
+@kernel
 def _value(c, d, x, t, pr, pi):
     """The polynomial at x + i t."""
     pr[:], pi[:] = 1.0, 0.0
@@ -391,12 +488,13 @@ def _product(z, y, i, d, qr, qi):
 
 
 @kernel
-def _corrections(c, d, bars, z, y, w, gap, parts):
-    """Fill w with bounds of the corrections |W_i|, and `gap` with the distance of each root to the
-    nearest other.
+def _corrections(c, d, bars, z, y, w, gap, parts, found):
+    """Fill w with bounds of the corrections |W_i|, `gap` with the distance of each root to the nearest
+    other, and `found` (lanes) where the corrections are no larger than what they are known to.
     """
     pr, pi, qr, qi, size, bound = parts[0], parts[1], parts[2], parts[3], parts[4], parts[5]
     lanes = len(size)
+    found[:] = True
     for i in range(d):
         x, t, own, near = z[i], y[i], w[i], gap[i]
         _value(c, d, x, t, pr, pi)
@@ -411,10 +509,14 @@ def _corrections(c, d, bars, z, y, w, gap, parts):
                     bound[lane] * size[lane] + doubt[lane] + 8.0 * d * ROUNDOFF_UP * abs(a[lane])
                 )
         for lane in range(lanes):
-            total = math.sqrt(pr[lane] * pr[lane] + pi[lane] * pi[lane]) + bound[lane]
+            size[lane] = math.sqrt(pr[lane] * pr[lane] + pi[lane] * pi[lane])
             own[lane] = (
-                total / math.sqrt(qr[lane] * qr[lane] + qi[lane] * qi[lane]) * (1.0 + 8.0 * d * EPS)
+                (size[lane] + bound[lane])
+                / math.sqrt(qr[lane] * qr[lane] + qi[lane] * qi[lane])
+                * (1.0 + 8.0 * d * EPS)
             )
+        for lane in range(lanes):
+            found[lane] = found[lane] and size[lane] <= bound[lane]
         for j in range(d):
             if j == i:
                 continue

@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, extend
-from survey.kernels.floquet.steps import lanes_of, next_term, norm_of
+from survey.kernels.floquet.steps import lanes_of, next_term, norm_of, times_step
 from survey.kernels.jit import kernel
 
 ORDER = 20
@@ -44,6 +44,7 @@ def flow(
     B = np.zeros((len(operations), ORDER + 1, n * lanes))
     C = np.zeros((len(operations), n, n * lanes))
     P, W = np.zeros((ORDER + 1, n, n * lanes)), np.zeros((len(terms), n * lanes))
+    U = np.zeros((len(terms), lanes))
     rows = np.zeros((n, lanes))
     a = np.zeros(lanes)
     needed = np.zeros((len(operations), n), np.bool_)
@@ -60,8 +61,7 @@ def flow(
             for k in range(numbers.shape[1]):
                 V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
-                for c in range(n):
-                    W[k, c * lanes + lane] = numbers[i, terms[k, NUMBER]]
+                U[k, lane] = numbers[i, terms[k, NUMBER]]
             for c in range(n):
                 x[c, lane] = x0[i, c]
                 D[c * n : (c + 1) * n, lane] = 0.0
@@ -76,15 +76,16 @@ def flow(
                 for lane in range(lanes):
                     V[states_at[c], lane] = x[c, lane]
             if derived:
+                times_step(U, s, n, W)
                 P[0] = 0.0
                 for c in range(n):
                     P[0, c, c * lanes : (c + 1) * lanes] = 1.0
             for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
                 extend(operations, signs, inside, order, V, t, s, S, k)
                 if k == 0:
-                    norm_of(S, W, terms, k, rows, a)
+                    norm_of(S, U, terms, k, rows, a)
                 if derived and k < ORDER:
-                    next_term(S, W, terms, used, needed, k, n, s, B, C, P)
+                    next_term(S, W, terms, used, needed, k, n, B, C, P)
             for lane in range(count):
                 if not busy[lane]:
                     continue

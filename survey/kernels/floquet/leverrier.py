@@ -14,12 +14,9 @@ import math
 
 import numpy as np
 
-from survey.kernels.floquet.characteristic import LANES, answer_lanes, improve
+from survey.kernels.floquet.characteristic import LANES, answer_lanes, from_circle
 from survey.kernels.jit import kernel
 from survey.kernels.math.roundoff import EPS
-
-MOST = 60  # iterations from a circle to the roots
-CLOSE = 1e-4  # a correction, relative to the largest root, from which they converge as from nearby
 
 
 @kernel
@@ -40,8 +37,8 @@ def answer_matrices(
     squares, sums, powers = np.empty((7, n, n)), np.empty((5, n + 1)), np.empty((0, n, n))
     ones, others, other_bars = np.ones(n), np.zeros(n + 1), np.full(n + 1, math.inf)
     c, bars = np.empty((K, LANES)), np.empty((K, LANES))
-    z, y, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))
-    outputs = np.empty(LANES, np.int64)
+    z, y = np.empty((d, LANES)), np.empty((d, LANES))
+    outputs, found = np.empty(LANES, np.int64), np.empty(LANES, np.bool_)
     for first in range(0, N, LANES):
         count = min(LANES, N - first)
         for lane in range(count):
@@ -65,9 +62,10 @@ def answer_matrices(
             for k in range(K):
                 c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
         if d > 2:
-            _from_circle(c, d, z, y, parts)
+            from_circle(c, d, z, y)
         answer_lanes(
-            c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+            c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
+            found,
         )  # fmt: skip
 
 
@@ -163,33 +161,3 @@ def _in_sums(c, c_bars, m, change, out, out_bars, first, lane):
             total += c[m - j] * change[j, power]
             bound += (c_bars[m - j] + (m + 4) * EPS * abs(c[m - j])) * abs(change[j, power])
         out[first + i, lane], out_bars[first + i, lane] = total, bound
-
-
-@kernel
-def _from_circle(c, d, z, y, parts):
-    """Weierstrass's iteration from points of a circle until it converges as from near by."""
-    before = np.empty((2, d, LANES))
-    for lane in range(LANES):
-        radius = 1e-3
-        for k in range(d):
-            radius = max(radius, abs(c[k, lane]) ** (1.0 / (k + 1)))
-        for i in range(d):
-            angle = (2.0 * math.pi * i + 1.0) / d  # no mirror images
-            z[i, lane], y[i, lane] = radius * math.cos(angle), radius * math.sin(angle)
-    converged = np.zeros(LANES, np.bool_)
-    for _ in range(MOST):
-        before[0], before[1] = z, y
-        improve(c, d, z, y, parts)
-        left = False
-        for lane in range(LANES):
-            moved = largest = 0.0
-            for i in range(d):
-                if converged[lane]:  # what follows depends on no neighbour
-                    z[i, lane], y[i, lane] = before[0, i, lane], before[1, i, lane]
-                moved = max(moved, abs(z[i, lane] - before[0, i, lane]))
-                moved = max(moved, abs(y[i, lane] - before[1, i, lane]))
-                largest = max(largest, abs(z[i, lane]), abs(y[i, lane]))
-            converged[lane] = moved < CLOSE * largest
-            left = left or not converged[lane]
-        if not left:
-            return

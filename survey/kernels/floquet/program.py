@@ -1,7 +1,7 @@
 """The power series of a matrix A(t) in many steps at once: those of its basis functions, operation
 by operation.
 
-A matrix is a sum of `terms` (BASIS, ROW, COLUMN, NUMBER): number * basis function;
+A matrix is a sum of `terms` (BASIS, ROW, COLUMN, NUMBER), sorted by rows: number * basis function;
 `measures.floquet.trace` makes it of a user's code. `operations` (count, OPERATION) are the rows of
 the basis functions: LEFT and RIGHT those that they are made of, FIRST to LAST the rows of `inside`
 (ADDED, FACTOR) that a combination adds. The series of a function h(y) follows from h' y': RIGHT is

@@ -58,7 +58,8 @@ def factors(
     size = len(operations)
     S, X = np.zeros((size, ORDER + 1, lanes)), np.empty((ORDER + 1, n, n * lanes))
     B, C = np.zeros((size, ORDER + 1, n * lanes)), np.zeros((size, n, n * lanes))
-    V, W = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), n * lanes))
+    V, U = np.empty((numbers.shape[1], lanes)), np.empty((len(terms), lanes))
+    W = np.empty((len(terms), n * lanes))
     a = np.zeros((ORDER + 1, lanes))
     w = np.empty((ORDER + 1 + BEYOND, lanes))
     e = np.empty((ORDER + 1, lanes))
@@ -83,20 +84,19 @@ def factors(
             for k in range(numbers.shape[1]):
                 V[k, lane] = numbers[i, k]
             for k in range(len(terms)):
-                weight = numbers[i, terms[k, NUMBER]] * (
+                U[k, lane] = numbers[i, terms[k, NUMBER]] * (
                     scale[i, terms[k, COLUMN]] / scale[i, terms[k, ROW]]
                 )
-                for c in range(n):
-                    W[k, c * lanes + lane] = weight
+        times_step(U, s, n, W)
         X[0] = 0.0
         for i in range(n):
             X[0, i, i * lanes : (i + 1) * lanes] = 1.0
         w[0], e[0] = 1.0, 0.0
         for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
             extend(operations, signs, inside, order, V, t, s, S, k)
-            norm_of(S, W, terms, k, rows, a[k])
+            norm_of(S, U, terms, k, rows, a[k])
             if k < ORDER:
-                next_term(S, W, terms, used, needed, k, n, s, B, C, X)
+                next_term(S, W, terms, used, needed, k, n, B, C, X)
                 _row_norms(X[k + 1], lanes, rows[0], w[k + 1])
                 _rounded(a, w, e, own, s, k, most)
         _missing(a, w, e, s, total, of_both, of_odd)
@@ -119,13 +119,13 @@ def factors(
 
 
 @kernel
-def norm_of(S, W, terms, k, rows, out):
-    """The maximum norm of A's coefficient of order k, by rows."""
+def norm_of(S, U, terms, k, rows, out):
+    """The maximum norm of A's coefficient of order k, by rows; U (terms, lanes): the terms' numbers."""
     rows[:] = 0.0
     for q in range(len(terms)):
         if terms[q, BASIS] == ONE and k > 0:
             continue
-        row, basis, weight = rows[terms[q, ROW]], S[terms[q, BASIS], k], W[q]
+        row, basis, weight = rows[terms[q, ROW]], S[terms[q, BASIS], k], U[q]
         for lane in range(len(out)):
             row[lane] += abs(basis[lane] * weight[lane])
     out[:] = 0.0
@@ -136,13 +136,24 @@ def norm_of(S, W, terms, k, rows, out):
 
 
 @kernel
-def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
-    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j]; `needed` (basis, row) rows of X
-    are multiplied.
+def times_step(U, s, n, W):
+    """Fill W (terms, n lanes) with the numbers U (terms, lanes) times half the steps, s, for every column."""
+    lanes = len(s)
+    for q in range(len(U)):
+        one, own = U[q], W[q]
+        for c in range(n):
+            for lane in range(lanes):
+                own[c * lanes + lane] = one[lane] * s[lane]
+
+
+@kernel
+def next_term(S, W, terms, used, needed, k, n, B, C, X):
+    """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j], W from `times_step`; `needed` (basis,
+    row) rows of X are multiplied.
 
     Each row of X, C and B[basis, order] holds `lanes` numbers for every column, as one long vector.
     """
-    lanes = len(s)
+    lanes = S.shape[2]
     for at in range(len(used)):
         m = used[at]
         if m == ONE:
@@ -170,25 +181,35 @@ def next_term(S, W, terms, used, needed, k, n, s, B, C, X):
                     )
                     for q in range(n * lanes):
                         sums[q] += (b0[q] * x0[q] + b1[q] * x1[q]) + (b2[q] * x2[q] + b3[q] * x3[q])
-    new = X[k + 1]
-    new[:] = 0.0
-    for q in range(len(terms)):
-        one, weight = new[terms[q, ROW]], W[q]
-        two = (
-            X[k, terms[q, COLUMN]]
-            if terms[q, BASIS] == ONE
-            else C[terms[q, BASIS], terms[q, COLUMN]]
-        )
-        for i in range(n * lanes):
-            one[i] += weight[i] * two[i]
-    share = np.empty(lanes)
-    for lane in range(lanes):
-        share[lane] = s[lane] / (k + 1)
+    q, share = 0, 1.0 / (k + 1)
     for row in range(n):
-        one = new[row]
-        for c in range(n):
-            for lane in range(lanes):
-                one[c * lanes + lane] *= share[lane]
+        one, end = X[k + 1, row], q
+        while end < len(terms) and terms[end, ROW] == row:
+            end += 1
+        # two at once, so that the sum is read and written less often, and the first without it
+        if end == q:
+            one[:] = 0.0
+        elif (end - q) % 2 == 1:
+            w0, x0 = W[q], _behind(terms[q], k, C, X)
+            for i in range(n * lanes):
+                one[i] = (w0[i] * x0[i]) * share
+        else:
+            w0, w1 = W[q], W[q + 1]
+            x0, x1 = _behind(terms[q], k, C, X), _behind(terms[q + 1], k, C, X)
+            for i in range(n * lanes):
+                one[i] = (w0[i] * x0[i] + w1[i] * x1[i]) * share
+        for at in range(q + 2 - (end - q) % 2, end, 2):
+            w0, w1 = W[at], W[at + 1]
+            x0, x1 = _behind(terms[at], k, C, X), _behind(terms[at + 1], k, C, X)
+            for i in range(n * lanes):
+                one[i] += (w0[i] * x0[i] + w1[i] * x1[i]) * share
+        q = end
+
+
+@inline
+def _behind(term, k, C, X):
+    """What the number of a term multiplies at order k."""
+    return X[k, term[COLUMN]] if term[BASIS] == ONE else C[term[BASIS], term[COLUMN]]
 
 
 @kernel
@@ -199,12 +220,20 @@ def _rounded(a, w, e, own, s, k, most):
     new = e[k + 1]
     for lane in range(len(new)):
         new[lane] = own[lane] * w[k, lane]
-    for j in range(k + 1):
+    # a basis function's coefficient j, products, k - j sums, a row
+    least = k + 8.0 + most
+    for j in range((k + 1) % 2):
         one, two, before = a[j], w[k - j], e[k - j]
-        # a basis function's coefficient j, products, k - j sums, a row
-        count = ROUNDOFF_UP * (k + j + 6.0 + most)
         for lane in range(len(new)):
-            new[lane] += one[lane] * (before[lane] + count * two[lane])
+            new[lane] += one[lane] * (before[lane] + ROUNDOFF_UP * least * two[lane])
+    for j in range((k + 1) % 2, k + 1, 2):  # two at once, as in `next_term`
+        one, two, before = a[j], w[k - j], e[k - j]
+        one1, two1, before1 = a[j + 1], w[k - j - 1], e[k - j - 1]
+        count, count1 = ROUNDOFF_UP * (least + j), ROUNDOFF_UP * (least + j + 1)
+        for lane in range(len(new)):
+            new[lane] += one[lane] * (before[lane] + count * two[lane]) + one1[lane] * (
+                before1[lane] + count1 * two1[lane]
+            )
     for lane in range(len(new)):
         new[lane] *= s[lane] / (k + 1)
 
@@ -323,12 +352,17 @@ def _over(even, odd, of_both, of_odd, work, error):
 def _row_norms(A, lanes, work, out):
     """Fill out (lanes) with the largest sums of moduli in a row of A (n, n lanes)."""
     n = len(A)
+    fours = n - n % 4
     out[:] = 0.0
     for i in range(n):
         one = A[i]
-        for lane in range(lanes):
-            work[lane] = 0.0
-        for c in range(n):
+        work[:] = 0.0
+        for c in range(0, fours, 4):
+            c0, c1 = one[c * lanes : (c + 1) * lanes], one[(c + 1) * lanes : (c + 2) * lanes]
+            c2, c3 = one[(c + 2) * lanes : (c + 3) * lanes], one[(c + 3) * lanes : (c + 4) * lanes]
+            for lane in range(lanes):
+                work[lane] += (abs(c0[lane]) + abs(c1[lane])) + (abs(c2[lane]) + abs(c3[lane]))
+        for c in range(fours, n):
             for lane in range(lanes):
                 work[lane] += abs(one[c * lanes + lane])
         for lane in range(lanes):
@@ -529,37 +563,91 @@ def gradients(F, error, doubt, first, B, out):
     error d of a step adds sum of d_ij (X B L)_ji, X the product of the steps before it and L that
     of those behind it.
     """
-    n, K, longest = F.shape[1], B.shape[1], 0
-    for i in range(len(B)):
+    n, K, N = F.shape[1], B.shape[1], len(B)
+    lanes, longest = min(32 if n <= 4 else 8, N), 0  # bits do not depend on it
+    for i in range(N):
         longest = max(longest, first[i + 1] - first[i])
-    before, tops = np.empty((longest + 1, n, n)), np.empty(n)
-    A, Z = np.empty((n, n)), np.empty((n, n))
-    for i in range(len(B)):
-        steps, more = first[i + 1] - first[i], 0.0
-        set_identity(before[0])
-        for k in range(steps):
-            multiply(F[first[i] + k], before[k], 0.0, before[k + 1])
-            more += doubt[first[i] + k]
-        out[i] = 0.0
-        for q in range(K):
-            A[:] = B[i, q]
-            for k in range(steps - 1, -1, -1):
-                # A is B L
-                step, total, rounded = F[first[i] + k], 0.0, 0.0
-                multiply(before[k], A, 0.0, Z)
-                column_tops(before[k], tops)
+    # of points side by side: steps, products of those before them, largest moduli in their columns
+    L, before = np.zeros((longest, n, n, lanes)), np.zeros((longest + 1, n, n, lanes))
+    tops, weight, rounding = (
+        np.zeros((longest, n, lanes)),
+        np.zeros((longest, lanes)),
+        np.zeros((longest, lanes)),
+    )
+    A, Z, W = np.zeros((n, n, lanes)), np.zeros((n, n, lanes)), np.zeros((n, n, lanes))
+    more, sums = np.zeros(lanes), np.zeros(lanes)
+    largest, total, rounded = np.zeros(lanes), np.zeros(lanes), np.zeros(lanes)
+    for start in range(0, N, lanes):
+        most = 0
+        for lane in range(lanes):
+            i = min(start + lane, N - 1)
+            steps, more[lane] = first[i + 1] - first[i], 0.0
+            most = max(most, steps)
+            for k in range(longest):
+                there = k < steps  # behind the last step are steps that do nothing, without errors
+                weight[k, lane] = error[first[i] + k] if there else 0.0
+                more[lane] += doubt[first[i] + k] if there else 0.0
+                rounding[k, lane] = n * ROUNDOFF_UP * row_norm(F[first[i] + k]) if there else 0.0
+                for r in range(n):
+                    for c in range(n):
+                        L[k, r, c, lane] = F[first[i] + k, r, c] if there else 1.0 * (r == c)
+        for r in range(n):
+            before[0, r, r] = 1.0
+        for k in range(most):
+            _multiply_lanes(L[k], before[k], before[k + 1])
+            for r in range(n):
                 for c in range(n):
-                    largest = 0.0
-                    for j in range(n):
-                        largest = max(largest, abs(Z[j, c]))
-                        rounded += abs(A[j, c]) * tops[j]
-                    total += largest
-                out[i, q] += (
-                    error[first[i] + k] * total + n * ROUNDOFF_UP * row_norm(step) * rounded
-                )
-                multiply(A, step, 0.0, Z)
-                A[:] = Z
-            out[i, q] *= math.exp(min(2.0 * more, 700.0)) * (1.0 + 1e-9)
+                    own, one = tops[k, c], before[k, r, c]
+                    for lane in range(lanes):
+                        own[lane] = max(own[lane] if r > 0 else 0.0, abs(one[lane]))
+        for q in range(K):
+            sums[:] = 0.0
+            for lane in range(lanes):
+                for r in range(n):
+                    for c in range(n):
+                        A[r, c, lane] = B[min(start + lane, N - 1), q, r, c]
+            for k in range(most - 1, -1, -1):
+                # A is B L
+                _multiply_lanes(before[k], A, Z)
+                total[:] = 0.0
+                rounded[:] = 0.0
+                for c in range(n):
+                    largest[:] = 0.0
+                    for r in range(n):
+                        one, two, top = Z[r, c], A[r, c], tops[k, r]
+                        for lane in range(lanes):
+                            largest[lane] = max(largest[lane], abs(one[lane]))
+                            rounded[lane] += abs(two[lane]) * top[lane]
+                    for lane in range(lanes):
+                        total[lane] += largest[lane]
+                one, two = weight[k], rounding[k]
+                for lane in range(lanes):
+                    sums[lane] += one[lane] * total[lane] + two[lane] * rounded[lane]
+                _multiply_lanes(A, L[k], W)
+                A, W = W, A
+            for lane in range(min(lanes, N - start)):
+                factor = math.exp(min(2.0 * more[lane], 700.0)) * (1.0 + 1e-9)
+                out[start + lane, q] = sums[lane] * factor
+
+
+@kernel
+def _multiply_lanes(left, right, out):
+    """Fill out with the products of matrices (n, n, lanes)."""
+    n, lanes = len(out), out.shape[2]
+    fours = n - n % 4
+    for r in range(n):
+        for c in range(n):
+            own = out[r, c]
+            own[:] = 0.0
+            for m in range(0, fours, 4):
+                a0, a1, a2, a3 = left[r, m], left[r, m + 1], left[r, m + 2], left[r, m + 3]
+                b0, b1, b2, b3 = right[m, c], right[m + 1, c], right[m + 2, c], right[m + 3, c]
+                for q in range(lanes):
+                    own[q] += (a0[q] * b0[q] + a1[q] * b1[q]) + (a2[q] * b2[q] + a3[q] * b3[q])
+            for m in range(fours, n):
+                one, two = left[r, m], right[m, c]
+                for q in range(lanes):
+                    own[q] += one[q] * two[q]
 
 
 def compile_some():
@@ -577,7 +665,7 @@ def compile_others():
     one, two, three, _operations, which, terms = _zeros()
     needed, two_terms = np.zeros((1, 1), np.bool_), np.zeros((2, 1, 1))
     _over(two, two, one, one, np.zeros((4, 1, 1)), one)
-    next_term(three, two, terms[:0], which[:0], needed, 0, 1, one, three, three, two_terms)
+    next_term(three, two, terms[:0], which[:0], needed, 0, 1, three, three, two_terms)
     many = np.zeros((ORDER + 1 + BEYOND, 1))
     _missing(many, many, many, one, one, one, one)
 

@@ -50,12 +50,24 @@ _ONE_AT_A_TIME = threading.Lock()
 
 @dataclass(frozen=True)
 class Axis:
-    """An axis of the map: the parameter's number, the number of points, the least and the greatest."""
+    """An axis of the map: the parameter's number, the number of points, the least and the greatest
+    coordinate, which is 1 / the parameter if `inverse`, else the parameter.
+    """
 
     column: int
     number: int
     low: float
     high: float
+    inverse: bool = False
+
+    def coordinate(self, values):
+        """Coordinates of values of the parameter, and values of coordinates."""
+        return 1.0 / values if self.inverse else values
+
+    @property
+    def inverted(self):
+        """The same axis with 1 / the coordinate."""
+        return replace(self, low=1.0 / self.high, high=1.0 / self.low, inverse=not self.inverse)
 
 
 @dataclass(frozen=True)
@@ -78,7 +90,7 @@ class SeriesMap:
         """Points (N, parameters) at positions of the axes."""
         out = np.tile(np.array(self.fixed), (len(x[0]), 1))
         for axis, values in zip(self.axes, x, strict=True):
-            out[:, axis.column] = values
+            out[:, axis.column] = axis.coordinate(values)
         return out
 
 
@@ -119,6 +131,28 @@ def axes_of(lines):
     return tuple(
         sorted(sorted(some, key=lambda a: (-a.number, a.column))[:2], key=lambda a: a.column)
     )
+
+
+def _by_period(system, axes, fixed):
+    """The axes, with 1 / the parameter where the period is more nearly linear in it, as in that of a
+    frequency: M depends on products of the period and A, and series converge faster.
+    """
+    if not callable(system.period):
+        return axes
+    middles = {axis.column: 0.5 * (axis.low + axis.high) for axis in axes}
+    found = []
+    for axis in axes:
+        bends = []
+        for one in (axis, axis.inverted) if axis.low * axis.high > 0.0 else ():
+            points = np.tile(fixed, (3, 1))
+            for column, middle in middles.items():
+                points[:, column] = middle
+            points[:, axis.column] = one.coordinate(np.linspace(one.low, one.high, 3))
+            with np.errstate(all="ignore"):
+                first, second, third = system.periods(points)
+            bends.append(abs(first - 2.0 * second + third))
+        found.append(axis.inverted if bends and bends[1] < 0.5 * bends[0] else axis)
+    return tuple(found)
 
 
 def serves(system, structure, wanted, lines):
@@ -168,11 +202,14 @@ def solve(system, structure, points, rtol, wanted, lines, answer):
         fixed[[axis.column for axis in axes]] = 0.0
         if not np.isfinite(fixed).all():
             continue
-        key = SeriesMap(system, structure, rtol, flags(wanted), axes, tuple(fixed))
+        key = SeriesMap(
+            system, structure, rtol, flags(wanted), _by_period(system, axes, fixed), tuple(fixed)
+        )
         with _ONE_AT_A_TIME:
             found = panels(key)
-        rows = flat[own[:, 0], axes[0].column] if len(axes) == 2 else np.zeros(1)
-        columns = flat[own[0], axes[-1].column]
+        first, last = key.axes[0], key.axes[-1]
+        rows = first.coordinate(flat[own[:, 0], first.column]) if len(axes) == 2 else np.zeros(1)
+        columns = last.coordinate(flat[own[0], last.column])
         free = np.ones(own.shape, bool)
         for panel in found:
             x, y = (_scaled(values, panel, k) for k, values in ((0, rows), (-1, columns)))
@@ -199,11 +236,13 @@ def scattered(system, structure, points, rtol, wanted, ranges, answer):
     fixed[column] = 0.0
     if not np.isfinite(fixed).all():
         return left
+    axes = _by_period(system, axes, fixed)
     key = SeriesMap(system, structure, rtol, flags(wanted), axes, tuple(fixed))
     with _ONE_AT_A_TIME:
         found = panels(key)
+    at = [axis.coordinate(points[:, axis.column]) for axis in axes]
     for panel in found:
-        x = np.stack([_scaled(points[:, k], panel, side) for side, k in enumerate(column)])
+        x = np.stack([_scaled(values, panel, side) for side, values in enumerate(at)])
         inside = np.flatnonzero(left & (abs(x) <= 1.0).all(axis=0))
         if inside.size:
             _answer_points(key, panel, np.ascontiguousarray(x[:, inside]), inside, answer)
@@ -213,8 +252,10 @@ def scattered(system, structure, points, rtol, wanted, ranges, answer):
 
 def _scaled(values, panel, side):
     """Positions from -1 to 1; at an end rounding may leave it by what the bounds allow for."""
-    x = (values - panel.middle[side]) / panel.radius[side]
-    return np.where(abs(x) <= 1.0 + 4 * EPS, np.clip(x, -1.0, 1.0), x)
+    middle, radius = panel.middle[side], panel.radius[side]
+    x = (values - middle) / radius
+    most = 1.0 + 4 * EPS * max(1.0, abs(middle) / radius)
+    return np.where(abs(x) <= most, np.clip(x, -1.0, 1.0), x)
 
 
 def _answer(key, panel, x, y, outputs, answer):
@@ -411,24 +452,25 @@ def coefficients(M, E, scale, structure, steps_of=None):
     N, n = M.shape[:2]
     m = n // 2
     kept = n if structure == "none" else m
-    near = 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
-    own = np.linalg.eigvals(M).astype(complex)
-    c, moduli = np.zeros((N, n + 1), complex), np.zeros((N, n + 1))
-    c[:, 0] = moduli[:, 0] = 1.0
-    for i in range(n):
-        c[:, 1 : i + 2] -= own[:, i, None] * c[:, : i + 1]
-        moduli[:, 1 : i + 2] += abs(own[:, i, None]) * moduli[:, : i + 1]
-    powers, sums = np.empty((N, kept, n, n)), np.empty((N, 5, n + 1))
     M, E, units = (np.ascontiguousarray(values) for values in (M, E, scale))
-    others = np.ascontiguousarray(c.real), 4 * n * EPS * moduli
-    leverrier.coefficients(M, E, units, *others, near, powers, sums)
+    powers, sums = np.empty((N, kept, n, n)), np.empty((N, 5, n + 1))
+    unknown = np.full((N, n + 1), np.inf)
+    leverrier.coefficients(M, E, units, unknown, unknown, np.zeros(N), powers, sums)
+    rounded = sums[:, 1, 1 : kept + 1]
+    if steps_of is None:
+        more = sums[:, 2, 1 : kept + 1] - rounded
+    else:
+        more = np.empty((N, kept))
+        steps.gradients(*steps_of, powers, more)
+        more *= 1.001
+    rough = np.flatnonzero(~(2.0 * rounded < more).all(axis=1))
+    if rough.size:
+        sums[rough] = _by_eigenvalues(M[rough], E[rough], units[rough])
     c, rounded, bars, *form = np.moveaxis(sums, 1, 0)
     c, bars = c[:, : kept + 1], bars[:, : kept + 1]
     if steps_of is not None:
-        more = np.empty((N, kept))
-        steps.gradients(*steps_of, powers, more)
         bars = rounded[:, : kept + 1].copy()
-        bars[:, 1:] += 1.001 * more
+        bars[:, 1:] += more
     if structure == "none":
         return c[:, 1:], bars[:, 1:]
     values, doubts = _in_sums(c[:, ::-1], bars[:, ::-1], m)
@@ -438,6 +480,22 @@ def coefficients(M, E, scale, structure, steps_of=None):
             [doubts[:, 1:], forms[1]], axis=1
         )
     return values[:, 1:], doubts[:, 1:]
+
+
+def _by_eigenvalues(M, E, units):
+    """`sums` of `leverrier.coefficients` with the polynomial of the computed eigenvalues beside."""
+    N, n = M.shape[:2]
+    near = 8 * n * EPS * np.sqrt((M * M).sum(axis=(1, 2)))
+    own = np.linalg.eigvals(M).astype(complex)
+    c, moduli = np.zeros((N, n + 1), complex), np.zeros((N, n + 1))
+    c[:, 0] = moduli[:, 0] = 1.0
+    for i in range(n):
+        c[:, 1 : i + 2] -= own[:, i, None] * c[:, : i + 1]
+        moduli[:, 1 : i + 2] += abs(own[:, i, None]) * moduli[:, : i + 1]
+    others = np.ascontiguousarray(c.real), 4 * n * EPS * moduli
+    sums = np.empty((N, 5, n + 1))
+    leverrier.coefficients(M, E, units, *others, near, np.empty((N, 0, n, n)), sums)
+    return sums
 
 
 def _in_sums(c, bars, m):
@@ -468,7 +526,10 @@ def sums_of_powers(m):
 def _expanded(key, middle, radius, sizes, values, bars):
     """The RootPanel of values (nodes, K) at the nodes; None if a bound is not finite."""
     K = values.shape[1]
-    ulps = [(4 + abs(m) + r) / r for m, r in zip(middle, radius, strict=True)]
+    ulps = [
+        (4 + (1 + axis.inverse) * (abs(m) + r)) / r
+        for axis, m, r in zip(key.axes, middle, radius, strict=True)
+    ]
     n1, n2 = sizes if len(sizes) == 2 else (1, sizes[0])
     series = np.empty((n1, K, n2))
     doubts = []
@@ -487,14 +548,8 @@ def _expanded(key, middle, radius, sizes, values, bars):
     if not np.isfinite(doubts).all():
         return None
     d = key.system.n // (2 if key.paired else 1)
-    companion = np.zeros((len(values), d, d))
-    companion[:, 0] = -values[:, :d]
-    companion[:, np.arange(1, d), np.arange(d - 1)] = 1.0
-    roots = np.linalg.eigvals(companion)
-    starts = np.stack([roots.real, roots.imag], axis=-1).reshape(n1, n2, d, 2)
-    return RootPanel(
-        middle, radius, series.reshape(n1, K * n2), doubts, np.ascontiguousarray(starts)
-    )
+    starts = characteristic.roots(np.ascontiguousarray(values[:, :d])).reshape(n1, n2, d, 2)
+    return RootPanel(middle, radius, series.reshape(n1, K * n2), doubts, starts)
 
 
 def _in_parts(bars):

@@ -571,7 +571,7 @@ class Program:
             for basis, number in symbol.terms.items()
             if graph.numbers[number] != ("constant", 0.0)
         ]
-        terms.sort()
+        terms.sort(key=lambda term: (term[pg.ROW], *term))  # as the kernels ask for
         self.terms = np.array(terms, dtype=np.int64).reshape(-1, pg.TERM)
         self.used = np.unique(np.concatenate([[ONE], self.terms[:, pg.BASIS]])).astype(np.int64)
         rows, inside, weights = [], [], []

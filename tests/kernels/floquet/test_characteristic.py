@@ -150,3 +150,20 @@ def test_double_roots_are_left_to_the_point_itself():
         np.poly(roots)[1:], np.full(3, 1e-14), roots + np.array([1e-3, -1e-3, 0]), 3, False
     )
     assert answer.missed[0] and answer.verdict[0] == -1
+
+
+@pytest.mark.parametrize("n", [3, 4, 6])
+def test_complex_roots_are_found_from_real_ones_at_the_node(n):
+    """And real ones from complex ones: between a node and a point two of them may have met."""
+    rng = np.random.default_rng(n)
+    for near in 10.0 ** rng.uniform(-4, -0.5, size=40):
+        others = np.array([-0.7, 0.3j, -0.3j, 1.4])[: n - 2]
+        others = others if n == 4 else others.real + np.arange(n - 2) * 0.21
+        real, pair = 0.9 + near * np.array([1, -1]), 0.9 + near * np.array([1j, -1j])
+        for start, exact in ((real, pair), (pair, real)):
+            roots = np.concatenate([exact, others])
+            c = np.poly(roots)[1:].real
+            starts = np.concatenate([start, others]).astype(complex)
+            answer = answered(c, np.full(n, 1e-15), starts, n, False, rtol=1e-8)
+            assert not answer.missed[0]
+            assert inside(answer, roots_of(c, np.zeros(n))) <= 1.0

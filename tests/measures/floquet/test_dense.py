@@ -123,6 +123,29 @@ def test_exact_multipliers_of_a_map(n, rtol, solved):
     assert worst <= 1.0
 
 
+def test_a_frequency_is_replaced_by_its_inverse(solved):
+    """As the period is linear in that, half the points at nodes serve; the ends of the axis are
+    among those that series answer.
+    """
+    scene, _ends = MAPS["damped"]
+    line = {"W": np.linspace(1.0, 2.6, 1000), "e": 0.3}
+    found = survey.evaluate(scene, **line)
+    assert solved[0] < 110
+    solved[0] = 0
+    alone = survey.evaluate(scene, W=line["W"][[0, 1, 500, -2, -1]], e=0.3)
+    assert solved[0] >= 5
+    off = abs(found.spectral_radius.sel(W=alone.W) - alone.spectral_radius)
+    bars = found.spectral_radius_error.sel(W=alone.W) + alone.spectral_radius_error
+    assert (off <= bars).all()
+
+    (damped,) = (axis for axis in dense.axes_of({0: (1000, 1.0, 2.6)}))
+    fixed = np.array([1.5, 0.3])
+    (inverse,) = dense._by_period(scene._system, (damped,), fixed)
+    assert inverse.inverse and (inverse.low, inverse.high) == (1 / 2.6, 1.0)
+    (plain,) = dense._by_period(scene._system, (dense.Axis(1, 1000, 0.1, 0.6),), fixed)
+    assert not plain.inverse
+
+
 def test_one_axis_and_third_axes(solved):
     scene, _ends = MAPS["damped"]
     line = survey.evaluate(scene, W=np.linspace(1.0, 2.6, 400), e=0.3)
