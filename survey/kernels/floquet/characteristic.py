@@ -277,6 +277,25 @@ def answer_lanes(
     form = np.empty((2, d))
     _roots(c, d, z, y, parts)
     _corrections(c, d, bars, z, y, w, gap, parts, found)
+    if not (paired or asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
+        _radii(
+            z,
+            y,
+            w,
+            gap,
+            outputs,
+            count,
+            n,
+            asked,
+            rtol,
+            floats,
+            verdict,
+            crossing,
+            missed,
+            found,
+            parts,
+        )
+        return
     for lane in range(count):
         p = outputs[lane]
         widest = 0.0
@@ -310,6 +329,47 @@ def answer_lanes(
             missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
                 open_signs and (asked[KREIN] or asked[CROSSING])
             )
+
+
+@kernel
+def _radii(
+    z, y, w, gap, outputs, count, n, asked, rtol, floats, verdict, crossing, missed, found, parts
+):
+    """Write the spectral radius and the verdict alone, as `_write` does, from roots z + i y in lanes."""
+    widest, free, value, top, least = parts[0], parts[1], parts[2], parts[3], parts[4]
+    d, lanes = len(z), len(widest)
+    widest[:], value[:], top[:], least[:] = 0.0, 0.0, 0.0, 0.0
+    free[:] = math.inf
+    for i in range(d):
+        own = w[i]
+        for lane in range(lanes):
+            widest[lane] = max(widest[lane], own[lane]) if own[lane] >= 0.0 else math.inf
+    for i in range(d):
+        x, t, own, near = z[i], y[i], w[i], gap[i]
+        for lane in range(lanes):
+            free[lane] = min(free[lane], near[lane] - 2.0 * d * (own[lane] + widest[lane]))
+            bar = own[lane] * (1.0 + (d - 1) * min(1.0, 2.0 * widest[lane] / near[lane]))
+            im = (
+                t[lane] if abs(t[lane]) > bar else 0.0
+            )  # its mirror image would be in the same disc
+            size = math.sqrt(x[lane] * x[lane] + im * im)
+            value[lane], top[lane] = max(value[lane], size), max(top[lane], size + bar)
+            least[lane] = max(least[lane], size - bar)
+    for lane in range(count):
+        p, decided = outputs[lane], UNDECIDED
+        clear = widest[lane] < math.inf and free[lane] > 0.0
+        found[lane] = found[lane] and clear
+        most, fewest = top[lane] * (1.0 + 4.0 * EPS), least[lane] * (1.0 - 4.0 * EPS)
+        off = max(most - value[lane], value[lane] - fewest)
+        if clear:
+            decided = STABLE if most < 1.0 else UNSTABLE if fewest > 1.0 else UNDECIDED
+            floats[4 * n, p], floats[4 * n + 1, p] = value[lane], off
+        verdict[p], crossing[p] = decided, UNDECIDED
+        missed[p] = (
+            not clear
+            or (asked[VERDICT] and decided == UNDECIDED)
+            or (asked[RADIUS] and not off <= rtol * (1.0 + value[lane]))
+        )
 
 
 @kernel
@@ -462,10 +522,19 @@ def roots(c):
 @kernel
 def _value(c, d, x, t, pr, pi):
     """The polynomial at x + i t."""
-    pr[:], pi[:] = 1.0, 0.0
-    for k in range(d):
+    lanes, first = len(x), c[0]
+    for lane in range(lanes):
+        pr[lane], pi[lane] = x[lane] + first[lane], t[lane]
+    for k in range(1, d - 1, 2):  # two at once: half as many values are read and written
+        a, b = c[k], c[k + 1]
+        for lane in range(lanes):
+            real = pr[lane] * x[lane] - pi[lane] * t[lane] + a[lane]
+            imag = pr[lane] * t[lane] + pi[lane] * x[lane]
+            pr[lane] = real * x[lane] - imag * t[lane] + b[lane]
+            pi[lane] = real * t[lane] + imag * x[lane]
+    for k in range(d - 1 + d % 2, d):
         a = c[k]
-        for lane in range(len(x)):
+        for lane in range(lanes):
             real = pr[lane] * x[lane] - pi[lane] * t[lane] + a[lane]
             pi[lane] = pr[lane] * t[lane] + pi[lane] * x[lane]
             pr[lane] = real
@@ -474,13 +543,19 @@ def _value(c, d, x, t, pr, pi):
 @kernel
 def _product(z, y, i, d, qr, qi):
     """The product over j of z_i - z_j."""
-    qr[:], qi[:] = 1.0, 0.0
     x, t = z[i], y[i]
-    for j in range(d):
+    lanes, first = len(x), 0 if i > 0 else 1
+    if d == 1:
+        qr[:], qi[:] = 1.0, 0.0
+        return
+    u, v = z[first], y[first]
+    for lane in range(lanes):
+        qr[lane], qi[lane] = x[lane] - u[lane], t[lane] - v[lane]
+    for j in range(first + 1, d):
         if j == i:
             continue
         u, v = z[j], y[j]
-        for lane in range(len(x)):
+        for lane in range(lanes):
             a, b = x[lane] - u[lane], t[lane] - v[lane]
             real = qr[lane] * a - qi[lane] * b
             qi[lane] = qr[lane] * b + qi[lane] * a
@@ -523,7 +598,9 @@ def _corrections(c, d, bars, z, y, w, gap, parts, found):
             u, v = z[j], y[j]
             for lane in range(lanes):
                 a, b = x[lane] - u[lane], t[lane] - v[lane]
-                near[lane] = min(near[lane], math.sqrt(a * a + b * b))
+                near[lane] = min(near[lane], a * a + b * b)
+        for lane in range(lanes):
+            near[lane] = math.sqrt(near[lane])
 
 
 @kernel

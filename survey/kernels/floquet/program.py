@@ -87,9 +87,13 @@ def extend(operations, signs, inside, order, V, middle, half, S, n):
             plain = (code if code < OF_LINE else code - OF_LINE) - FUNCTIONS
             for lane in range(lanes):
                 own[lane] = function(plain, S[a, 0, lane])
+        elif code >= OF_LINE:
+            one, two, factor = S[a, 1], S[b, n - 1], signs[i] / n
+            for lane in range(lanes):
+                own[lane] = one[lane] * two[lane] * factor
         else:
             own[:] = 0.0
-            for k in range(1, n + 1 if code < OF_LINE else 2):
+            for k in range(1, n + 1):
                 one, two = S[a, k], S[b, n - k]
                 for lane in range(lanes):
                     own[lane] += k * one[lane] * two[lane]

@@ -31,8 +31,9 @@ from survey.measures.floquet import monodromy
 from survey.measures.floquet.answers import Answers
 from survey.measures.floquet.multipliers import not_symplectic
 
-DEGREES = np.array([8, 12, 16, 20, 24, 28, 32, 40])
-PROBED = 48  # nodes of the lines that show the degrees that are needed
+DEGREES = np.arange(8, 42, 2)
+# nodes of the lines that show the degrees that are needed: at first, and where these are too few
+FEW_PROBED, PROBED = 32, 48
 POINTS_PER_NODE = 4  # a panel pays if there are this many points for each that it solves
 SMALLEST = 16  # points of an axis
 FEWEST = 4096  # points on their own from which on series pay
@@ -363,28 +364,38 @@ def _degrees(key, middle, radius, budget):
     solved; and, on a line by itself, what `_coefficients` gives at its PROBED nodes and at TRIED.
     """
     sides = len(middle)
-    ends = [np.zeros(1)] if sides == 1 else [np.array([-0.97, 0.97])]
-    if 2.0 * PROBED * sides * len(ends[0]) > budget:
+    ends = [0.0] if sides == 1 else [-0.97, 0.97]
+    if 2.0 * PROBED * sides * len(ends) > budget:
         return None, 0, None
-    x = chebyshev.symmetric_nodes(PROBED)
-    needed = []
-    lines = [np.stack([x if k == side else np.full(PROBED, end) for k in range(sides)], axis=1)
-             for side in range(sides) for end in ends[0]]  # fmt: skip
-    given = np.concatenate([*lines, TRIED[:, :1]] if sides == 1 else lines)
-    known = _coefficients(key, middle, radius, given)
-    if known is None:
-        return None, len(given), None
-    nodes = PROBED * len(lines)
-    values, bars = (part[:nodes].reshape(sides, -1, PROBED, part.shape[1]) for part in known)
-    for side in range(sides):
-        most = 0
-        for line, bar in zip(values[side], bars[side], strict=True):
-            series = abs(chebyshev.by_columns(PROBED).T @ line)
-            noise = np.maximum(4.0 * bar.max(axis=0), 1e-15 * abs(line).max(axis=0))
-            noise = np.maximum(noise, 1e-3 * key.rtol * (1.0 + abs(line).min(axis=0)))
-            most = max(most, 1 + int(np.flatnonzero((series > noise).any(axis=1)).max(initial=0)))
-        needed.append(most + 4 if most < PROBED - 4 else 10 * PROBED)
-    return np.array(needed), len(given), known
+    needed, spent, open_ = np.zeros(sides, np.int64), 0, list(range(sides))
+    for number in (PROBED,) if sides == 1 else (FEW_PROBED, PROBED):
+        x = chebyshev.symmetric_nodes(number)
+        lines = [np.stack([x if k == side else np.full(number, end) for k in range(sides)], axis=1)
+                 for side in open_ for end in ends]  # fmt: skip
+        given = np.concatenate([*lines, TRIED[:, :1]] if sides == 1 else lines)
+        known = _coefficients(key, middle, radius, given)
+        spent += len(given)
+        if known is None:
+            return None, spent, None
+        values, bars = (
+            part[: number * len(lines)].reshape(len(open_), -1, number, part.shape[1])
+            for part in known
+        )
+        for side, *own in zip(open_, values, bars, strict=True):
+            terms = max(_terms(key, *line) for line in zip(*own, strict=True))
+            needed[side] = terms + 4 if terms < number - 4 else 10 * PROBED
+        open_ = [side for side in open_ if needed[side] > PROBED]
+        if not open_:
+            break
+    return needed, spent, known
+
+
+def _terms(key, line, bars):
+    """The number of terms that count in the series of coefficients (nodes, K) known within `bars`."""
+    series = abs(chebyshev.by_columns(len(line)).T @ line)
+    noise = np.maximum(4.0 * bars.max(axis=0), 1e-15 * abs(line).max(axis=0))
+    noise = np.maximum(noise, 1e-3 * key.rtol * (1.0 + abs(line).min(axis=0)))
+    return 1 + int(np.flatnonzero((series > noise).any(axis=1)).max(initial=0))
 
 
 def _coefficients(key, middle, radius, x):

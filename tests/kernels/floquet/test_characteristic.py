@@ -44,19 +44,23 @@ def inside(answer, exact):
 @pytest.mark.parametrize("n", [1, 2, 3, 4, 7, pytest.param(12, marks=pytest.mark.slow)])
 def test_roots_of_all_polynomials_within_the_doubts(n):
     rng, served, worst = np.random.default_rng(n), 0, 0.0
+    radius_of = slice(4 * n, 4 * n + 2), 0
     for _ in range(60):
         pairs = rng.integers(0, n // 2 + 1)
         own = rng.normal(size=pairs) + 1j * rng.normal(size=pairs)
         roots = np.concatenate([own, own.conj(), 1.5 * rng.normal(size=n - 2 * pairs)])
         c = np.poly(roots)[1:].real
         doubts = 10.0 ** rng.uniform(-13, -5) * rng.uniform(size=n)
-        answer = answered(
-            c,
-            doubts,
-            roots * (1 + 0.05 * rng.normal(size=n)) + 0.01j * rng.normal(size=n),
-            n,
-            False,
-        )
+        starts = roots * (1 + 0.05 * rng.normal(size=n)) + 0.01j * rng.normal(size=n)
+        answer = answered(c, doubts, starts, n, False)
+        if n > 2:  # of two states the radius alone is known better
+            alone = answered(c, doubts, starts, n, False, multipliers=False)
+            assert alone.missed[0] <= answer.missed[0]
+            if not answer.missed[0]:
+                assert alone.verdict[0] == answer.verdict[0]
+                np.testing.assert_allclose(
+                    alone.floats[radius_of], answer.floats[radius_of], rtol=1e-14
+                )
         if not np.isfinite(answer.floats).all() or answer.missed[0]:
             continue
         served += 1
