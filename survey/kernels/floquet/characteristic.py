@@ -93,11 +93,8 @@ def answer(
                     y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
             waiting = _answer_nearby(
                 c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-                found, others, other_places, waiting,
+                found, others, other_places, waiting, r == R - 1 and first + LANES >= L,
             )  # fmt: skip
-    _answer_others(
-        others, z, y, other_places, waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
-    )  # fmt: skip
 
 
 @inline
@@ -198,55 +195,42 @@ def answer_points(
                     sums[lane] += part[lane] * one[lane]
         waiting = _answer_nearby(
             c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-            found, others, other_places, waiting,
+            found, others, other_places, waiting, first + LANES >= N,
         )  # fmt: skip
-    _answer_others(
-        others, z, y, other_places, waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
-    )  # fmt: skip
 
 
 @kernel
 def _answer_nearby(
     c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-    found, others, other_outputs, waiting,
+    found, others, other_outputs, waiting, last,
 ):  # fmt: skip
     """As `answer_lanes`, from roots z + i y at the nearest node. Points whose roots are not found from
     these, as where real ones have become complex, are added to the `waiting` ones of `others`
-    (coefficients and bounds) and `other_outputs`; returns how many wait.
+    (coefficients and bounds) and `other_outputs`, which begin at a circle once there are LANES of
+    them, or these points are the `last`; returns how many wait.
     """
-    answer_lanes(
-        c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed, found
-    )  # fmt: skip
-    for lane in range(count if len(z) > 2 else 0):
-        if found[lane]:
-            continue
-        for k in range(len(c)):
-            others[0, k, waiting], others[1, k, waiting] = c[k, lane], bars[k, lane]
-        other_outputs[waiting] = outputs[lane]
-        waiting += 1
-        if waiting == LANES:
-            _answer_others(
-                others, z, y, other_outputs, waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
-            )  # fmt: skip
-            waiting = 0
-    return waiting
-
-
-@kernel
-def _answer_others(
-    others, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
-):
-    """Answer the points that wait, from roots on a circle."""
-    if count == 0:
-        return
-    c, bars, found = others[0], others[1], np.empty(LANES, np.bool_)
-    for lane in range(count, LANES):
-        for k in range(len(c)):
-            c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
-    from_circle(c, len(z), z, y)
-    answer_lanes(
-        c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed, found
-    )  # fmt: skip
+    lane, own, other_found = 0, True, np.empty(LANES, np.bool_)
+    while True:
+        # one call of `answer_lanes`: it is compiled once
+        answer_lanes(
+            c if own else others[0], bars if own else others[1], z, y, outputs if own else other_outputs,
+            count if own else waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
+            found if own else other_found,
+        )  # fmt: skip
+        waiting, own = waiting if own else 0, False
+        while lane < count and waiting < LANES:
+            if len(z) > 2 and not found[lane]:
+                for k in range(len(c)):
+                    others[0, k, waiting], others[1, k, waiting] = c[k, lane], bars[k, lane]
+                other_outputs[waiting] = outputs[lane]
+                waiting += 1
+            lane += 1
+        if waiting == 0 or (waiting < LANES and not last):
+            return waiting
+        for free in range(waiting, LANES):
+            for k in range(len(c)):
+                others[0, k, free], others[1, k, free] = others[0, k, 0], others[1, k, 0]
+        from_circle(others[0], len(z), z, y)
 
 
 @kernel
