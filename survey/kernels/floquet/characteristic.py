@@ -37,41 +37,58 @@ TIE = 1e-9
 
 
 @kernel
-def answer(
-    series,
-    doubts,
-    x,
-    places,
-    near,
-    starts,
-    outputs,
-    n,
-    paired,
-    asked,
-    rtol,
-    floats,
-    signs,
-    verdict,
-    crossing,
-    missed,
-):
-    """Answer the points `outputs` (R, L) of rows at x (R), columns at `places` (L): columns of `floats`,
-    `signs`, ... as in `stability.Answers`.
+def answer(c, bars, z, y, points, n, paired, asked, rtol, floats, signs, verdict, crossing, missed):
+    """Answer blocks of LANES points from their coefficients c, known to within `bars` (blocks, K,
+    LANES), and the roots z + i y at the nearest nodes (blocks, d, LANES), which are used up.
 
-    series (n1, K m), of K coefficients, m terms along the row each. near (R + L): the part of each
-    row, then of each column, of which each node has PARTS; doubts (K, parts, parts): how well the
-    coefficients are known there; starts (n1, m, d, 2): the roots at the nodes. Of K = 2 d
-    coefficients the last d are those of the Krein form.
+    points (blocks, LANES): their columns of `floats`, `signs`, ... as in `stability.Answers`; -1 where a block ends
+    earlier. Of K = 2 d coefficients the last d are those of the Krein form. Points whose roots are not found from those
+    of the node, as where real ones have become complex, begin at a circle once all others are answered.
     """
-    K, m, d, R, L = len(doubts), starts.shape[1], starts.shape[2], len(x), outputs.shape[1]
+    blocks, K, d = len(c), c.shape[1], z.shape[1]
+    own_c, own_bars = np.empty((K, LANES)), np.empty((K, LANES))
+    own_points, found = np.empty(LANES, np.int64), np.empty(LANES, np.bool_)
+    left, number, done, b = np.empty(blocks * LANES, np.int64), 0, 0, 0
+    while b < blocks or done < number:
+        later, own = b == blocks, min(b, blocks - 1)
+        count = min(LANES, number - done) if later else 0
+        if later:
+            for lane in range(LANES):
+                block, place = divmod(left[done + min(lane, count - 1)], LANES)
+                own_points[lane] = points[block, place]
+                for k in range(K):
+                    own_c[k, lane], own_bars[k, lane] = c[block, k, place], bars[block, k, place]
+            from_circle(own_c, d, z[own], y[own])
+        while not later and count < LANES and points[b, count] >= 0:
+            count += 1
+        answer_lanes(  # called once, and so compiled once
+            own_c if later else c[b], own_bars if later else bars[b], z[own], y[own],
+            own_points if later else points[b], count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
+            found,
+        )  # fmt: skip
+        if later:
+            done += LANES
+            continue
+        for lane in range(count if d > 2 else 0):
+            if not found[lane]:
+                left[number] = b * LANES + lane
+                number += 1
+        b += 1
+
+
+@kernel
+def fill_rows(series, doubts, x, places, near, starts, outputs, needed, c, bars, z, y, points):
+    """Fill c, bars, z, y and `points` of `answer` for the points `outputs` (R, L) of rows at x (R),
+    columns at `places` (L); each row has blocks of its own.
+
+    series (n1, K m), of K coefficients, of which the first are `needed`, m terms along the row each. near (R + L): the
+    part of each row, then of each column, of which each node has PARTS; doubts (K, parts, parts):
+    how well the coefficients are known there; starts (n1, m, d, 2): the roots at the nodes.
+    """
+    K, m, R, L = len(doubts), starts.shape[1], len(x), outputs.shape[1]
     rows, table = np.empty((R, K * m)), np.empty((m, LANES))
     restrict(series, x, np.empty((2, K * m)), rows)
-    c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
-    z, y = np.empty((d, LANES)), np.empty((d, LANES))
-    # of points whose roots are not found from those of the node
-    others, other_places, waiting = np.empty((2, K, LANES)), np.empty(LANES, np.int64), 0
-    found = np.empty(LANES, np.bool_)
-    needed = d if _is_short(n, asked) else K
+    of_row = (L + LANES - 1) // LANES
     for first in range(0, L, LANES):
         count = min(LANES, L - first)
         for lane in range(LANES):
@@ -80,25 +97,28 @@ def answer(
                 table[1, lane] = places[first + min(lane, count - 1)]
         _polynomials(table)
         for r in range(R):
+            b = r * of_row + first // LANES
             for k in range(needed):
-                _sum(rows[r, k * m : (k + 1) * m], table, c[k])
+                _sum(rows[r, k * m : (k + 1) * m], table, c[b, k])
             for lane in range(LANES):
                 column = first + min(lane, count - 1)
-                own_places[lane] = outputs[r, column]
+                points[b, lane] = outputs[r, column] if lane < count else -1
                 one, two = near[r], near[R + column]
-                for k in range(needed):
-                    bars[k, lane] = doubts[k, one, two]
-                for i in range(d if d > 2 else 0):
-                    z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
-                    y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
-            waiting = _answer_nearby(
-                c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-                found, others, other_places, waiting, r == R - 1 and first + LANES >= L,
-            )  # fmt: skip
+                _nearest(doubts, starts, one, two, needed, bars[b], z[b], y[b], lane)
 
 
 @inline
-def _is_short(n, asked):
+def _nearest(doubts, starts, one, two, needed, bars, z, y, lane):
+    """Set the bounds, and the roots where they are of use, of a point in the parts `one` and `two`."""
+    for k in range(needed):
+        bars[k, lane] = doubts[k, one, two]
+    for i in range(len(z) if len(z) > 2 else 0):
+        z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
+        y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
+
+
+@kernel
+def is_short(n, asked):
     """Is all that is asked answered by `_of_two`?"""
     return n == 2 and not (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN])
 
@@ -120,55 +140,28 @@ def _sum(weights, table, sums):
 
 
 @kernel
-def answer_points(
-    series,
-    terms,
-    doubts,
-    x,
-    near,
-    starts,
-    outputs,
-    n,
-    paired,
-    asked,
-    rtol,
-    floats,
-    signs,
-    verdict,
-    crossing,
-    missed,
-):
-    """As `answer`, of points at x (2, N), each with coordinates of its own; near (2, N).
+def fill_points(series, terms, doubts, x, near, starts, outputs, needed, c, bars, z, y, points):
+    """As `fill_rows`, for points at x (2, N), each with coordinates of its own; near (2, N).
 
     terms (K, m): how many across the rows count of each series along them.
     """
-    K, m, d, n1, N = len(doubts), starts.shape[1], starts.shape[2], len(series), x.shape[1]
+    m, n1, N = starts.shape[1], len(series), x.shape[1]
     across, along, part = np.empty((n1, LANES)), np.empty((m, LANES)), np.empty(LANES)
-    c, bars, own_places = np.empty((K, LANES)), np.empty((K, LANES)), np.empty(LANES, np.int64)
-    z, y = np.empty((d, LANES)), np.empty((d, LANES))
-    # of points whose roots are not found from those of the node
-    others, other_places, waiting = np.empty((2, K, LANES)), np.empty(LANES, np.int64), 0
-    found = np.empty(LANES, np.bool_)
-    needed = d if _is_short(n, asked) else K
     for first in range(0, N, LANES):
-        count = min(LANES, N - first)
+        b, count = first // LANES, min(LANES, N - first)
         for lane in range(LANES):
             p = first + min(lane, count - 1)
-            across[0, lane], along[0, lane], own_places[lane] = 1.0, 1.0, outputs[p]
+            points[b, lane] = outputs[p] if lane < count else -1
+            across[0, lane], along[0, lane] = 1.0, 1.0
             if n1 > 1:
                 across[1, lane] = x[0, p]
             if m > 1:
                 along[1, lane] = x[1, p]
-            one, two = near[0, p], near[1, p]
-            for k in range(needed):
-                bars[k, lane] = doubts[k, one, two]
-            for i in range(d if d > 2 else 0):
-                z[i, lane] = starts[one // PARTS, two // PARTS, i, 0]
-                y[i, lane] = starts[one // PARTS, two // PARTS, i, 1]
+            _nearest(doubts, starts, near[0, p], near[1, p], needed, bars[b], z[b], y[b], lane)
         _polynomials(across)
         _polynomials(along)
         for k in range(needed):
-            sums = c[k]
+            sums = c[b, k]
             sums[:] = 0.0
             for j in range(m - 1, -1, -1):
                 part[:] = 0.0
@@ -193,44 +186,6 @@ def answer_points(
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]
-        waiting = _answer_nearby(
-            c, bars, z, y, own_places, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-            found, others, other_places, waiting, first + LANES >= N,
-        )  # fmt: skip
-
-
-@kernel
-def _answer_nearby(
-    c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-    found, others, other_outputs, waiting, last,
-):  # fmt: skip
-    """As `answer_lanes`, from roots z + i y at the nearest node. Points whose roots are not found from
-    these, as where real ones have become complex, are added to the `waiting` ones of `others`
-    (coefficients and bounds) and `other_outputs`, which begin at a circle once there are LANES of
-    them, or these points are the `last`; returns how many wait.
-    """
-    lane, own, other_found = 0, True, np.empty(LANES, np.bool_)
-    while True:
-        # one call of `answer_lanes`: it is compiled once
-        answer_lanes(
-            c if own else others[0], bars if own else others[1], z, y, outputs if own else other_outputs,
-            count if own else waiting, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-            found if own else other_found,
-        )  # fmt: skip
-        waiting, own = waiting if own else 0, False
-        while lane < count and waiting < LANES:
-            if len(z) > 2 and not found[lane]:
-                for k in range(len(c)):
-                    others[0, k, waiting], others[1, k, waiting] = c[k, lane], bars[k, lane]
-                other_outputs[waiting] = outputs[lane]
-                waiting += 1
-            lane += 1
-        if waiting == 0 or (waiting < LANES and not last):
-            return waiting
-        for free in range(waiting, LANES):
-            for k in range(len(c)):
-                others[0, k, free], others[1, k, free] = others[0, k, 0], others[1, k, 0]
-        from_circle(others[0], len(z), z, y)
 
 
 @kernel
@@ -251,7 +206,7 @@ def answer_lanes(
     (LANES): has each root a disc of its own, which no step more would narrow much?
     """
     K, d = len(c), len(z)
-    if _is_short(n, asked):
+    if is_short(n, asked):
         _of_two(c, bars, outputs, count, paired, asked, rtol, floats, verdict, crossing, missed)
         return
     w, gap, parts = np.empty((d, LANES)), np.empty((d, LANES)), np.empty((6, LANES))

@@ -24,7 +24,7 @@ from functools import lru_cache
 import numpy as np
 
 from survey.kernels.floquet import characteristic, leverrier, steps
-from survey.kernels.floquet.characteristic import PARTS
+from survey.kernels.floquet.characteristic import LANES, PARTS
 from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import monodromy
@@ -44,6 +44,7 @@ MOST = 0.9  # the share of the nodes answered to the requested accuracy from whi
 # points that are no nodes
 TRIED = np.array([[0.137, -0.713], [-0.551, 0.318], [0.862, 0.907], [-0.934, -0.269]])
 LARGEST = 12  # states
+TOGETHER = 4096  # points that are answered together: what they need fits into the cache
 SERVED = frozenset({"multiplier_re", "multiplier_im", "spectral_radius", "exponent", "period", "krein", "crossing",
                     "verdict"})  # fmt: skip
 _ONE_AT_A_TIME = threading.Lock()
@@ -106,6 +107,11 @@ class RootPanel:
     series: np.ndarray
     doubts: np.ndarray
     starts: np.ndarray
+
+    @property
+    def sizes(self):
+        """The numbers of nodes (n1, n2)."""
+        return self.starts.shape[:2]
 
 
 def flags(wanted):
@@ -261,28 +267,64 @@ def _scaled(values, panel, side):
 
 def _answer(key, panel, x, y, outputs, answer):
     """Answer the points of a panel at x (rows), y (columns), between -1 and 1."""
-    n1, K = len(panel.series), len(panel.doubts)
-    near = np.concatenate([_part(x, n1), _part(y, panel.series.shape[1] // K)])
-    characteristic.answer(
-        panel.series, panel.doubts, *map(np.ascontiguousarray, (x, y)), near, panel.starts,
-        np.ascontiguousarray(outputs), key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats,
-        answer.signs, answer.verdict, answer.crossing, answer.missed,
-    )  # fmt: skip
+    n1, n2 = panel.sizes
+    near = _part(x, n1), _part(y, n2)
+    columns = min(len(y), TOGETHER)
+    rows = max(1, TOGETHER // columns)
+    blocks = _Blocks(key, panel, rows * -(-columns // LANES))
+    for i in range(0, len(x), rows):
+        for j in range(0, len(y), columns):
+            own, places = slice(i, i + rows), slice(j, j + columns)
+            some = np.ascontiguousarray(outputs[own, places])
+            given = (
+                panel.series, panel.doubts, np.ascontiguousarray(x[own]), np.ascontiguousarray(y[places]),
+                np.concatenate([near[0][own], near[1][places]]), panel.starts, some, blocks.needed,
+            )  # fmt: skip
+            used = blocks.first(len(some) * -(-some.shape[1] // LANES))
+            characteristic.fill_rows(*given, *used)
+            blocks.answer(used, answer)
 
 
 def _answer_points(key, panel, x, outputs, answer):
     """Answer the points of a panel at x (2, N), each between -1 and 1."""
-    n1, K = len(panel.series), len(panel.doubts)
-    n2 = panel.series.shape[1] // K
+    n1, n2 = panel.sizes
     near = np.stack([_part(x[0], n1), _part(x[1], n2)])
     # terms beyond these, of all n2 series, are a tenth of the bounds at most
-    rest = np.cumsum(abs(panel.series[::-1]), axis=0)[::-1].reshape(n1, K, n2)
+    rest = np.cumsum(abs(panel.series[::-1]), axis=0)[::-1].reshape(n1, -1, n2)
     terms = (rest > 0.1 * panel.doubts.min(axis=(1, 2))[:, None] / n2).sum(axis=0)
-    characteristic.answer_points(
-        panel.series, terms, 1.1 * panel.doubts, x, near, panel.starts, outputs,
-        key.system.n, key.paired, np.array(key.asked), key.rtol, answer.floats, answer.signs,
-        answer.verdict, answer.crossing, answer.missed,
-    )  # fmt: skip
+    doubts, blocks = 1.1 * panel.doubts, _Blocks(key, panel, TOGETHER // LANES)
+    for i in range(0, len(outputs), TOGETHER):
+        own = slice(i, i + TOGETHER)
+        given = (
+            panel.series, terms, doubts, np.ascontiguousarray(x[:, own]), np.ascontiguousarray(near[:, own]),
+            panel.starts, outputs[own], blocks.needed,
+        )  # fmt: skip
+        used = blocks.first(-(-len(outputs[own]) // LANES))
+        characteristic.fill_points(*given, *used)
+        blocks.answer(used, answer)
+
+
+class _Blocks:
+    """What `characteristic.answer` takes, of a number of blocks of points."""
+
+    def __init__(self, key, panel, number):
+        self.key, self.asked = key, np.array(key.asked)
+        K, d = len(panel.doubts), panel.starts.shape[2]
+        self.needed = d if characteristic.is_short(key.system.n, self.asked) else K
+        of_coefficients, of_roots = (number, K, LANES), (number, d, LANES)
+        shapes = of_coefficients, of_coefficients, of_roots, of_roots
+        self.arrays = *map(np.empty, shapes), np.empty((number, LANES), np.int64)
+
+    def first(self, number):
+        """The arrays of the first blocks."""
+        return tuple(values[:number] for values in self.arrays)
+
+    def answer(self, used, answer):
+        key = self.key
+        characteristic.answer(
+            *used, key.system.n, key.paired, self.asked, key.rtol, answer.floats, answer.signs, answer.verdict,
+            answer.crossing, answer.missed,
+        )  # fmt: skip
 
 
 def _part(x, n):
