@@ -90,7 +90,7 @@ BRUN = [
     "lanes_double:end",
     "brun_lanes:enter",
 ]
-FLOQUET = ["steps:_over", "steps:next_term", "steps:_missing", "steps:products"]
+FLOQUET = ["leverrier:answer_matrices"]
 DANBY = ["danby_double:chain", "traces_double:measure"]
 
 

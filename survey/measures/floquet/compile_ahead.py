@@ -4,14 +4,10 @@
 
 import numpy as np
 
-from survey.kernels.floquet import discs, steps
+from survey.measures.floquet import monodromy, stability
 
 
 def compile_ahead(variables, options):
-    """Compile kernels of the steps, then what follows them, by calls on next to nothing."""
-    steps.compile_others()
-    yield
-    steps.compile_further()
-    real = np.zeros((1, 1, 1))
-    vectors = np.ones((1, 1, 1), np.complex128)
-    discs.couplings(real, real, real, vectors[0], vectors, vectors, real.copy())
+    """Compile what answers from monodromy matrices, while the other process compiles what makes them."""
+    matrices = monodromy.Matrices.plain(0.5 * np.eye(2)[None], np.zeros((1, 2, 2)))
+    stability.by_coefficients(matrices, "none", 1e-10, {"verdict"})

@@ -23,6 +23,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from survey import waiting
 from survey.kernels.floquet import characteristic, leverrier, steps
 from survey.kernels.floquet.characteristic import LANES, PARTS
 from survey.kernels.math import chebyshev
@@ -321,6 +322,7 @@ class _Blocks:
 
     def answer(self, used, answer):
         key = self.key
+        waiting.wait()
         characteristic.answer(
             *used, key.system.n, key.paired, self.asked, key.rtol, answer.floats, answer.signs, answer.verdict,
             answer.crossing, answer.missed,

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from survey import measures, waiting
+from survey import measures
 from survey.kernels.floquet import sizes, steps
 from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -279,9 +279,6 @@ def _call(points, method, those, row_at, group, count, sharp):
             np.empty(ways * point.size),
             np.empty(ways * point.size),
         )
-        if waiting.other_compiler:
-            steps.compile_some()
-            waiting.wait()
         method.floquet_factors(
             program.operations, program.signs, program.inside, program.order, program.used, program.terms,
             np.ascontiguousarray(values[row_at]), scale, noise, n, point, middle, half, *found,
@@ -293,7 +290,6 @@ def _call(points, method, those, row_at, group, count, sharp):
         F[where], error[where], doubt[where] = found
         images.complete(F, error, doubt, offset, steps_of)
         offset += steps_of * parts[k]
-    waiting.wait()
     found = Matrices.empty(len(those), n)
     steps.products(F, error, doubt, first, n, found.M, found.E, found.R)
     if callable(sharp):

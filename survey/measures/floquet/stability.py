@@ -10,7 +10,7 @@ undecided   the error bounds allow either
 
 import numpy as np
 
-from survey import status
+from survey import status, waiting
 from survey.kernels.floquet import leverrier
 from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
@@ -94,6 +94,7 @@ def by_coefficients(matrices, structure, rtol, asked, period=None, growth=None):
         with np.errstate(over="ignore", invalid="ignore"):
             det = np.exp(growth[0]) * np.stack([np.ones(N), np.expm1(growth[1]) + 8 * EPS])
     found.floats[:] = np.nan
+    waiting.wait()
     leverrier.answer_matrices(
         M, E, det, change, forms, paired, np.array(dense.flags(asked)), rtol, found.floats, found.signs,
         found.verdict, found.crossing, found.missed,
