@@ -121,18 +121,22 @@ def factors(
 @kernel
 def norm_of(S, U, terms, k, rows, out):
     """The maximum norm of A's coefficient of order k, by rows; U (terms, lanes): the terms' numbers."""
-    rows[:] = 0.0
-    for q in range(len(terms)):
-        if terms[q, BASIS] == ONE and k > 0:
-            continue
-        row, basis, weight = rows[terms[q, ROW]], S[terms[q, BASIS], k], U[q]
-        for lane in range(len(out)):
-            row[lane] += abs(basis[lane] * weight[lane])
+    sums, q = rows[0], 0
     out[:] = 0.0
-    for i in range(len(rows)):
-        row = rows[i]
-        for lane in range(len(out)):
-            out[lane] = max(out[lane], row[lane])
+    while q < len(terms):
+        row, known = terms[q, ROW], False
+        while q < len(terms) and terms[q, ROW] == row:
+            if terms[q, BASIS] != ONE or k == 0:
+                basis, weight = S[terms[q, BASIS], k], U[q]
+                if not known:
+                    sums[:] = 0.0
+                    known = True
+                for lane in range(len(out)):
+                    sums[lane] += abs(basis[lane] * weight[lane])
+            q += 1
+        if known:
+            for lane in range(len(out)):
+                out[lane] = max(out[lane], sums[lane])
 
 
 @kernel
