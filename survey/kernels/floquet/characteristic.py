@@ -218,22 +218,8 @@ def answer_lanes(
     _corrections(c, d, bars, z, y, w, gap, parts, found)
     if not (paired or asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
         _radii(
-            z,
-            y,
-            w,
-            gap,
-            outputs,
-            count,
-            n,
-            asked,
-            rtol,
-            floats,
-            verdict,
-            crossing,
-            missed,
-            found,
-            parts,
-        )
+            z, y, w, gap, outputs, count, n, asked, rtol, floats, verdict, crossing, missed, found, parts
+        )  # fmt: skip
         return
     for lane in range(count):
         p = outputs[lane]
@@ -288,9 +274,8 @@ def _radii(
         for lane in range(lanes):
             free[lane] = min(free[lane], near[lane] - 2.0 * d * (own[lane] + widest[lane]))
             bar = own[lane] * (1.0 + (d - 1) * min(1.0, 2.0 * widest[lane] / near[lane]))
-            im = (
-                t[lane] if abs(t[lane]) > bar else 0.0
-            )  # its mirror image would be in the same disc
+            # 0 where its mirror image would be in the same disc
+            im = t[lane] if abs(t[lane]) > bar else 0.0
             size = math.sqrt(x[lane] * x[lane] + im * im)
             value[lane], top[lane] = max(value[lane], size), max(top[lane], size + bar)
             least[lane] = max(least[lane], size - bar)
