@@ -404,7 +404,9 @@ def from_circle(c, d, z, y):
             z[i, lane], y[i, lane] = radius * math.cos(angle), radius * math.sin(angle)
     converged = np.zeros(LANES, np.bool_)
     for _ in range(MOST):
-        before[0], before[1] = z, y
+        for i in range(d):
+            for lane in range(LANES):
+                before[0, i, lane], before[1, i, lane] = z[i, lane], y[i, lane]
         improve(c, d, z, y, parts)
         left = False
         for lane in range(LANES):

@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from survey.kernels.floquet.characteristic import LANES, answer_lanes, from_circle
+from survey.kernels.floquet.steps import copy
 from survey.kernels.jit import kernel
 from survey.kernels.math.roundoff import EPS
 
@@ -102,7 +103,7 @@ def _leverrier(M, E, units, others, other_bars, near, powers, squares, sums):
     c[0], rounded[0], bars[0], form[0], form_bars[0] = 1.0, 0.0, 0.0, 0.0, 0.0
     for k in range(1, n + 1):
         if k <= len(powers):
-            powers[k - 1] = B
+            copy(B, powers[k - 1])
         shift = trace = doubt = moduli = 0.0
         for i in range(n):
             for j in range(n):
