@@ -164,25 +164,7 @@ def fill_points(series, terms, doubts, x, near, starts, outputs, needed, c, bars
             sums = c[b, k]
             sums[:] = 0.0
             for j in range(m - 1, -1, -1):
-                part[:] = 0.0
-                fours = terms[k, j] - terms[k, j] % 4
-                for i in range(terms[k, j] - 1, fours - 1, -1):
-                    weight, one = series[i, k * m + j], across[i]
-                    for lane in range(LANES):
-                        part[lane] += weight * one[lane]
-                for i in range(fours - 4, -1, -4):  # four at once, as in `_sum`
-                    at = k * m + j
-                    w0, w1, w2, w3 = (
-                        series[i, at],
-                        series[i + 1, at],
-                        series[i + 2, at],
-                        series[i + 3, at],
-                    )
-                    t0, t1, t2, t3 = across[i], across[i + 1], across[i + 2], across[i + 3]
-                    for lane in range(LANES):
-                        part[lane] += (w0 * t0[lane] + w1 * t1[lane]) + (
-                            w2 * t2[lane] + w3 * t3[lane]
-                        )
+                _sum(series[: terms[k, j], k * m + j], across, part)
                 one = along[j]
                 for lane in range(LANES):
                     sums[lane] += part[lane] * one[lane]

@@ -45,8 +45,7 @@ def flow(
     C = np.zeros((len(operations), n, n * lanes))
     P, W = np.zeros((ORDER + 1, n, n * lanes)), np.zeros((len(terms), n * lanes))
     U = np.zeros((len(terms), lanes))
-    rows = np.zeros((n, lanes))
-    a = np.zeros(lanes)
+    sums, a = np.zeros(lanes), np.zeros(lanes)
     needed = np.zeros((len(operations), n), np.bool_)
     for k in range(len(terms)):
         needed[terms[k, BASIS], terms[k, COLUMN]] = True
@@ -83,7 +82,7 @@ def flow(
             for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
                 extend(operations, signs, inside, order, V, t, s, S, k)
                 if k == 0:
-                    norm_of(S, U, terms, k, rows, a)
+                    norm_of(S, U, terms, k, sums, a)
                 if derived and k < ORDER:
                     next_term(S, W, terms, used, needed, k, n, B, C, P)
             for lane in range(count):

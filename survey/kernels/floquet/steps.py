@@ -63,7 +63,7 @@ def factors(
     a = np.zeros((ORDER + 1, lanes))
     w = np.empty((ORDER + 1 + BEYOND, lanes))
     e = np.empty((ORDER + 1, lanes))
-    rows, t, s, own = np.empty((n, lanes)), np.empty(lanes), np.empty(lanes), np.empty(lanes)
+    sums, t, s, own = np.empty(lanes), np.empty(lanes), np.empty(lanes), np.empty(lanes)
     even = np.empty((n, n * lanes))
     odd = np.empty((n, n * lanes))
     work = np.empty((4, n, n * lanes))
@@ -94,10 +94,10 @@ def factors(
         w[0], e[0] = 1.0, 0.0
         for k in range(ORDER + 1):  # one call of each kernel: it is compiled once
             extend(operations, signs, inside, order, V, t, s, S, k)
-            norm_of(S, U, terms, k, rows, a[k])
+            norm_of(S, U, terms, k, sums, a[k])
             if k < ORDER:
                 next_term(S, W, terms, used, needed, k, n, B, C, X)
-                _row_norms(X[k + 1], lanes, rows[0], w[k + 1])
+                _row_norms(X[k + 1], lanes, sums, w[k + 1])
                 _rounded(a, w, e, own, s, k, most)
         _missing(a, w, e, s, total, of_both, of_odd)
         for way in range(ways):
@@ -119,9 +119,9 @@ def factors(
 
 
 @kernel
-def norm_of(S, U, terms, k, rows, out):
+def norm_of(S, U, terms, k, sums, out):
     """The maximum norm of A's coefficient of order k, by rows; U (terms, lanes): the terms' numbers."""
-    sums, q = rows[0], 0
+    q = 0
     out[:] = 0.0
     while q < len(terms):
         row, known = terms[q, ROW], False
