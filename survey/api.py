@@ -198,7 +198,7 @@ def evaluate(
             module,
             grid.points,
             lambda: _seconds(module, request, grid),
-            options=request.options,
+            request=request,
         ) as progress:
             found = solve.compute(grid, module, request, progress=progress)
         ds = count(labelled(grid, module, scene, request, found), found)

@@ -98,6 +98,10 @@ CONTRACT = {
         "{output: seconds that a point takes besides where it is named}, of outputs on request",
         dict,
     ),
+    "COMPILING": Value(
+        "{output: seconds that compiling takes besides where it is named}, of outputs on request",
+        dict,
+    ),
     "curves_seconds": Value(
         "seconds that the curves of [boundaries] take on a map of the whole domain, where they are searched",
         float,

@@ -26,6 +26,11 @@ theta1), exp(+-i theta2), theta1 < theta2, lose it by the meeting whose arc is t
 theta2), at -1, or theta2 - theta1, between the pairs; pairs of like Krein sign (B D > 0) may meet
 without harm, so there it is 1. It is -1 where the error bars leave it open.
 
+On request, the outputs of `survey.floquet` for the canonical system in x = xi, q = eta' + xi, p =
+xi' - eta, m = -eta: `multiplier_re`, `multiplier_im`, `spectral_radius`, `exponent` (per radian of
+f), `krein`, `crossing`, `monodromy`. They are in float64: beyond 1 - e = 1e-7 a point has no value
+(`overflow`) where they are named.
+
 What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1
 - mu) < 1 (Routh). mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are
 even in e, and the same at 1 - mu. As e -> 1 the multipliers grow like (1 - e)^-5 and more: values
@@ -40,11 +45,19 @@ Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libr
 beside this file.
 """
 
+from dataclasses import replace
+from functools import cache
+from math import cos, pi, sqrt
+
 import numpy as np
 
+from survey import status
 from survey.measures import linear_motion
+from survey.measures.floquet import stability
+from survey.measures.floquet.compile_ahead import compile_ahead as _family_ahead
+from survey.measures.floquet.system import System
 from survey.measures.libration import danby, motion
-from survey.measures.libration.danby_double import compile_ahead as compile_ahead
+from survey.measures.libration.danby_double import compile_ahead as _double_ahead
 from survey.measures.rows import Rows
 from survey.scene import Parameter, Trajectory, plus_minus
 
@@ -69,7 +82,22 @@ PARAMETERS = (
 )
 OPTIONS = ()
 STARTER = {"mu": (0.0005, 0.06), "e": (0.0, 0.7)}
-OUTPUTS = danby.OUTPUTS
+_NAMES = (
+    "multiplier_re",
+    "multiplier_im",
+    "spectral_radius",
+    "exponent",
+    "monodromy",
+    "krein",
+    "crossing",
+)
+_FAMILY = tuple(replace(o, on_request=True) for o in stability.OUTPUTS if o.name in _NAMES)
+OUTPUTS = (*danby.OUTPUTS, *_FAMILY)
+SECONDS = dict.fromkeys(_NAMES, 1e-6)  # on maps, by series
+COMPILING = dict.fromkeys(_NAMES, 25)  # measured, 2 cores
+DIMENSIONS = {name: np.arange(1, 5) for name in ("multiplier", "row", "column")}
+states = ("x", "q", "p", "m")
+structure = "symplectic"
 
 
 def cost(options, sizes):
@@ -85,7 +113,54 @@ def solve(point, request):
     many = request.ranges.get("mu", (0,))[0] >= danby.MANY
     e, mu = block.per_row(point["e"]), block.per_point(point["mu"])
     out = danby.solve(e, mu, request.method, request.rtol, dense, many)
-    return {name: block.back(values) for name, values in out.items()}
+    out = {name: block.back(values) for name, values in out.items()}
+    asked = {o.name for o in _FAMILY} & set(request.variables)
+    return _with_family(out, point, request, asked) if asked else out
+
+
+def compile_ahead(variables, options):
+    """Compile what points that are solved one by one need, then what the family "floquet" needs
+    (see `survey.scenes`).
+    """
+    _double_ahead(variables, options)
+    if not {o.name for o in _FAMILY}.isdisjoint(variables):
+        yield
+        _family_ahead(variables, options)
+
+
+def _with_family(out, point, request, asked):
+    """The outputs with those that are asked of the family "floquet"."""
+    mu, e = np.broadcast_arrays(point["mu"], point["e"])
+    lines = {i: request.line(name) for i, name in enumerate(("mu", "e")) if request.line(name)}
+    given = np.stack([mu, e], axis=-1), request.method, request.rtol, asked, lines
+    found = stability.solve(_system(), structure, *given)
+    own, theirs = out["status"], found.pop("status")
+    lost = (own == status.OK) & (theirs != status.OK)
+    for name, values in (out | found).items():
+        kept = lost.reshape(lost.shape + (1,) * (values.ndim - lost.ndim))
+        out[name] = np.where(kept, np.nan if values.dtype.kind == "f" else -1, values)
+    return out | {"status": np.where(lost, theirs, own)}
+
+
+@cache
+def _system():
+    """The canonical equations (3) of `libration_elliptic.md` in the angle v, tan(f/2) = tan(v/2) / k,
+    k^4 = (1 - e) / (1 + e): half-way to the eccentric anomaly, where steps can be longest.
+    """
+
+    def fill(v, p, out):
+        mu, e = p
+        square = sqrt((1.0 - e) / (1.0 + e))  # k^2
+        cosine, sine = 0.5 + 0.5 * cos(v), 0.5 - 0.5 * cos(v)  # squares, of v / 2
+        turn = sqrt(square) / (square * cosine + sine)  # df / dv
+        pull = sqrt(square) / (sqrt((1.0 - e) * (1.0 + e)) * (cosine + square * sine))  # r df / dv
+        d1 = 1.5 + 1.5 * sqrt(1.0 - 3.0 * mu * (1.0 - mu))
+        d2 = 6.75 * mu * (1.0 - mu) / d1
+        out[0, 2] = out[2, 1] = out[3, 0] = turn
+        out[0, 3] = out[1, 2] = out[3, 1] = -turn
+        out[1, 3], out[2, 0] = turn - d2 * pull, d1 * pull - turn
+
+    return System({"A": fill}, len(states), 2 * pi, (), symplectic=True)
 
 
 def equation(names, ends, options):

@@ -34,27 +34,30 @@ def always_compiled(scene):
     return hasattr(scene, "HASH") and scene.FAMILY == "hill"
 
 
-def seconds(name, scene, cells=False, options=None):
-    """How long compiling a scene's kernels usually takes here; with those of `cells`."""
+def seconds(name, scene, cells=False, request=None):
+    """How long compiling a scene's kernels for a request usually takes here; with those of `cells`."""
     from survey.sweep.dispatch import cpus  # loads dask
 
-    asked = scene.FAMILY, (options or {}).get("question")
+    asked = scene.FAMILY, request and request.options.get("question")
     if asked in OF_QUESTIONS:
         return OF_QUESTIONS[asked]
     kernels, more = OF_SCENES.get(name, (SECONDS.get(scene.FAMILY, USUAL), 0))
+    further = getattr(scene, "COMPILING", {})
+    wanted = request.variables if request else ()
+    kernels += max((further.get(o, 0) for o in wanted), default=0)
     divided = hasattr(scene, "compile_ahead") and name not in OF_SCENES
     # measured: on one processor, what another compiles meanwhile comes after it
     return (kernels + more * cells) * (2 if divided and cpus() == 1 else 1)
 
 
-def sentence(name, scene, options=None):
+def sentence(name, scene, request=None):
     """`compiling gyrostat, once on this machine, about 10 s`."""
     when = "in each process that solves it" if always_compiled(scene) else "on this machine"
-    return f"compiling {name}, once {when}, about {seconds(name, scene, options=options)} s"
+    return f"compiling {name}, once {when}, about {seconds(name, scene, request=request)} s"
 
 
 @contextlib.contextmanager
-def compiling(name, scene, say, options=None):
+def compiling(name, scene, say, request=None):
     """Name the compiling of the scene's kernels, by `say`, once it has taken a moment."""
     from numba.core import event
 
@@ -77,7 +80,7 @@ def compiling(name, scene, say, options=None):
 
         def tell(self):
             self.said = True
-            say(sentence(name, scene, options))
+            say(sentence(name, scene, request))
 
     listener = Listener()
     event.register("numba:compile", listener)

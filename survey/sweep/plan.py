@@ -72,8 +72,9 @@ def _compiling(workflow):
     spent, done = measured.compiling(workflow)
     if done:
         return "done already"
-    cells, options = workflow.refine is not None, workflow.request.options
-    usual = announce.seconds(workflow.name, workflow.scene, cells, options)
+    usual = announce.seconds(
+        workflow.name, workflow.scene, workflow.refine is not None, workflow.request
+    )
     about = lasting(usual if spent is None else spent)
     own = announce.always_compiled(workflow.scene)
     when = "at each run, as the equation is your own" if own else "once on this machine"

@@ -32,7 +32,7 @@ class Progress:
             self.workflow.name,
             getattr(self.workflow, "scene", None),
             self._say,
-            self.workflow.request.options if hasattr(self.workflow, "request") else None,
+            getattr(self.workflow, "request", None),
         )
         if getattr(self.workflow, "scene", None) is not None:
             self.naming.__enter__()
@@ -146,7 +146,7 @@ def _left(done, total, reused, elapsed, left):
 
 
 @contextlib.contextmanager
-def watched(name, scene, points, seconds, what="blocks", options=None):
+def watched(name, scene, points, seconds, what="blocks", request=None):
     """For a call from Python: names compiling; yields what to call with (done, total), or None if
     nothing is shown.
 
@@ -158,7 +158,7 @@ def watched(name, scene, points, seconds, what="blocks", options=None):
     shown, quick = announce.console(), seconds() < LONG
     workflow = SimpleNamespace(name=name, grid=SimpleNamespace(points=points))
     with (
-        announce.compiling(name, scene, lambda text: shown.print(text, markup=False), options),
+        announce.compiling(name, scene, lambda text: shown.print(text, markup=False), request),
         Progress(shown, workflow, silent=quick) as progress,
     ):
         yield None if quick else lambda done, total: progress(done, total, 0, what)

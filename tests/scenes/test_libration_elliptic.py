@@ -111,6 +111,86 @@ def monodromy(mu, e):
     )
 
 
+FAMILY = [
+    "multiplier_re",
+    "multiplier_im",
+    "spectral_radius",
+    "exponent",
+    "krein",
+    "crossing",
+    "monodromy",
+]
+
+
+def test_multipliers_are_the_zeros_of_the_reference_polynomial():
+    """Krein signs: two pairs on the circle have like ones where B D > 0 (section 3 of the digest)."""
+    given = [row["mu"] for row in POINTS], [row["e"] for row in POINTS]
+    ds = points(*given, variables=["verdict", *FAMILY])
+    assert (ds.status == 0).all()
+    like = set()
+    with mp.workdps(40):
+        for i, row in enumerate(POINTS):
+            a, b = mpf(row["a"]), mpf(row["b"])
+            exact = mp.polyroots([1, -a, b, -a, 1], maxsteps=500, extraprec=400)
+            here = ds.isel(p=i)
+            for re, im, bar in zip(
+                here.multiplier_re.values.tolist(), here.multiplier_im.values.tolist(),
+                here.multiplier_re_error.values.tolist(), strict=True,
+            ):  # fmt: skip
+                assert min(abs(complex(re, im) - z) for z in exact) <= bar
+            radius = max(map(abs, exact))
+            off = abs(mpf(float(here.spectral_radius)) - radius)
+            assert off <= float(here.spectral_radius_error) + 1e-30
+            exponent = abs(mpf(float(here.exponent)) - mp.log(radius) / (2 * mp.pi))
+            assert exponent <= float(here.exponent_error) + 1e-30
+            signs = here.krein.values
+            if not row["stable"]:
+                assert (signs[abs(here.multiplier_im.values) < 1e-9] == 0).all()
+                continue
+            upper = signs[here.multiplier_im.values > 0]
+            like.add(bool(upper[0] == upper[1]))
+            assert (upper[0] == upper[1]) == (float(row["B"]) * float(row["D"]) > 0)
+            assert here.spectral_radius == 1.0 and here.spectral_radius_error == 0.0
+    assert like == {True, False}
+
+
+def test_the_monodromy_matrix_is_that_of_the_whole_period():
+    """Of DOP853 in the variables of (1), brought to the canonical state (3)."""
+    to = np.array([[1.0, 0, 0, 0], [1, 0, 0, 1], [0, -1, 1, 0], [0, -1, 0, 0]])
+    for mu, e in ((0.01, 0.2), (0.04, 0.15), (0.045, 0.1), (0.02, 0.6), (0.0, 0.3)):
+        here = points([mu], e, variables=FAMILY).isel(p=0)
+        other = to @ monodromy(mu, e) @ np.linalg.inv(to)
+        off = abs(here.monodromy.values - other)
+        assert (off <= here.monodromy_error.values + 2e-8 * abs(other).max()).all()
+
+
+def test_what_the_family_gives_agrees_with_the_map_and_leaves_it_alone():
+    axes = {"mu": np.linspace(0.0, 0.06, 61), "e": np.linspace(0.0, 0.95, 39)}
+    plain = survey.evaluate("libration_elliptic", **axes)
+    ds = survey.evaluate(
+        "libration_elliptic", variables=["a", "verdict", "collision", *FAMILY[:-1]], **axes
+    )
+    assert (ds.status == 0).all()
+    assert all((ds[name] == plain[name]).all() for name in ("a", "verdict", "collision"))
+    bars = ds.multiplier_re_error.sum("multiplier") + ds.a_error + 1e-14 * (1 + abs(ds.a))
+    assert (abs(ds.multiplier_re.sum("multiplier") - ds.a) <= bars).all()
+    assert ((ds.spectral_radius == 1.0) == (ds.verdict == 1)).all()
+    unstable = (ds.verdict == 0) & (ds.mu > 0)
+    assert (ds.spectral_radius - ds.spectral_radius_error > 1.0).where(unstable, True).mean() > 0.99
+    how = ds.crossing.where(unstable & (ds.crossing > 0))
+    assert (how == 4).where((ds.collision == 2) & how.notnull(), True).all()
+    assert (how == 2).where((ds.collision == 1) & how.notnull() & (ds.a < -4), True).all()
+    assert {2.0, 4.0} <= set(np.unique(how.values[np.isfinite(how.values)]))
+
+
+def test_beyond_the_reach_of_float64_the_named_outputs_have_no_value_and_the_others_keep_theirs():
+    given = {"mu": 0.01, "e": 1 - 1e-11}
+    ds = survey.evaluate("libration_elliptic", variables=["a", "spectral_radius"], **given)
+    assert ds.status.attrs["flag_meanings"].split()[int(ds.status)] == "overflow"
+    assert np.isnan(ds.a) and np.isnan(ds.spectral_radius)
+    assert int(survey.evaluate("libration_elliptic", **given).status) == 0
+
+
 def test_half_the_period_gives_the_monodromy_of_the_whole_and_the_collision_its_multipliers():
     random = np.random.default_rng(3)
     mu, e = random.uniform(0.001, 0.05, 24), random.uniform(0.0, 0.5, 24)
