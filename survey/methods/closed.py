@@ -15,7 +15,15 @@ import numpy as np
 
 from survey.kernels.cylinder import closed, trigonometric, weierstrass
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.steps import EQUILIBRIUM, NO_CONVERGENCE, OK, TRUST, TURNING, finite
+from survey.kernels.cylinder.steps import (
+    EQUILIBRIUM,
+    NO_CONVERGENCE,
+    OK,
+    TRUST,
+    TURNING,
+    finite,
+    row_of,
+)
 from survey.kernels.cylinder.weierstrass import BAR_W, BAR_X, COUNT, LANES, W, X
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -119,14 +127,15 @@ def _store(out, phi0, x, w, bar_x, bar_w):
 
 
 @kernel
-def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     """See `steps.abels`; tolerance and limit have no meaning here."""
     data = closed.scratch()
     for i in range(len(P)):
         phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
         kind, side = closed.start(P[i], phi0, w0, data)
-        for j in range(finite(targets[i])):
-            out, x = floats[i, j], targets[i, j] - phi0
+        own = row_of(targets, i)
+        for j in range(finite(own)):
+            out, x = planes[:, i, j], own[j] - phi0
             if kind == closed.NONE or kind == closed.LOST:
                 status[i, j] = _NO_FORM if kind == closed.NONE else NO_CONVERGENCE
             elif x == 0.0:

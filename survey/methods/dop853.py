@@ -168,10 +168,10 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
 
 
 @kernel
-def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     """See `steps.abels`."""
     steps.abels(
-        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status
+        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, planes, status
     )
 
 

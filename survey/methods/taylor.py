@@ -111,16 +111,16 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
     )
 
 
-def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     """See `lockstep_phi.abels` and `lockstep_abel.abels`, and for programs `abels` and
     `abels_near` of `lockstep_program`.
     """
     ahead = np.zeros((len(P), lockstep_phi.STATE))
     # the first of both reads a block beyond the last
-    far = np.full((len(P), targets.shape[1] + lockstep_phi.BLOCK), np.inf)
+    far = np.full((len(targets), targets.shape[1] + lockstep_phi.BLOCK), np.inf)
     far[:, : targets.shape[1]] = targets
     if P.shape[1] != COLUMNS:
-        leads, rest = lockstep_program.grouped(P), (tolerance, limit, ahead, floats, status)
+        leads, rest = lockstep_program.grouped(P), (tolerance, limit, ahead, planes, status)
         for lead in np.unique(leads):
             lockstep_program.abels(P, leads, lead, starts, far, *rest)
             lockstep_program.abels_near(P, leads, lead, starts, targets, *rest)
@@ -128,38 +128,38 @@ def flow_abels(P, starts, targets, tolerance, limit, floats, status):
     # compile the longer one, by a call on nothing, while that process compiles the other
     if waiting.other_compiler:
         _abels_in_time(
-            P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], floats[:0], status[:0]
+            P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], planes[:, :0], status[:0]
         )
         waiting.wait()
-    _abels_in_angle(P, starts, far, tolerance, limit, ahead, floats, status)
-    _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status)
+    _abels_in_angle(P, starts, far, tolerance, limit, ahead, planes, status)
+    _abels_in_time(P, starts, targets, tolerance, limit, ahead, planes, status)
 
 
 def flow_abels_ahead():
     """Compile what `flow_abels` waits for."""
     P, none = np.empty((0, COLUMNS)), np.empty((0, EXACT_START))
     P.flags.writeable = False
-    floats = np.empty((0, 2, STATE))
+    planes = np.empty((STATE, 0, 2))
     _abels_in_angle(
-        P, none, none, 0.0, 0, np.empty((0, lockstep_phi.STATE)), floats, np.empty((0, 2), np.int64)
+        P, none, none, 0.0, 0, np.empty((0, lockstep_phi.STATE)), planes, np.empty((0, 2), np.int64)
     )
 
 
 @kernel
-def _abels_in_angle(P, starts, targets, tolerance, limit, ahead, floats, status):
-    lockstep_phi.abels(P, starts, targets, tolerance, limit, ahead, floats, status)
+def _abels_in_angle(P, starts, targets, tolerance, limit, ahead, planes, status):
+    lockstep_phi.abels(P, starts, targets, tolerance, limit, ahead, planes, status)
 
 
 @kernel
-def _abels_in_time(P, starts, targets, tolerance, limit, ahead, floats, status):
-    lockstep_abel.abels(P, starts, targets, tolerance, limit, ahead, floats, status)
+def _abels_in_time(P, starts, targets, tolerance, limit, ahead, planes, status):
+    lockstep_abel.abels(P, starts, targets, tolerance, limit, ahead, planes, status)
 
 
 @kernel
-def flow_abels_by_row(P, starts, targets, tolerance, limit, floats, status):
+def flow_abels_by_row(P, starts, targets, tolerance, limit, planes, status):
     """See `steps.abels`."""
     steps.abels(
-        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, floats, status
+        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, planes, status
     )
 
 

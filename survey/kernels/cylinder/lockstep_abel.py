@@ -83,6 +83,7 @@ from survey.kernels.cylinder.steps import (
     crossing,
     finite,
     node_possible,
+    row_of,
     runs_into_node,
     to_target,
     trusted,
@@ -316,7 +317,7 @@ def _refill(
     started,
     column,
     ahead,
-    floats,
+    planes,
     status,
 ):
     """Give free lanes the rows that wait; returns the first that still waits."""
@@ -329,10 +330,11 @@ def _refill(
             p = P[waiting]
             phi0 = starts[waiting, rc.START_PHI]
             w0 = starts[waiting, rc.START_W]
-            size = finite(targets[waiting])
+            own = row_of(targets, waiting)
+            size = finite(own)
             at, rows, codes = (
-                targets[waiting, :size],
-                floats[waiting, :size],
+                own[:size],
+                planes[:, waiting, :size].T,
                 status[waiting, :size],
             )
             if first < size and (
@@ -352,7 +354,7 @@ def _refill(
                 if begun:
                     _go_on(ahead[waiting], state, fixed, i)
                 column[i], started[i] = first, state[V, i] > 0.0
-                goal[i] = targets[waiting, first] - fixed[TURN, i]
+                goal[i] = own[first] - fixed[TURN, i]
             waiting += 1
     return waiting
 
@@ -395,12 +397,12 @@ def _calm(state, fixed, goal, doubt, started, calm):
 
 
 @inline
-def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
+def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
     """w and t at the ascending targets >= phi0 of each row, which end at its first infinity; as
     `steps.abels`.
 
-    P (rows, 10) from `flow.coefficients`; `ahead` as `lockstep_phi.abels` left it, which comes
-    first.
+    P (rows, 10) from `flow.coefficients`; targets (rows or 1, n), planes (STATE, rows, n); `ahead` as
+    `lockstep_phi.abels` left it, which comes first.
     """
     work, block = np.zeros((ROWS, LANES)), np.zeros(_SIZE)
     T, state, before, fixed, _found, fate = split(work)
@@ -419,7 +421,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
                     doubt[i] = -1
             waiting = _refill(
                 P, starts, targets, waiting, state, fixed, axes, row, sizes, goal, started, column, ahead,
-                floats, status
+                planes, status
             )  # fmt: skip
             if not busy(row):
                 return
@@ -432,14 +434,14 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
                 continue
             r, size = row[i], sizes[i]
             column[i], doubt[i], started[i], ending = _pass(
-                T, state, before, fixed, axes[i], i, block, targets[r, :size], column[i], doubt[i], started[i],
-                floats[r, :size], status[r, :size]
+                T, state, before, fixed, axes[i], i, block, row_of(targets, r)[:size], column[i], doubt[i], started[i],
+                planes[:, r, :size].T, status[r, :size]
             )  # fmt: skip
             if column[i] < size:
-                goal[i] = targets[r, column[i]] - fixed[TURN, i]
+                goal[i] = row_of(targets, r)[column[i]] - fixed[TURN, i]
             if ending == _GOING and state[STEPS, i] >= limit:
                 ending = STEP_LIMIT
             if ending != _GOING:
                 if ending != OK:
-                    conclude(ending, doubt[i], column[i], floats[r, :size], status[r, :size])
+                    conclude(ending, doubt[i], column[i], planes[:, r, :size].T, status[r, :size])
                 row[i], free = -1, True

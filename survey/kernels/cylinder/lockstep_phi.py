@@ -43,7 +43,7 @@ from survey.kernels.cylinder.lockstep import (
     polynomial,
     sine_cosine,
 )
-from survey.kernels.cylinder.steps import OK, STEP_LIMIT, conclude, finite, unturned
+from survey.kernels.cylinder.steps import OK, STEP_LIMIT, finite, row_of, unturned
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import summed, unroll
@@ -297,9 +297,33 @@ def _eight(table, row, column):
     )  # fmt: skip
 
 
+@inline
+def _eight_of(block, first):
+    """Eight numbers of the block, likewise."""
+    return (
+        block[first], block[first + 1], block[first + 2], block[first + 3],
+        block[first + 4], block[first + 5], block[first + 6], block[first + 7],
+    )  # fmt: skip
+
+
+@inline
+def _set_eight(table, row, column, numbers):
+    """Set eight numbers of a row, see `_eight`."""
+    i, j = np.uint64(row), np.uint64(column)
+    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
+    k = j + four
+    table[i, j], table[i, j + one] = numbers[0], numbers[1]
+    table[i, j + two], table[i, j + three] = numbers[2], numbers[3]
+    table[i, k], table[i, k + one] = numbers[4], numbers[5]
+    table[i, k + two], table[i, k + three] = numbers[6], numbers[7]
+
+
 @kernel
-def _record(T, before, state, step, i, block, targets, k, first, floats):
-    """Record lane i at the targets of row k, from the `first` on, within the step; returns the next."""
+def _record(T, before, state, step, i, block, targets, k, first, size, planes):
+    """Record lane i at the targets of row k, from the `first` on, within the step; returns the next.
+
+    Where there is room a whole block is recorded: what lies beyond the step is replaced later.
+    """
     psi, turns, w, t, t_low = (
         before[AT, i],
         before[TURNED, i],
@@ -310,10 +334,11 @@ def _record(T, before, state, step, i, block, targets, k, first, floats):
     inverse, end = 1.0 / w, state[AT, i]
     high, slope = step[W_WITHIN, i], step[STEEPEST, i]
     time_bar, slowest = state[T_BOUND, i], 1.0 / step[LOWEST, i]
+    at = min(k, len(targets) - 1)
     while True:
         # read anew: broadcast from memory, where 34 vectors would be kept on the stack
         omega, integral = _omega(T, i), _integral(T, i)
-        given = _eight(targets, k, first)
+        given = _eight(targets, at, first)
         for j in range(BLOCK):
             block[j] = given[j]
         count = 0
@@ -327,13 +352,25 @@ def _record(T, before, state, step, i, block, targets, k, first, floats):
             block[BLOCK + j], block[2 * BLOCK + j] = value, time
             block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
             block[4 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
-        for j in range(count):
-            row = floats[np.uint64(k), np.uint64(first + j)]
-            row[rc.VALUE], row[rc.TIME] = block[BLOCK + j], block[2 * BLOCK + j]
-            row[rc.VALUE_BAR], row[rc.TIME_BAR] = block[3 * BLOCK + j], block[4 * BLOCK + j]
+        if first + BLOCK <= size:
+            _set_eight(planes[rc.VALUE], k, first, _eight_of(block, BLOCK))
+            _set_eight(planes[rc.TIME], k, first, _eight_of(block, 2 * BLOCK))
+            _set_eight(planes[rc.VALUE_BAR], k, first, _eight_of(block, 3 * BLOCK))
+            _set_eight(planes[rc.TIME_BAR], k, first, _eight_of(block, 4 * BLOCK))
+        else:
+            for n in range(rc.STATE):
+                for j in range(count):
+                    planes[n, k, first + j] = block[(n + 1) * BLOCK + j]
         first += count
-        if count < BLOCK:
+        if count < BLOCK or not unturned(targets[at, first], turns) <= end:
             return first
+
+
+@inline
+def stop(first, size, status):
+    """Note that too many steps were taken for the targets from the `first` on."""
+    for j in range(first, size):
+        status[j] = STEP_LIMIT
 
 
 @inline
@@ -348,8 +385,8 @@ def _refill(P, starts, targets, status, waiting, state, fixed, row, sizes, goal,
     width = status.shape[1]
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            p, w0 = P[waiting], starts[waiting, rc.START_W]
-            if math.isfinite(targets[waiting, 0]) and w0 > 0.0:
+            p, w0, own = P[waiting], starts[waiting, rc.START_W], row_of(targets, waiting)
+            if math.isfinite(own[0]) and w0 > 0.0:
                 psi, turns = reduced(starts[waiting, rc.START_PHI])
                 slip = (4.0 * ROUNDOFF_UP) * (turns != 0.0)
                 bend = p[BOUND_F] + p[BOUND_G] / w0
@@ -366,9 +403,9 @@ def _refill(P, starts, targets, status, waiting, state, fixed, row, sizes, goal,
                         2.0 + bend / w0,
                     )
                     state[W_BOUND, i], state[T_BOUND, i] = bound, slip / w0
-                    row[i], goal[i], sizes[i] = waiting, targets[waiting, 0], width
-                    if not math.isfinite(targets[waiting, width - 1]):
-                        sizes[i] = finite(targets[waiting])
+                    row[i], goal[i], sizes[i] = waiting, own[0], width
+                    if not math.isfinite(own[width - 1]):
+                        sizes[i] = finite(own)
                     for k in range(sizes[i]):
                         status[waiting, k] = OK
             waiting += 1
@@ -378,9 +415,9 @@ def _refill(P, starts, targets, status, waiting, state, fixed, row, sizes, goal,
 
 
 @inline
-def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
+def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
     """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`, but
-    that the rows of `targets` end with BLOCK infinities.
+    that the rows of `targets` end with BLOCK infinities, and results go to planes (STATE, rows, n).
 
     `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and
     COLUMN is the number of its targets where all are known.
@@ -393,7 +430,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
     step, fixed = work[third:fourth], work[fourth:]
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
-    goal, block = np.zeros(LANES), np.zeros(5 * BLOCK)
+    goal, block = np.zeros(LANES), np.zeros((1 + rc.STATE) * BLOCK)
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
     free, ended = True, np.zeros(LANES, dtype=np.bool_)
     while True:
@@ -420,15 +457,15 @@ def abels(P, starts, targets, tolerance, limit, ahead, floats, status):
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
             size, j = sizes[i], int(state[COLUMN, i])
             if sound:
-                j = _record(T, before, state, step, i, block, targets, k, j, floats)
+                j = _record(T, before, state, step, i, block, targets, k, j, size, planes)
             far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
             if j < size and sound and far and state[COUNT, i] < limit:
-                state[COLUMN, i], goal[i] = j, targets[k, j]
+                state[COLUMN, i], goal[i] = j, row_of(targets, k)[j]
                 continue
             for n in range(STATE):
                 ahead[k, n] = state[n, i] if sound else before[n, i]
             ahead[k, COLUMN] = j
             if j < size and state[COUNT, i] >= limit:
-                conclude(STEP_LIMIT, -1, j, floats[k, :size], status[k, :size])
+                stop(j, size, status[k])
                 ahead[k, COLUMN] = size
             row[i], free = -1, True

@@ -92,6 +92,7 @@ from survey.kernels.cylinder.steps import (
     conclude,
     crossing,
     finite,
+    row_of,
     runs_into_node,
     to_target,
     trusted,
@@ -518,7 +519,8 @@ def _enter_far(
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             p, w0 = P[waiting], starts[waiting, rc.START_W]
-            if leads[waiting] == lead and math.isfinite(targets[waiting, 0]) and w0 > 0.0:
+            own = row_of(targets, waiting)
+            if leads[waiting] == lead and math.isfinite(own[0]) and w0 > 0.0:
                 phi, turns = starts[waiting, rc.START_PHI], 0.0
                 if circle:
                     phi, turns = reduced(phi)
@@ -535,7 +537,7 @@ def _enter_far(
                     state[far.W_BOUND, i], state[far.T_BOUND, i] = bound, slip / w0
                     program.note(p, numbers, i, i + 1)
                     row[i], radius[i] = waiting, 1.0
-                    sizes[i], goal[i] = finite(targets[waiting]), targets[waiting, 0]
+                    sizes[i], goal[i] = finite(own), own[0]
                     for k in range(sizes[i]):
                         status[waiting, k] = OK
             waiting += 1
@@ -548,7 +550,7 @@ _expand = far.expansion(far.given)
 
 
 @kernel
-def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, status):
+def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, status):
     """As `lockstep_phi.abels`, of the rows of P that have the program `lead`."""
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
     circle = p[ON_CIRCLE] > 0.0
@@ -564,7 +566,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, stat
     radius = np.ones(LANES)
     points, over, known, out, bounds = _ball_tables(p)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
-    goal, block = np.zeros(LANES), np.zeros(5 * far.BLOCK)
+    goal, block = np.zeros(LANES), np.zeros((1 + rc.STATE) * far.BLOCK)
     waiting, free, ended = np.int64(lead), True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
@@ -613,16 +615,16 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, stat
             sound = math.isfinite(w) and bound < far.SURE * w
             size, j = sizes[i], int(state[far.COLUMN, i])
             if sound:
-                j = far._record(T, before, state, step, i, block, targets, k, j, floats)
+                j = far._record(T, before, state, step, i, block, targets, k, j, size, planes)
             if j < size and sound and far._far(w, bound, fixed[BOUND_G, i]):
                 if state[far.COUNT, i] < limit:
-                    state[far.COLUMN, i], goal[i] = j, targets[k, j]
+                    state[far.COLUMN, i], goal[i] = j, row_of(targets, k)[j]
                     continue
             for n in range(far.STATE):
                 ahead[k, n] = state[n, i] if sound else before[n, i]
             ahead[k, far.COLUMN] = j
             if j < size and state[far.COUNT, i] >= limit:
-                conclude(STEP_LIMIT, -1, j, floats[k, :size], status[k, :size])
+                far.stop(j, size, status[k])
                 ahead[k, far.COLUMN] = size
             row[i], free = -1, True
 
@@ -803,14 +805,18 @@ def _calm(T, state, before, fixed, goal, doubt, started, calm):
 @splice
 def _enter_near(
     P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, row, sizes, goal,
-    started, column, delay, ahead, floats, status,
+    started, column, delay, ahead, planes, status,
 ):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             r, p = waiting, P[waiting]
             waiting += 1
-            phi0, w0, size = starts[r, rc.START_PHI], starts[r, rc.START_W], finite(targets[r])
+            phi0, w0, size = (
+                starts[r, rc.START_PHI],
+                starts[r, rc.START_W],
+                finite(row_of(targets, r)),
+            )
             begun = ahead[r, far.W] > 0.0
             first = int(ahead[r, far.COLUMN]) if begun else 0
             if leads[r] != lead or first >= size:
@@ -820,7 +826,7 @@ def _enter_near(
                 phi, turns = reduced(phi0)
             elif w0 == 0.0:
                 program.bound_near(p, phi0)
-            at, rows, codes = targets[r, :size], floats[r, :size], status[r, :size]
+            at, rows, codes = row_of(targets, r)[:size], planes[:, r, :size].T, status[r, :size]
             if not begun and at_rest(p, phi, phi0, w0, at, rows, codes):
                 continue
             for k in range(len(state)):
@@ -838,12 +844,12 @@ def _enter_near(
             fixed[lockstep.NEXT, i] = math.inf
             program.note(p, numbers, i, i + 1)
             row[i], sizes[i], column[i], started[i] = r, size, first, own > 0.0
-            goal[i] = targets[r, first]
+            goal[i] = row_of(targets, r)[first]
     return waiting
 
 
 @kernel
-def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, floats, status):
+def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, status):
     """As `lockstep_abel.abels`, of the rows of P that have the program `lead`; on a line they are left
     with bounds of some place.
     """
@@ -866,7 +872,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, floats,
                     doubt[i] = -1
             waiting = _enter_near(
                 P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, row, sizes, goal,
-                started, column, delay, ahead, floats, status
+                started, column, delay, ahead, planes, status
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
@@ -890,14 +896,14 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, floats,
                 for k in range(len(out)):
                     own[BOUND_F + k] = bounds[k, i]
             column[i], doubt[i], started[i], ending = _pass(
-                own, T, state, before, fixed, delay[i], i, block, targets[r, :size], column[i], doubt[i],
-                started[i], floats[r, :size], status[r, :size]
+                own, T, state, before, fixed, delay[i], i, block, row_of(targets, r)[:size], column[i], doubt[i],
+                started[i], planes[:, r, :size].T, status[r, :size]
             )  # fmt: skip
             if column[i] < size:
-                goal[i] = targets[r, column[i]]
+                goal[i] = row_of(targets, r)[column[i]]
             if ending == GOING and state[STEPS, i] >= limit:
                 ending = STEP_LIMIT
             if ending != GOING:
                 if ending != OK:
-                    conclude(ending, doubt[i], column[i], floats[r, :size], status[r, :size])
+                    conclude(ending, doubt[i], column[i], planes[:, r, :size].T, status[r, :size])
                 row[i], free = -1, True

@@ -193,13 +193,21 @@ def trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats,
 
 
 @inline
-def abels(setting, begin, at, P, starts, targets, tolerance, limit, floats, status):
-    """`abel` for each row of P; a row of targets ends at its first infinity."""
+def abels(setting, begin, at, P, starts, targets, tolerance, limit, planes, status):
+    """`abel` for each row of P; a row of targets ends at its first infinity, and one may serve all;
+    planes (STATE, rows, n) are filled.
+    """
     for i in range(len(P)):
-        size = finite(targets[i])
+        size = finite(row_of(targets, i))
         phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
-        abel(setting, begin, at, P[i], phi0, w0, targets[i, :size],
-             tolerance, limit, floats[i], status[i])  # fmt: skip
+        abel(setting, begin, at, P[i], phi0, w0, row_of(targets, i)[:size],
+             tolerance, limit, planes[:, i].T, status[i])  # fmt: skip
+
+
+@inline
+def row_of(targets, i):
+    """The targets of row i: its own, or the one row that serves all."""
+    return targets[min(i, len(targets) - 1)]
 
 
 @inline

@@ -31,17 +31,19 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
         )
 
 
-def flow_abels(P, starts, targets, tolerance, limit, floats, status):
+def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     """See `steps.abels`, and `flow_trajectories`."""
     for i in range(len(P)):
+        floats = np.full((planes.shape[2], len(planes)), np.nan)
         flow_double.abel(
             P[i],
             starts[i, rc.START_PHI],
             starts[i, rc.START_W],
-            _asked(targets[i]),
-            floats[i],
+            _asked(targets[min(i, len(targets) - 1)]),
+            floats,
             status[i],
         )
+        planes[:, i] = floats.T
 
 
 def _asked(row):

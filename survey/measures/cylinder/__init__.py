@@ -31,13 +31,13 @@ METHODS = {
             ("P", "starts", "times", "tolerance", "limit", "turnings"),
         ),
         "flow_abels": Function(
-            "fill floats (rows, n, STATE: VALUE to TIME_BAR) and status (rows, n) at ascending targets phi >= phi0, "
-            "for w0 >= 0",
-            ("P", "starts", "targets", "tolerance", "limit", "floats", "status"),
+            "fill planes (STATE: VALUE to TIME_BAR, rows, n) and status (rows, n) at ascending targets (rows or 1, n), "
+            "phi >= phi0, for w0 >= 0",
+            ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
         "flow_abels_by_row": Function(
             "the same, one row after the other, where that is compiled sooner",
-            ("P", "starts", "targets", "tolerance", "limit", "floats", "status"),
+            ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
         "flow_abels_ahead": Function(
             "compile some of what `flow_abels` calls, while another process compiles the rest"

@@ -7,6 +7,7 @@ import numpy as np
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.steps import TURNING, UNDETERMINED
 from survey.measures.cylinder import basins, fate, portrait
+from survey.measures.cylinder.solution import distinct
 from survey.status import INVALID_PARAMETERS, OK
 
 MOST_TURNINGS = 2**31 - 1  # are kept as int32
@@ -26,7 +27,15 @@ def dense(point, names, name):
     points = [i for i in range(len(shape)) if i not in dense]
     order = points + dense
     columns = int(np.prod([shape[i] for i in dense], dtype=int))
-    last = np.broadcast_to(arrays[-1], shape).transpose(order).reshape(-1, columns)
+    own = arrays[-1].reshape((1,) * (len(shape) - arrays[-1].ndim) + arrays[-1].shape)
+    own = np.broadcast_to(
+        own, [shape[i] if i in dense else own.shape[i] for i in range(len(shape))]
+    )
+    own, number = own.transpose(order), int(np.prod([shape[i] for i in points], dtype=int))
+    if own.shape[: len(points)] == (1,) * len(points):  # the same for all rows: not copied
+        last = np.broadcast_to(own.reshape(1, columns), (number, columns))
+    else:
+        last = np.broadcast_to(own, [shape[i] for i in order]).reshape(-1, columns)
     small = [shape[i] if i in points else 1 for i in range(len(shape))]
     rows = np.empty((*small, len(names)))
     for i, array in enumerate(arrays[:-1]):
@@ -43,7 +52,7 @@ def dense(point, names, name):
 
 def valid(rows, columns):
     """Rows and columns with NaN replaced by numbers, and where none was replaced."""
-    numbers, fine = np.isfinite(rows), np.isfinite(columns)
+    numbers, fine = np.isfinite(rows), np.isfinite(distinct(columns))
     if numbers.all() and fine.all():
         return rows, columns, fine
     numbers = numbers.all(axis=1)[:, None]

@@ -206,11 +206,13 @@ def _in_phi(method, rows, targets, rtol, by_row):
         P, starts = split(rows[pick])
         starts[:, rc.START_W] = np.abs(starts[:, rc.START_W])
         starts += 0.0  # no negative zeros
-        floats = np.full((*targets[pick].shape, rc.STATE), np.nan)
-        status = np.zeros(targets[pick].shape, dtype=np.int64)
-        at = np.array(targets[pick], order="C")
-        solve(P, starts, at, tolerance, budget, floats, status)
-        return floats, status
+        shape = len(P), targets.shape[1]
+        planes = np.full((rc.STATE, *shape), np.nan)
+        status = np.zeros(shape, dtype=np.int64)
+        own = distinct(targets)
+        at = np.array(own if len(own) < len(targets) else own[pick], order="C")
+        solve(P, starts, at, tolerance, budget, planes, status)
+        return planes.transpose(1, 2, 0), status
 
     asked = np.isfinite(distinct(targets))
     return back(_repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol))
@@ -237,20 +239,27 @@ def _repeated(run, asked, ladder, rtol):
 
 def met(results, rtol):
     """Does no answer miss the requested accuracy? As a rule; where some do, `missed` says which."""
-    floats, status = results[0], results[-1]
-    return all_within(floats.reshape(-1, floats.shape[-1]), status.reshape(-1), rtol)
+    return all_within(_planes(results[0]), results[-1].reshape(-1), rtol)
+
+
+def _planes(floats):
+    """(STATE, points), without a copy."""
+    planes = floats.transpose(2, 0, 1)
+    if planes.flags.c_contiguous:
+        return planes.reshape(len(planes), -1)
+    return floats.reshape(-1, floats.shape[-1]).T
 
 
 def missed(results, rtol):
     """Where the answer misses the requested accuracy, or there is none."""
     floats, status = results[0], results[-1]
     out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
-    points = floats.reshape(-1, floats.shape[-1])
+    planes = _planes(floats)
     for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
-        wide = np.flatnonzero(~(points[:, bar] <= rtol))  # as a rule, few
+        wide = np.flatnonzero(~(planes[bar] <= rtol))  # as a rule, few
         if wide.size:
             out.reshape(-1)[wide] |= ~(
-                points[wide, bar] <= rtol * (1.0 + np.abs(points[wide, value]))
+                planes[bar, wide] <= rtol * (1.0 + np.abs(planes[value, wide]))
             )
     return out
 

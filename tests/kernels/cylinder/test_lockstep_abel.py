@@ -15,9 +15,9 @@ MANY = lockstep.LANES + 3  # more rows than lanes
 
 
 @fresh
-def one_by_one(P, starts, targets, tolerance, limit, floats, status):
+def one_by_one(P, starts, targets, tolerance, limit, planes, status):
     steps.abels(taylor.flow_setting, taylor.flow_begin, taylor.flow_at, P, starts, targets, tolerance, limit,
-                floats, status)  # fmt: skip
+                planes, status)  # fmt: skip
 
 
 def solved(rows, over, tolerance=1e-13, run=taylor.flow_abels, limit=solution.STEPS):
@@ -25,9 +25,9 @@ def solved(rows, over, tolerance=1e-13, run=taylor.flow_abels, limit=solution.ST
     rows = np.asarray(rows, float)
     P, starts = solution.split(rows)
     targets = rows[:, 6:7] + np.asarray(over, float)
-    floats, status = np.full((*targets.shape, 4), np.nan), np.full(targets.shape, 99)
-    run(P, starts, targets, tolerance, limit, floats, status)
-    return floats, status
+    planes, status = np.full((4, *targets.shape), np.nan), np.full(targets.shape, 99)
+    run(P, starts, targets, tolerance, limit, planes, status)
+    return np.moveaxis(planes, 0, 2), status
 
 
 def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
@@ -88,7 +88,7 @@ def test_phi_is_the_variable_far_from_turning_points():
     floats, status = solved(rows, over)
     ahead = np.zeros((len(rows), lockstep_phi.STATE))
     P, starts = solution.split(rows)
-    again, codes = np.empty_like(floats), np.empty_like(status)
+    again, codes = np.empty((4, *status.shape)), np.empty_like(status)
     lockstep_phi.abels(
         P,
         starts,
@@ -100,7 +100,7 @@ def test_phi_is_the_variable_far_from_turning_points():
         codes,
     )
     assert (ahead[:, lockstep_phi.COLUMN] == len(over)).all() and (status == steps.OK).all()
-    np.testing.assert_array_equal(again, floats)
+    np.testing.assert_array_equal(np.moveaxis(again, 0, 2), floats)
     assert floats[..., 2].max() < 1e-10 and floats[..., 3].max() < 1e-10
     for i in (0, 7, 31):
         b12, b31, d, c23, s2, s3 = map(mp.mpf, rows[i, :6])
