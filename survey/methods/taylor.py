@@ -112,6 +112,16 @@ def flow_turnings(P, starts, times, tolerance, limit, turnings):
 
 
 def flow_abels(P, starts, targets, tolerance, limit, planes, status):
+    """See `_abels`."""
+    _abels(P, starts, targets, tolerance, limit, planes, status, True)
+
+
+def flow_abels_untimed(P, starts, targets, tolerance, limit, planes, status):
+    """See `_abels`."""
+    _abels(P, starts, targets, tolerance, limit, planes, status, False)
+
+
+def _abels(P, starts, targets, tolerance, limit, planes, status, timed):
     """See `lockstep_phi.abels` and `lockstep_abel.abels`, and for programs `abels` and
     `abels_near` of `lockstep_program`.
     """
@@ -122,7 +132,7 @@ def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     if P.shape[1] != COLUMNS:
         leads, rest = lockstep_program.grouped(P), (tolerance, limit, ahead, planes, status)
         for lead in np.unique(leads):
-            lockstep_program.abels(P, leads, lead, starts, far, *rest)
+            lockstep_program.abels(P, leads, lead, starts, far, *rest, timed)
             lockstep_program.abels_near(P, leads, lead, starts, targets, *rest)
         return
     # compile the longer one, by a call on nothing, while that process compiles the other
@@ -131,7 +141,7 @@ def flow_abels(P, starts, targets, tolerance, limit, planes, status):
             P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], planes[:, :0], status[:0]
         )
         waiting.wait()
-    _abels_in_angle(P, starts, far, tolerance, limit, ahead, planes, status)
+    _abels_in_angle(P, starts, far, tolerance, limit, ahead, planes, status, timed)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, planes, status)
 
 
@@ -139,15 +149,14 @@ def flow_abels_ahead():
     """Compile what `flow_abels` waits for."""
     P, none = np.empty((0, COLUMNS)), np.empty((0, EXACT_START))
     P.flags.writeable = False
-    planes = np.empty((STATE, 0, 2))
-    _abels_in_angle(
-        P, none, none, 0.0, 0, np.empty((0, lockstep_phi.STATE)), planes, np.empty((0, 2), np.int64)
-    )
+    planes, status = np.empty((STATE, 0, 2)), np.empty((0, 2), np.int64)
+    ahead = np.empty((0, lockstep_phi.STATE))
+    _abels_in_angle(P, none, none, 0.0, 0, ahead, planes, status, True)
 
 
 @kernel
-def _abels_in_angle(P, starts, targets, tolerance, limit, ahead, planes, status):
-    lockstep_phi.abels(P, starts, targets, tolerance, limit, ahead, planes, status)
+def _abels_in_angle(P, starts, targets, tolerance, limit, ahead, planes, status, timed):
+    lockstep_phi.abels(P, starts, targets, tolerance, limit, ahead, planes, status, timed)
 
 
 @kernel

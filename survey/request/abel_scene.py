@@ -95,8 +95,7 @@ class AbelScene(FunctionScene):
         rows = solution.rows(self.flows(given[:, :-2]), given[:, -2], given[:, -1])
         if question == "trajectory":
             return blocks.trajectories(rows, last, back, solution, method, request.rtol)
-        before = request.options.get("branch") == "before"
-        return blocks.abel(rows, last, back, solution, method, request.rtol, before)
+        return blocks.abel(rows, last, back, solution, method, request)
 
     def why(self, answer):
         """Why a point has its verdict (see `survey.scenes`)."""

@@ -285,8 +285,7 @@ def solve(point, request):
     )
     if question == "trajectory":
         return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request.rtol)
-    before = request.options.get("branch") == "before"
-    return blocks.abel(*blocks.dense(point, start, "phi"), measure, method, request.rtol, before)
+    return blocks.abel(*blocks.dense(point, start, "phi"), measure, method, request)
 
 
 def why(answer):

@@ -37,6 +37,37 @@ def solve(question, method="auto", rtol=1e-10, **values):
     return gyrostat.solve(point, Request({"question": question}, method, rtol))
 
 
+@pytest.mark.parametrize("method", ["auto", "dop853"])
+def test_w_alone_is_that_of_a_survey_with_times(method):
+    """Random systems at angles on both sides, some of which are beyond turning points."""
+    random = np.random.default_rng(11)
+    count = 60 if method == "auto" else 6
+    given = dict(zip(SIX, random.normal(size=(6, count)), strict=True))
+    given |= {"phi0": random.uniform(-3, 3, count), "w0": random.normal(size=count)}
+    given = {name: xr.DataArray(values, dims="i") for name, values in given.items()}
+    given |= {"phi": np.linspace(-9, 9, 53), "question": "abel", "method": method}
+    whole = survey.evaluate("gyrostat", **given)
+    alone = survey.evaluate("gyrostat", variables=["w", "phi_turning"], **given)
+    assert set(alone.data_vars) == {"w", "w_error", "phi_turning", "phi_turning_error", "status"}
+    assert {OK, gyrostat_turning()} <= set(np.unique(whole.status))
+    same = whole.status == alone.status
+    assert same.mean() > 0.999
+    for name in ("w", "phi_turning"):
+        known = same & whole[name].notnull()
+        assert (alone[name].notnull() == whole[name].notnull()).where(same, True).all()
+        bars = whole[f"{name}_error"] + alone[f"{name}_error"]
+        assert (abs(alone[name] - whole[name]) <= bars).where(known, True).all()
+        assert known.sum() > count
+    timed = survey.evaluate("gyrostat", variables=["w", "t"], **given)
+    xr.testing.assert_equal(timed.w, whole.w)
+    xr.testing.assert_equal(timed.t, whole.t)
+
+
+def gyrostat_turning():
+    """The code of the status `turning`."""
+    return 16 + list(gyrostat.STATUS).index("turning")
+
+
 def grid(*lengths):
     """Axes phi0, w0 and perhaps a third, each along its own dimension."""
     axes = [np.linspace(-3.0, 3.0, n) for n in lengths]

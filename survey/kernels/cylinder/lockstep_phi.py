@@ -318,9 +318,18 @@ def _set_eight(table, row, column, numbers):
     table[i, k + two], table[i, k + three] = numbers[6], numbers[7]
 
 
+@inline
+def _within(target, turns, psi, end):
+    """How far a target lies into the step, what its rounding may shift, and whether it is passed."""
+    x = unturned(target, turns)
+    passed = x <= end
+    return max(x - psi, 0.0) if passed else 0.0, 3e-16 * abs(target), passed
+
+
 @kernel
-def _record(T, before, state, step, i, block, targets, k, first, size, planes):
-    """Record lane i at the targets of row k, from the `first` on, within the step; returns the next.
+def _record(T, before, state, step, i, block, targets, k, first, size, planes, timed):
+    """Record lane i at the targets of row k, from the `first` on, within the step, with the times if
+    `timed`; returns the next.
 
     Where there is room a whole block is recorded: what lies beyond the step is replaced later.
     """
@@ -337,28 +346,32 @@ def _record(T, before, state, step, i, block, targets, k, first, size, planes):
     at = min(k, len(targets) - 1)
     while True:
         # read anew: broadcast from memory, where 34 vectors would be kept on the stack
-        omega, integral = _omega(T, i), _integral(T, i)
-        given = _eight(targets, at, first)
+        omega, given, count = _omega(T, i), _eight(targets, at, first), 0
         for j in range(BLOCK):
             block[j] = given[j]
-        count = 0
-        for j in range(BLOCK):
-            target = block[j]
-            x = unturned(target, turns)
-            passed = x <= end
-            count += passed
-            s, slip = max(x - psi, 0.0) if passed else 0.0, 3e-16 * abs(target)
-            value, time = w + w * _rise(omega, s), t + (_elapsed(integral, s) * inverse + t_low)
-            block[BLOCK + j], block[2 * BLOCK + j] = value, time
-            block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
-            block[4 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
+        if timed:
+            integral = _integral(T, i)
+            for j in range(BLOCK):
+                s, slip, passed = _within(block[j], turns, psi, end)
+                count += passed
+                value, time = w + w * _rise(omega, s), t + (_elapsed(integral, s) * inverse + t_low)
+                block[BLOCK + j], block[2 * BLOCK + j] = value, time
+                block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
+                block[4 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
+        else:
+            for j in range(BLOCK):
+                s, slip, passed = _within(block[j], turns, psi, end)
+                count += passed
+                block[BLOCK + j] = w + w * _rise(omega, s)
+                block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
         if first + BLOCK <= size:
             _set_eight(planes[rc.VALUE], k, first, _eight_of(block, BLOCK))
-            _set_eight(planes[rc.TIME], k, first, _eight_of(block, 2 * BLOCK))
             _set_eight(planes[rc.VALUE_BAR], k, first, _eight_of(block, 3 * BLOCK))
-            _set_eight(planes[rc.TIME_BAR], k, first, _eight_of(block, 4 * BLOCK))
+            if timed:
+                _set_eight(planes[rc.TIME], k, first, _eight_of(block, 2 * BLOCK))
+                _set_eight(planes[rc.TIME_BAR], k, first, _eight_of(block, 4 * BLOCK))
         else:
-            for n in range(rc.STATE):
+            for n in range(0, rc.STATE, 1 if timed else 2):
                 for j in range(count):
                     planes[n, k, first + j] = block[(n + 1) * BLOCK + j]
         first += count
@@ -415,9 +428,10 @@ def _refill(P, starts, targets, status, waiting, state, fixed, row, sizes, goal,
 
 
 @inline
-def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
+def abels(P, starts, targets, tolerance, limit, ahead, planes, status, timed):
     """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`, but
-    that the rows of `targets` end with BLOCK infinities, and results go to planes (STATE, rows, n).
+    that the rows of `targets` end with BLOCK infinities, and results go to planes (STATE, rows, n), those of
+    the time only if `timed`.
 
     `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and
     COLUMN is the number of its targets where all are known.
@@ -457,7 +471,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
             size, j = sizes[i], int(state[COLUMN, i])
             if sound:
-                j = _record(T, before, state, step, i, block, targets, k, j, size, planes)
+                j = _record(T, before, state, step, i, block, targets, k, j, size, planes, timed)
             far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
             if j < size and sound and far and state[COUNT, i] < limit:
                 state[COLUMN, i], goal[i] = j, row_of(targets, k)[j]

@@ -550,7 +550,7 @@ _expand = far.expansion(far.given)
 
 
 @kernel
-def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, status):
+def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, status, timed):
     """As `lockstep_phi.abels`, of the rows of P that have the program `lead`."""
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
     circle = p[ON_CIRCLE] > 0.0
@@ -615,7 +615,9 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
             sound = math.isfinite(w) and bound < far.SURE * w
             size, j = sizes[i], int(state[far.COLUMN, i])
             if sound:
-                j = far._record(T, before, state, step, i, block, targets, k, j, size, planes)
+                j = far._record(
+                    T, before, state, step, i, block, targets, k, j, size, planes, timed
+                )
             if j < size and sound and far._far(w, bound, fixed[BOUND_G, i]):
                 if state[far.COUNT, i] < limit:
                     state[far.COLUMN, i], goal[i] = j, row_of(targets, k)[j]

@@ -35,6 +35,10 @@ METHODS = {
             "phi >= phi0, for w0 >= 0",
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
+        "flow_abels_untimed": Function(
+            "the same without times, whose planes are left as they are where that saves time",
+            ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
+        ),
         "flow_abels_by_row": Function(
             "the same, one row after the other, where that is compiled sooner",
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),

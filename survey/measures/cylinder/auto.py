@@ -39,9 +39,9 @@ def trajectories(method, rows, times, rtol):
     return _by_rows(rows, times, partial(_trajectories, method, rtol))
 
 
-def abel(method, rows, targets, rtol, before=False):
+def abel(method, rows, targets, rtol, before=False, timed=True):
     """As `solution.abel`, likewise."""
-    return _by_rows(rows, targets, partial(_abel, method, rtol, before))
+    return _by_rows(rows, targets, partial(_abel, method, rtol, before, timed))
 
 
 def _by_rows(rows, columns, solve):
@@ -88,12 +88,12 @@ def _trajectories(method, rtol, rows, times, served):
     return _further(solve, method, rtol, results, missed, rows, times)
 
 
-def _abel(method, rtol, before, rows, targets, served):
-    solve = partial(solution.abel, rtol=rtol, before=before)
+def _abel(method, rtol, before, timed, rows, targets, served):
+    solve = partial(solution.abel, rtol=rtol, before=before, timed=timed)
     if not served:
         results = solve(method, rows, targets)
         return _completed(
-            results, _left_open(results, rtol), partial(solve, taylor_double), rows, targets
+            results, _left_open(results, rtol, timed), partial(solve, taylor_double), rows, targets
         )
     results = solve(closed, rows, targets)
     missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
@@ -115,12 +115,12 @@ def _further(solve, method, rtol, results, missed, rows, columns):
     return results
 
 
-def _left_open(results, rtol):
+def _left_open(results, rtol, timed=True):
     """The points that double-double arithmetic may still answer: those that miss rtol, unless by
     too many steps or an overflow, and those that have turned an undetermined number of times.
     """
     status = results[-1]
-    if solution.met(results, max(rtol, FINEST)):
+    if solution.met(results, max(rtol, FINEST), timed):
         missed = np.zeros(status.shape, bool)
     else:
         missed = solution.missed(results, max(rtol, FINEST))

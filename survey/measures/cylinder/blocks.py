@@ -11,6 +11,7 @@ from survey.measures.cylinder.solution import distinct
 from survey.status import INVALID_PARAMETERS, OK
 
 MOST_TURNINGS = 2**31 - 1  # are kept as int32
+TIMES = {"t", "t_turning"}
 # how far beside parameters others are tried: a number that vanishes there too is taken for 0 throughout
 BESIDE = 1e-3
 
@@ -81,13 +82,18 @@ def at_times(results, good, back):
     return results | {"turnings": back(turnings), "status": back(status)}
 
 
-def abel(rows, targets, back, measure, method, rtol, before):
-    """w, t, the turning point and status at the angles; `measure` is `solution` or `auto`."""
+def abel(rows, targets, back, measure, method, request):
+    """w, t if it is wanted, the turning point and status at the angles; `measure` is `solution` or
+    `auto`.
+    """
+    before = request.options.get("branch") == "before"
+    timed = not request.variables or not TIMES.isdisjoint(request.variables)
     rows, targets, good = valid(rows, targets)
-    return at_angles(measure.abel(method, rows, targets, rtol, before), good, back)
+    results = measure.abel(method, rows, targets, request.rtol, before, timed=timed)
+    return at_angles(results, good, back, timed)
 
 
-def at_angles(results, good, back):
+def at_angles(results, good, back, timed=True):
     """The outputs of the question `abel`, from floats and status where the input is `good`."""
     floats, status = results
     if not good.all():
@@ -98,7 +104,7 @@ def at_angles(results, good, back):
         here = status == code
         some, every = here.any(), here.all()
         for name, value, bar in zip(
-            names, (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=True
+            names[: 1 + timed], (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=False
         ):
             for key, at in ((name, value), (f"{name}_error", bar)):
                 values = floats[..., at]

@@ -292,9 +292,13 @@ class SeparatrixAware:
             self.measure.trajectories(method, rows, times, rtol), rows, times, rtol, trajectories
         )
 
-    def abel(self, method, rows, targets, rtol, before=False):
+    def abel(self, method, rows, targets, rtol, before=False, timed=True):
         return self._replaced(
-            self.measure.abel(method, rows, targets, rtol, before), rows, targets, rtol, abel
+            self.measure.abel(method, rows, targets, rtol, before, timed=timed),
+            rows,
+            targets,
+            rtol,
+            abel,
         )
 
     def _replaced(self, results, rows, columns, rtol, measure):

@@ -143,7 +143,7 @@ def _count(method, rows, times, tolerance, asked, results):
         turnings[pick] = np.where(status[pick] == OK, counted, turnings[pick])
 
 
-def abel(method, rows, targets, rtol, before=False, by_row=False):
+def abel(method, rows, targets, rtol, before=False, by_row=False, timed=True):
     """VALUE to TIME_BAR of `records` (last axis) and status at phi = `targets` (rows, columns).
 
     Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in
@@ -151,13 +151,13 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
     side it has turned at t = 0.
 
     `by_row`: one row after the other, which is compiled 12 s sooner than lock step: for those who
-    need few.
+    need few. Unless `timed`, TIME and TIME_BAR need not be known, and say nothing.
     """
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
     least = distinct(targets).min(axis=1, keepdims=True, initial=np.inf)
     if targets.size and (past == past[0]).all() and (least >= phi0).all():  # as a rule
-        return _branch(method, rows, targets, rtol, 1.0, past[0], by_row)
+        return _branch(method, rows, targets, rtol, 1.0, past[0], by_row, timed)
     floats = np.full((*targets.shape, rc.STATE), np.nan)
     status = np.zeros(targets.shape, dtype=np.int64)
     for side in (1.0, -1.0):
@@ -173,11 +173,11 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
                 at = slice(same[0], same[-1] + 1)
                 some = slice(None) if picked.all() else picked
                 floats[some, at], status[some, at] = _branch(
-                    method, rows[some], targets[some, at], rtol, side, past, by_row
+                    method, rows[some], targets[some, at], rtol, side, past, by_row, timed
                 )
                 continue
             at = np.where(mine, targets[picked], side * np.inf)
-            found = _branch(method, rows[picked], at, rtol, side, past, by_row)
+            found = _branch(method, rows[picked], at, rtol, side, past, by_row, timed)
             for result, new in zip((floats, status), found, strict=True):
                 held = result[picked]
                 held[mine] = new[mine]
@@ -185,11 +185,13 @@ def abel(method, rows, targets, rtol, before=False, by_row=False):
     return floats, status
 
 
-def _branch(method, rows, targets, rtol, side, past, by_row):
+def _branch(method, rows, targets, rtol, side, past, by_row, timed):
     """As `abel`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
     rows = reverse(rows) if past else rows
     rows = mirror(rows) if side < 0 else rows
-    floats, status = _in_phi(method, rows, side * targets if side < 0 else targets, rtol, by_row)
+    floats, status = _in_phi(
+        method, rows, side * targets if side < 0 else targets, rtol, by_row, timed
+    )
     if side < 0 or past:
         floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
         floats[..., rc.TIME] *= -1.0 if past else 1.0
@@ -197,9 +199,11 @@ def _branch(method, rows, targets, rtol, side, past, by_row):
     return floats, status
 
 
-def _in_phi(method, rows, targets, rtol, by_row):
+def _in_phi(method, rows, targets, rtol, by_row, timed):
     targets, back = _sorted(targets)
     solve = getattr(method, "flow_abels_by_row", method.flow_abels) if by_row else method.flow_abels
+    if not timed:
+        solve = getattr(method, "flow_abels_untimed", solve)
     budget = STEPS * min(method.FLOW_WORK, 10)
 
     def run(pick, tolerance):
@@ -207,7 +211,8 @@ def _in_phi(method, rows, targets, rtol, by_row):
         starts[:, rc.START_W] = np.abs(starts[:, rc.START_W])
         starts += 0.0  # no negative zeros
         shape = len(P), targets.shape[1]
-        planes = np.full((rc.STATE, *shape), np.nan)
+        planes = np.zeros((rc.STATE, *shape))
+        planes[:: 1 if timed else 2] = np.nan  # zeros that no one needs cost nothing
         status = np.zeros(shape, dtype=np.int64)
         own = distinct(targets)
         at = np.array(own if len(own) < len(targets) else own[pick], order="C")
@@ -215,15 +220,15 @@ def _in_phi(method, rows, targets, rtol, by_row):
         return planes.transpose(1, 2, 0), status
 
     asked = np.isfinite(distinct(targets))
-    return back(_repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol))
+    return back(_repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol, timed))
 
 
-def _repeated(run, asked, ladder, rtol):
+def _repeated(run, asked, ladder, rtol, timed=True):
     """Solve all rows, then again, finer, those that miss the requested accuracy; keep the better of two."""
     first, *others = ladder
     results = run(slice(None), first)
     for tolerance in others:
-        if met(results, rtol):
+        if met(results, rtol, timed):
             break
         coarse = (missed(results, rtol) & asked).any(axis=1)
         if not coarse.any() or tolerance >= first:
@@ -237,9 +242,13 @@ def _repeated(run, asked, ladder, rtol):
     return results
 
 
-def met(results, rtol):
+def met(results, rtol, timed=True):
     """Does no answer miss the requested accuracy? As a rule; where some do, `missed` says which."""
-    return all_within(_planes(results[0]), results[-1].reshape(-1), rtol)
+    planes, status = _planes(results[0]), results[-1].reshape(-1)
+    pairs = ((rc.VALUE, rc.VALUE_BAR), (rc.TIME, rc.TIME_BAR))  # PHI and W likewise
+    return all(
+        all_within(planes[value], planes[bar], status, rtol) for value, bar in pairs[: 1 + timed]
+    )
 
 
 def _planes(floats):
