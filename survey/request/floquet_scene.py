@@ -95,6 +95,16 @@ class FloquetScene(TracedScene):
         return 1e-7 * n + (left + NODES / np.prod(longest)) * alone
 
     @property
+    def remark(self):
+        """A sentence for `survey plan` where the number of states costs series, or None."""
+        if len(self.states) <= dense.LARGEST:
+            return None
+        return (
+            f"{len(self.states)} states: series serve at most {dense.LARGEST}, so each point is solved on its own, "
+            f"which takes about {1e3 * self._alone:.2g} ms"
+        )
+
+    @property
     def curves_seconds(self):
         """Seconds that the curves of a map take, roughly: a lattice, and points of curves, most of
         them in narrow tongues, which damped systems do not have; measured on the examples in

@@ -106,6 +106,7 @@ CONTRACT = {
         "seconds that the curves of [boundaries] take on a map of the whole domain, where they are searched",
         float,
     ),
+    "remark": Value("a sentence that `survey plan` adds, on what makes the scene slow", str),
     "solve": Function("{output: array} of a block, see above", ("point", "request"), needed=True),
     "why": Function(
         "a sentence: what decided the verdict, by which margin against which error bar", ("answer",)

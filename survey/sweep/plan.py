@@ -55,6 +55,7 @@ def plan(workflow):
         "bytes": size,
         "size": filesize.decimal(size),
         "method": request.method,
+        **_remark(scene),
         "rtol": request.rtol,
         "variables": ", ".join(name for name in layout(scene, request)),
         **parts,
@@ -65,6 +66,12 @@ def plan(workflow):
         "time_from": LEARNT if measured.knows(workflow) else GUESSED,
         "compiling": _compiling(workflow),
     }
+
+
+def _remark(scene):
+    """What the scene itself says of its cost, if anything."""
+    words = getattr(scene, "remark", None)
+    return {"remark": words} if words else {}
 
 
 def _compiling(workflow):

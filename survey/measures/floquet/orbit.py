@@ -173,6 +173,8 @@ def _defined(equation, points):
     """Where (N) f is finite at the start."""
     found = np.zeros(len(points), bool)
     guess, period = equation.begin(points)
+    # where f does not depend on t, a period that is not known says nothing of f
+    period = np.where(np.isnan(period), 1.0, period) if equation.free else period
     some = np.flatnonzero(np.isfinite(guess).all(axis=1) & np.isfinite(period))
     found[some] = equation.defined(points[some], guess[some], period[some])
     return found

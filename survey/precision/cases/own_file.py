@@ -1,21 +1,27 @@
-"""The chart of a user's own file: a row, a map and scattered points of its first two parameters."""
+"""The chart of a user's own Hill equation or linear system: a row, a map and scattered points of its
+first two parameters.
+"""
 
 from types import SimpleNamespace
 
 import numpy as np
 
 from survey.precision.known import references as known
-from survey.truth import digits
+from survey.request import ranges
+from survey.request.floquet_scene import FloquetScene
+from survey.truth import digits, own_systems
 
-ERROR = "discriminant"
+ERROR = "discriminant"  # of Hill equations; of linear systems the spectral radius
 ROW, MAP, SCATTERED, POINTS = 2_000, (60, 80), 2_000, 24
 
 
 def case(path):
-    """What a file in `cases` offers, for a user's Hill equation in a file, or in a workflow with
-    its ranges.
+    """What a file in `cases` offers, for a user's Hill equation or linear system in a file, or in a
+    workflow with its ranges.
     """
-    found, truth = digits.of_file(path)
+    linear = isinstance(ranges.of(path).scene, FloquetScene)
+    found, truth = (own_systems if linear else digits).of_file(path)
+    error = "spectral_radius" if linear else ERROR
     names, fixed = list(found.axes), dict(found.fixed)
 
     def scattered(number, seed):
@@ -35,11 +41,11 @@ def case(path):
             names[0]: found.values(names[0], MAP[1])[None, :],
         }
         works["map {}x{}".format(*MAP)] = (across | grid, {})
-    exact = known(truth, scattered(POINTS, 5), {}, ERROR)
+    exact = known(truth, scattered(POINTS, 5), {}, error)
     most = {"rk4": 500, "dop853": 500}
     return SimpleNamespace(
         SCENE=found.scene,
-        ERROR=ERROR,
+        ERROR=error,
         MOST=most,
         NAME=found.name,
         works=lambda: works,
