@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import ground_resonance
+import mpmath as mp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -83,6 +84,53 @@ def test_a_quadrupoles_damping_in_closed_form():
         ours = ds.isel(k=i).transpose("q", "a", ...)
         assert (abs(ours.exponent.values - exact) <= ours.exponent_error.values + bar + 1e-15).all()
         assert (ours.verdict.values == (exact < 0)).all()
+
+
+@pytest.mark.parametrize(
+    "delta, epsilon, zeta, verdict",
+    [(1.0, 0.42, 0.1, 0), (1.0, 0.38, 0.1, 1), (4.2, 2.7, 0.1, 0), (2.5, 3.0, 0.1, 1), (-0.5, 1.0, 0.3, 0)],
+)  # fmt: skip
+def test_damped_multipliers_in_closed_form(delta, epsilon, zeta, verdict):
+    """exp(-pi zeta) times those of Mathieu's equation at delta - zeta^2, which mpmath integrates to 30 digits."""
+    with mp.workdps(30):
+        d, e, damping = (mp.mpf(value) for value in (delta, epsilon, zeta))
+        rest = d - damping**2
+
+        def slope(t, y):
+            return [y[1], -(rest + e * mp.cos(2 * t)) * y[0]]
+
+        columns = [mp.odefun(slope, 0, start)(mp.pi) for start in ([1, 0], [0, 1])]
+        half = (columns[0][0] + columns[1][1]) / 2
+        root = mp.sqrt(mp.mpc(half**2 - 1))
+        exact = [mp.exp(-mp.pi * damping) * (half + sign * root) for sign in (1, -1)]
+        ds = survey.evaluate(
+            str(FOLDER / "damped_mathieu.py"), delta=delta, epsilon=epsilon, zeta=zeta
+        )
+        ours = ds.multiplier_re.values + 1j * ds.multiplier_im.values
+        for value in exact:
+            k = int(abs(ours - complex(value)).argmin())
+            for name, part in (("multiplier_re", value.real), ("multiplier_im", value.imag)):
+                off = abs(mp.mpf(float(ds[name][k])) - part)
+                assert off <= float(ds[f"{name}_error"][k]) < 1e-10
+        assert int(ds.verdict) == verdict == (max(map(abs, exact)) < 1)
+
+
+def test_damped_tongues_in_closed_form():
+    """On a map: the exponents of the scene `mathieu` less zeta, and the sign of the difference."""
+    delta, epsilon, zeta = np.linspace(-1.0, 7.0, 33), np.linspace(0.0, 6.0, 25), [0.03, 0.1, 0.4]
+    ds = survey.evaluate(str(FOLDER / "damped_mathieu.py"), delta=delta, epsilon=epsilon, zeta=zeta)
+    for i, damping in enumerate(zeta):
+        one = survey.evaluate("mathieu", a=delta - damping**2, q=epsilon / 2)
+        one = one.transpose("a", "q", ...)
+        exact = np.maximum(one.exponent.values, 0.0) / np.pi - damping
+        bar = one.exponent_error.values / np.pi
+        ours = ds.isel(zeta=i).transpose("delta", "epsilon", ...)
+        known = ours.verdict.values >= 0
+        # at delta = epsilon = 0 a multiplier is 1, and only there nothing is decided
+        assert (~known == (delta[:, None] == 0.0) & (epsilon == 0.0)).all()
+        assert (ours.verdict.values == (exact < 0))[known].all()
+        off = abs(ours.exponent.values - exact)
+        assert (off <= ours.exponent_error.values + bar + 1e-15).all()
 
 
 def test_the_quadrupoles_first_region():
