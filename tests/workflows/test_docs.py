@@ -347,6 +347,7 @@ def test_a_scene_with_its_mathematics_has_its_notebook_and_its_kept_file():
     named -= {"gyrostat_integrable"}
     assert {path.stem for path in NOTEBOOKS} == named | {
         "abel",
+        "own_examples",
         "own_hill",
         "own_system",
         "overnight",
