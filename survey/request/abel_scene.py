@@ -175,7 +175,7 @@ class AbelScene(FunctionScene):
                 continue
             except IndexError as error:
                 self._refuse_index(f"{name}(phi, p)", error)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 self._refuse(
                     f"{name}(phi, p) fails ({type(error).__name__}: {reason(error)})", "correct it"
                 )

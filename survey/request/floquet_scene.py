@@ -456,7 +456,8 @@ class FloquetScene(TracedScene):
     def _plain(self, name, time, point):
         """The matrix of this name, from the code run on numbers."""
         m = self._size_of(name)
-        return self._filled(self.matrices[name], (float(time), point), (m, m))
+        given = (float(time), point), (m, m)
+        return self._again(self.matrices[name], f"{name}(t, p, out)", *given)
 
     def _try(self, point):
         """Raise BadInput unless the functions, run as Python, fill their matrices."""

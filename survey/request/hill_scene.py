@@ -461,10 +461,12 @@ class HillScene(FunctionScene):
         try:
             with np.errstate(all="ignore"):
                 value = getattr(self.z, "py_func", self.z)(0.25, point)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             failed = error
         if isinstance(failed, IndexError):
             self._refuse_index("z(u, p)", failed)
+        if isinstance(failed, SystemExit):
+            self._refuse(f"z(u, p) fails (SystemExit: {reason(failed)})", "correct it")
         try:
             user_equation.at(self.z, np.empty((0, len(self.PARAMETERS))), np.empty((0, 1)))
         except user_equation.Raised as error:
@@ -489,7 +491,7 @@ class HillScene(FunctionScene):
             return np.asarray(given(p), dtype=float)
         except (ArithmeticError, ValueError):
             return np.float64(np.nan)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self._refuse(
                 f"{name}(p) fails ({type(error).__name__}: {reason(error)})",
                 "it must return numbers",

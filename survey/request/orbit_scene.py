@@ -281,7 +281,8 @@ class OrbitScene(TracedScene):
 
     def _at(self, t, x, point):
         """f from the code run on numbers."""
-        return self._filled(self.f, (float(t), x.copy(), point), (len(self.states),))
+        given = (float(t), x.copy(), point), (len(self.states),)
+        return self._again(self.f, "f(t, x, p, out)", *given)
 
     def _compare(self, programs, point, x, T):
         """Refuse what the recorded operations show: other values than the code's, no period,

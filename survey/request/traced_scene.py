@@ -50,8 +50,18 @@ class TracedScene(FunctionScene):
         """As `_filled`, but NaN where the function fails in any way."""
         try:
             return self._filled(function, arguments, shape)
-        except Exception:
+        except (Exception, SystemExit):
             return np.full(shape, np.nan)
+
+    def _again(self, function, call, arguments, shape):
+        """As `_filled`, but BadInput, naming the time, if the function fails there, though not where
+        it was tried first.
+        """
+        try:
+            return self._filled(function, arguments, shape)
+        except (Exception, SystemExit) as error:
+            why = f"{type(error).__name__}: {reason(error)}"
+            self._refuse(f"{call} fails at t = {arguments[0]:g} ({why})", "correct it")
 
     def _tried(self, function, call, arguments, shape, sizes, what):
         """As `_filled`, but BadInput if the function fails; `sizes` says what it may index, `what`
@@ -63,7 +73,7 @@ class TracedScene(FunctionScene):
             if "only integers" in str(error):
                 self._refuse_name(call)
             self._refuse(f"{call} indexes beyond an array ({error})", sizes)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             if isinstance(error, AttributeError) and "'numpy.ndarray'" in str(error):
                 self._refuse_name(call)
             if isinstance(error, TypeError) and "'complex'" in str(error):
@@ -82,7 +92,7 @@ class TracedScene(FunctionScene):
         """Refuse the function of this name if it fails at the point."""
         try:
             function(point)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             self._refuse(f"{name}(p) fails ({type(error).__name__}: {reason(error)})", "correct it")
 
     def _called(self, function, *arguments):

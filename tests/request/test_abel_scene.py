@@ -137,6 +137,10 @@ def bad(phi, p):
     raise RuntimeError("no")
 
 
+def ends(phi, p):
+    raise SystemExit(3)
+
+
 @pytest.mark.parametrize(
     ("given", "words"),
     [
@@ -159,6 +163,7 @@ def test_wrong_scenes_are_one_line(given, words):
     ("given", "words"),
     [
         ({"f": bad}, r"f\(phi, p\) fails \(RuntimeError: no\)"),
+        ({"g": ends}, r"g\(phi, p\) fails \(SystemExit: 3\)"),
         ({"g": lambda phi, p: p[3]}, r"g\(phi, p\) indexes beyond an array.*p\[0\] to p\[0\]"),
         ({"g": lambda phi, p: p["mu"]}, "write p"),
         ({"g": lambda phi, p: [phi]}, r"g\(phi, p\) returns \[0.25\]"),

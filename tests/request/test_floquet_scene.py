@@ -331,6 +331,53 @@ def test_wrong_functions_are_one_line(given, words):
     assert "\n" not in str(refusal.value)
 
 
+def ends(*_):
+    raise SystemExit(3)
+
+
+def late(t, p, out):
+    if t > 2.0:
+        raise RuntimeError("too late")
+    out[0, 0] = p[0]
+
+
+@pytest.mark.parametrize("key", ["K", "C", "M", "period", "breaks", "conserved"])
+def test_a_function_that_ends_python_is_one_line(key):
+    with_A = {"K": None, "C": None, "A": lambda t, p, out: out.__setitem__((0, 1), 1.0)}
+    own = {"states": ("x", "y"), **with_A} if key == "conserved" else {}
+    given = {key: (lambda t, p, out: ends()) if key in "KCM" else lambda p: ends()}
+    with pytest.raises(BadInput, match=r"fails \(SystemExit: 3\)") as refusal:
+        survey.evaluate(scene(**own, **given), delta=[1.0, 2.0], epsilon=0.3, zeta=0.1)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_function_may_be_interrupted():
+    def K2(t, p, out):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        survey.evaluate(scene(K=K2), delta=1.0, epsilon=0.3, zeta=0.1)
+
+
+def test_a_function_that_fails_late_is_one_line():
+    with pytest.raises(BadInput, match=r"K\(t, p, out\) fails at t = 2\..* \(RuntimeError: too"):
+        survey.evaluate(scene(K=late), delta=1.0, epsilon=0.3, zeta=0.1)
+
+
+@pytest.mark.parametrize("how", ["in A", "at once"])
+def test_a_run_of_a_file_that_ends_python_says_so(program, tmp_path, monkeypatch, how):
+    inside = {"in A": "    raise SystemExit(3)\n", "at once": "    pass\nraise SystemExit(3)\n"}
+    (tmp_path / "mine.py").write_text(
+        "PARAMETERS, STATES, PERIOD = ('delta', 'epsilon', 'zeta'), ('x', 'v'), 1.0\n"
+        f"def A(t, p, out):\n{inside[how]}"
+    )
+    (tmp_path / "mine.toml").write_text(WORKFLOW)
+    monkeypatch.chdir(tmp_path)
+    run = program("run", "mine.toml", "-o", "mine.nc")
+    assert run.returncode == 2 and "(SystemExit: 3)" in run.stderr
+    assert "Traceback" not in run.stderr
+
+
 def test_a_file_without_its_names_is_one_line(tmp_path):
     for name in ("STATES", "PERIOD", "PARAMETERS"):
         path = tmp_path / f"{name}.py"

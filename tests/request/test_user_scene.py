@@ -183,6 +183,12 @@ BAD = [
     ("PERIOD = pi", "PERIOD = lambda p: p[2]", r"PERIOD\(p\) fails"),
     (
         "PERIOD = pi",
+        "def PERIOD(p):\n    raise SystemExit(3)",
+        r"PERIOD\(p\) fails \(SystemExit: 3\)",
+    ),
+    ("return p[0]", "raise SystemExit(3)\n    p[0]", r"z\(u, p\) fails \(SystemExit: 3\)"),
+    (
+        "PERIOD = pi",
         "PERIOD = 3.0",
         r"EVEN = True, but z\(T - u\) is not z\(u\) at a = 1, q = 0.5, T = 3",
     ),

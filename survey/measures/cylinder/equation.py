@@ -316,7 +316,7 @@ def recorded(function, name, record, p):
     except ArithmeticError:
         record.raised = True
         return record.constant(np.nan).index
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise Raised(name) from error
 
 

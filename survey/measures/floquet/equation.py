@@ -76,11 +76,11 @@ class Equation:
             row = value(p) if callable(value) else value
         except (ArithmeticError, ValueError):
             return np.full(size, np.nan)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise Raised(name) from error
         try:
             row = np.atleast_1d(np.asarray(row, dtype=float))
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise Raised(name) from error
         if row.shape != (size,):
             what = (
@@ -169,7 +169,7 @@ class Equation:
             raise Unsupported(
                 f"f(t, x, p, out): {error}, while its operations are recorded"
             ) from error
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise Raised("f(t, x, p, out)") from error
         if out.shape != (n,):
             what = f"f(t, x, p, out) returns an array of shape {out.shape}, not {(n,)}"

@@ -114,7 +114,7 @@ class System:
         graph = Graph([float(x) for x in points[0]], 0.25)
         try:
             found = graph.lift(trace.lifted(self.period)(graph.parameters))
-        except Exception:
+        except (Exception, SystemExit):
             return None
         if graph.guards or graph.equalities or not found.is_number:
             return None
@@ -127,7 +127,7 @@ class System:
             for value in (self.period, self.breaks):
                 if callable(value):
                     trace.lifted(value)(graph.parameters)
-        except Exception:
+        except (Exception, SystemExit):
             return False
         return not graph.guards and not graph.equalities
 
@@ -136,7 +136,7 @@ class System:
             return value(p) if callable(value) else value
         except (ArithmeticError, ValueError):
             return np.nan
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise Raised(f"{name}(p)") from error
 
     def _number(self, name, value, p):
@@ -219,7 +219,7 @@ class System:
             raise Unsupported(
                 f"{name}(t, p, out): {error}, while its operations are recorded"
             ) from error
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise Raised(f"{name}(t, p, out)") from error
         if out.shape != (size, size):
             what = f"{name}(t, p, out) returns an array of shape {out.shape}, not {(size, size)}"

@@ -502,6 +502,10 @@ def fails(t, x, p, out):
     raise KeyError("k")
 
 
+def ends(*_):
+    raise SystemExit(3)
+
+
 def skewed(t, x, p, out):
     out[0, 1], out[1, 0] = 1.0, 1.0
 
@@ -519,6 +523,10 @@ def right_at_rest(t, x, p, out):
         ({"f": branches}, "a branch depends on t or on a state"),
         ({"f": short}, "indexes beyond an array"),
         ({"f": fails}, "fails \\(KeyError"),
+        ({"f": lambda t, x, p, out: ends()}, "f\\(t, x, p, out\\) fails \\(SystemExit: 3"),
+        ({"period": lambda p: ends()}, "period\\(p\\) fails \\(SystemExit: 3"),
+        ({"start": lambda p: ends()}, "start\\(p\\) fails \\(SystemExit: 3"),
+        ({"jacobian": lambda t, x, p, out: ends()}, "out\\) fails \\(SystemExit: 3"),
         ({"f": lambda t, x, p, out: [x[0]]}, "shape \\(1,\\)"),
         ({"period": -1.0}, "period = -1.0"),
         ({"period": 3.0}, "differs from f\\(t\\)"),
