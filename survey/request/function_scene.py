@@ -123,12 +123,15 @@ class FunctionScene:
 
 
 def refusal(name, message):
-    """The BadInput of a scene: what its file calls EVEN is `even` to who gave it to `survey.hill`,
-    and so on.
+    """The BadInput of a scene."""
+    return BadInput(f"{name}: {with_keys(name, message)}")
+
+
+def with_keys(name, message):
+    """The message with the keys of the scene: what its file calls EVEN is `even` to who gave it to
+    `survey.hill`, and so on.
     """
-    return BadInput(
-        f"{name}: {message if name.endswith('.py') else _KEYS.sub(lambda key: key[0].lower(), message)}"
-    )
+    return message if name.endswith(".py") else _KEYS.sub(lambda key: key[0].lower(), message)
 
 
 def reason(error):

@@ -16,6 +16,7 @@ from survey.measures.floquet.equation import Equation
 from survey.measures.floquet.symmetry import Symmetry
 from survey.measures.floquet.system import TRIED
 from survey.request.floquet_scene import SAME
+from survey.request.function_scene import with_keys
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
@@ -29,9 +30,7 @@ BRANCH = Parameter(
 )  # fmt: skip
 STATUS = {
     "invalid_parameters": "outside the domain, or start, period or f there is not finite, or the period not positive",
-    "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends: "
-    "give a better start, or PERIOD = None if f does not depend on t; or, with CONTINUATION, the point has fewer "
-    "orbits than `branch`",
+    "no_orbit": "Newton's method does not converge from the start, or no orbit is shown to exist near where it ends",
 }
 
 
@@ -49,8 +48,35 @@ class OrbitScene(TracedScene):
     FAMILY = "orbit"
     AUDIT = ("dop853",)
     OPTIONS = ()
-    STATUS = STATUS
     compile_ahead = staticmethod(compile_ahead)
+
+    @property
+    def STATUS(self):
+        """The statuses; that of a point without an orbit says what may help with this f."""
+        fewer = "" if self.continued is None else "the point has fewer orbits than `branch`, or "
+        better = with_keys(self.NAME, self._better)
+        return STATUS | {"no_orbit": f"{fewer}{STATUS['no_orbit']}: {better}"}
+
+    @property
+    def _better(self):
+        """What may help where no orbit is found, without a semicolon, which ends a sentence in files."""
+        better = "give a better start"
+        if self.symmetry is not None:
+            return better
+        if self.period is None:
+            n = len(self.states)
+            if n < 4 or n % 2:
+                family = "unless the system is conservative, as its orbits then form families, and REVERSED and HELD"
+                return f"{better}, {family}, which tell these apart, need an even number of states, four at least"
+            family = "if the system is conservative, so that its orbits form families"
+            return f"{better}, or, {family}, name REVERSED and HELD, which tell these apart"
+        uses = self.equation.uses_time
+        if uses is None:
+            return f"{better}, or PERIOD = None if f does not depend on t"
+        if uses:
+            return better
+        free = "f does not depend on t, so that the period of an orbit that moves is to be found"
+        return f"{free}: set PERIOD = None, and give START a guess of the period after the states"
 
     @property
     def PARAMETERS(self):

@@ -38,6 +38,13 @@ class Equation:
         return self.period is None
 
     @property
+    def uses_time(self):
+        """Does f depend on t where it was recorded? None where it has not been."""
+        with LOCK:
+            known = list(self._traces)
+        return any(trace.TIME in programs.f.order for programs in known) if known else None
+
+    @property
     def share(self):
         """The share of the period that is integrated."""
         return 1.0 if self.symmetry is None else SHARE
