@@ -4,6 +4,7 @@ import logging
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,6 +21,9 @@ LARGEST = 64  # states
 NODES = 1500  # that a map asks for, roughly
 SOME = 4  # points at which a structure is tried
 SAME = 1e-9  # relative to the largest entry: what counts as periodic, as symplectic, as the same
+# As shares of the period: how closely a pole is sought, and where A is compared beside it; by how much
+# it must grow from each of these to the next, 100 times if the pole is simple. A logarithm grows less.
+NEAREST, BESIDE, POLE = 1e-14, (1e-6, 1e-8, 1e-10), 30.0
 STATUS = {
     "invalid_parameters": "outside the domain, or A or T is not finite there, or A does not have the stated structure",
     "no_convergence": "a branch of the code changes between BREAKS: name every time at which A jumps or has a kink",
@@ -265,6 +269,7 @@ class FloquetScene(TracedScene):
         self._known.update(_effort(known))
         spikes = self._called(probing.spikes, known)
         for i in np.flatnonzero(np.isfinite(spikes)):
+            self._refuse_infinite(known, i, spikes[i])
             self._refuse(
                 f"A has a spike near t = {spikes[i]:.6g} at {self._where(given[i])}, too narrow to be seen in a run",
                 "name its position in BREAKS",
@@ -290,6 +295,34 @@ class FloquetScene(TracedScene):
             raise BadInput(f"{what} at {here}; {remedy}") from None
         self._refuse(
             f"A has no finite value at {self._where(given[0])}",
+            "correct it, or the domains of PARAMETERS",
+        )
+
+    def _refuse_infinite(self, points, i, t):
+        """Refuse A if what seems a spike near t, at the i-th of these SystemPoints, is a pole."""
+        point, edges = points.points[i], points.edges[i]
+        programs = next(group.programs for group in points.groups if i in group.own)
+        period = edges[-1]
+
+        def size(t):
+            own = abs(self._at(programs, point, edges, t)).max(axis=(1, 2))
+            return np.where(np.isnan(own), np.inf, own)
+
+        half = 8 * period / probing.CHECKED
+        while half > NEAREST * period:
+            some = t + half * np.linspace(-1.0, 1.0, 33)
+            t = some[size(some).argmax()]
+            half /= 8
+        grown = [size(t + d * period * np.array([-1.0, 1.0])).max() for d in BESIDE]
+        if not all(near > POLE * far for far, near in pairwise(grown)):
+            return
+        what = "A seems to be infinite"
+        if "M" in self.matrices:
+            singular = np.linalg.svd(self._plain("M", t, point), compute_uv=False)
+            if singular[-1] <= SAME * singular[0] or singular.size == 1:
+                what = "M seems to be singular"
+        self._refuse(
+            f"{what} near t = {t:.6g} at {self._where(point)}, where the system has no solution",
             "correct it, or the domains of PARAMETERS",
         )
 
@@ -335,7 +368,7 @@ class FloquetScene(TracedScene):
             plain.append(
                 None if "A" not in self.matrices else [self._plain("A", time, point) for time in t]
             )
-        size = max(abs(A).max() for A in recorded)
+        size = np.max([abs(A).max() for A in recorded])
         if not np.isfinite(size):
             return None
         for own, bar, other in zip(recorded, bars, plain, strict=True):

@@ -378,6 +378,67 @@ def test_a_run_of_a_file_that_ends_python_says_so(program, tmp_path, monkeypatch
     assert "Traceback" not in run.stderr
 
 
+def poled(t, p, out):
+    out[0, 1], out[1, 0] = 1.0, -1 / (p[0] + math.cos(2 * t))
+
+
+def poled_twice(t, p, out):
+    out[0, 1], out[1, 0] = 1.0, -1 / (p[0] + math.cos(2 * t)) ** 2
+
+
+def logarithmic(t, p, out):
+    out[0, 1], out[1, 0] = 1.0, -math.log(0.5 + p[0] + math.cos(2 * t))
+
+
+def narrow(t, p, out):
+    out[0, 1], out[1, 0] = 1.0, -1 / (0.5 + p[0] + 1e-9 + math.cos(2 * t))
+
+
+def vanishing(t, p, out):
+    out[0, 0] = math.cos(2 * t)
+
+
+@pytest.mark.parametrize("breaks", [(), math.pi / 3, (math.pi / 3, 2 * math.pi / 3)])
+def test_a_pole_is_told_from_a_spike(breaks):
+    """x'' = x / (1/2 + cos 2t): naming the poles in BREAKS does not help."""
+    given = {"period": math.pi, "parameters": "a", "states": ("x", "v"), "breaks": breaks}
+    words = (
+        r"A seems to be infinite near t = (1\.0472|2\.0944) at a = 0\.5, where the system has no"
+    )
+    with pytest.raises(BadInput, match=words) as refusal:
+        survey.evaluate(survey.floquet(poled, **given), a=0.5)
+    assert "\n" not in str(refusal.value) and "breaks" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("A", "words"),
+    [
+        (poled_twice, r"A seems to be infinite near t = (1\.0472|2\.0944) at a = 0\.5"),
+        (logarithmic, "A has a spike near t = 1.570.*name its position in breaks"),
+        (narrow, "A has a spike near t = 1.570.*name its position in breaks"),
+    ],
+)
+def test_what_is_less_than_a_pole_is_a_spike(A, words):
+    given = {"period": math.pi, "parameters": "a", "states": ("x", "v")}
+    with pytest.raises(BadInput, match=words):
+        survey.evaluate(survey.floquet(A, **given), a=0.5)
+
+
+def test_a_mass_that_vanishes_is_named():
+    words = r"M seems to be singular near t = (0\.785398|2\.35619) at delta = 1, "
+    with pytest.raises(BadInput, match=words):
+        survey.evaluate(scene(M=vanishing), delta=1.0, epsilon=0.3, zeta=0.1)
+
+
+def test_a_logarithm_of_negative_numbers_is_said_to_be_undefined_with_breaks_too():
+    def A(t, p, out):
+        out[0, 1], out[1, 0] = 1.0, -math.log(1 + p[0] * math.cos(2 * t))
+
+    given = {"period": math.pi, "parameters": "a", "states": ("x", "v"), "breaks": math.pi / 3}
+    with pytest.raises(BadInput, match=r"A has no finite value at a = 1\.5"):
+        survey.evaluate(survey.floquet(A, **given), a=1.5)
+
+
 def test_a_file_without_its_names_is_one_line(tmp_path):
     for name in ("STATES", "PERIOD", "PARAMETERS"):
         path = tmp_path / f"{name}.py"
