@@ -16,7 +16,7 @@ from survey.measures.floquet.equation import Equation
 from survey.measures.floquet.symmetry import Symmetry
 from survey.measures.floquet.system import TRIED
 from survey.request.floquet_scene import SAME
-from survey.request.function_scene import with_keys
+from survey.request.function_scene import reason, with_keys
 from survey.request.traced_scene import TracedScene
 from survey.scene import Parameter, plus_minus
 
@@ -365,9 +365,23 @@ class OrbitScene(TracedScene):
                 ]
             )
             defined = np.isfinite(A).all(axis=(1, 2))
+            broken = defined & ~np.isfinite(given).all(axis=(1, 2))
+            if broken.any():
+                self._refuse_undefined(call, here, asked[np.flatnonzero(broken)[0]])
             off = abs(given - A)[defined]
             if not (off <= SAME * abs(A[defined]).max()).all():
                 self._refuse(
                     f"jacobian(t, x, p, out) is not df/dx at {here}", "correct it, or leave it out"
                 )
         return True
+
+    def _refuse_undefined(self, call, here, asked):
+        """Refuse jacobian, which has no value where f and df/dx have one, with what it raised."""
+        function, _call, arguments, shape, *_ = asked
+        why = "it fills in inf or nan"
+        try:
+            with np.errstate(all="ignore"):
+                getattr(function, "py_func", function)(*arguments, np.zeros(shape))
+        except (ArithmeticError, ValueError) as error:
+            why = f"{type(error).__name__}: {reason(error)}"
+        self._refuse(f"{call} fails at {here} ({why})", "correct it, or leave it out")

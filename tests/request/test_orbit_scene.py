@@ -72,3 +72,36 @@ def test_a_file_has_the_keys_in_capitals(tmp_path):
     )
     why = survey.evaluate(str(path), a=1.0).survey.point().why
     assert "set PERIOD = None, and give START a guess" in why
+
+
+def unsure(t, x, p, out):
+    raise ValueError("not yet")
+
+
+def divided(t, x, p, out):
+    out[0, 0] = 1 / 0
+
+
+def undefined(t, x, p, out):
+    out[0, 0] = math.nan
+
+
+@pytest.mark.parametrize(
+    ("jacobian", "words"),
+    [
+        (
+            unsure,
+            r"jacobian\(t, x, p, out\) fails at a = 1 \(ValueError: not yet\); correct it, or",
+        ),
+        (
+            divided,
+            r"jacobian\(t, x, p, out\) fails at a = 1 \(ZeroDivisionError: division by zero\)",
+        ),
+        (undefined, r"jacobian\(t, x, p, out\) fails at a = 1 \(it fills in inf or nan\)"),
+    ],
+)
+def test_a_jacobian_that_fails_is_named_with_what_it_raises(jacobian, words):
+    given = {"period": None, "start": (2.0, 0.0, 6.6), "states": ("x", "v"), "parameters": "a"}
+    with pytest.raises(survey.BadInput, match=words) as refusal:
+        survey.evaluate(survey.orbit(van_der_pol, jacobian=jacobian, **given), a=1.0)
+    assert "\n" not in str(refusal.value)
