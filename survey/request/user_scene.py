@@ -883,12 +883,16 @@ def _continued(
     names = [p.name for p in parameters]
     try:
         name, low, high = given[0], float(given[1]), float(given[2])
-        good = len(given) == 3 and name in names and -np.inf < low < high < np.inf
+        good = len(given) == 3 and name in names and np.isfinite([low, high]).all()
     except (TypeError, ValueError, IndexError, KeyError):
         good = False
     if not good:
         refuse(
             f"CONTINUATION = {shown(given)}: give (name, least, greatest value) of one of {', '.join(names)}"
+        )
+    if not low < high:
+        refuse(
+            f"CONTINUATION = {shown(given)}: {low:g} is not below {high:g}; give (name, least, greatest value)"
         )
     index = names.index(name)
     own = parameters[index]

@@ -192,6 +192,12 @@ def test_bad_ranges(given):
     assert "\n" not in str(caught.value)
 
 
+def test_a_range_that_runs_backwards_is_told():
+    words = r"continuation = \('w', 2, 1\): 2 is not below 1; give \(name, least, greatest value\)"
+    with pytest.raises(survey.BadInput, match=words):
+        scene(continuation=("w", 2, 1))
+
+
 def test_outside_the_range():
     assert survey.evaluate(scene(), F=1.0, w=[0.5, 1.0]).status.values.tolist() == [1, 0]
 
