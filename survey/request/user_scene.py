@@ -750,9 +750,15 @@ def _floquet(
     if conserved is not None and not callable(conserved):
         given = conserved
         try:
-            conserved = tuple(np.asarray(given, dtype=float).ravel().tolist())
+            rows = np.asarray(given, dtype=float)
         except (TypeError, ValueError):
-            conserved = ()
+            rows = np.zeros(0)
+        if sum(length > 1 for length in rows.shape) > 1:
+            refuse(
+                f"CONSERVED = {shown(given)}: one combination of the states alone can be stated; give "
+                f"its coefficients, {len(names)} numbers"
+            )
+        conserved = tuple(rows.ravel().tolist())
         if len(conserved) != len(names):
             refuse(
                 f"CONSERVED = {shown(given)}: there are {len(names)} states, and each needs a number"

@@ -507,3 +507,38 @@ def test_a_file_may_name_what_is_conserved(tmp_path):
     assert int(ds.verdict) == 1 and ds.sizes["multiplier"] == 2
     path.write_text(path.read_text().replace(", CONSERVED", "").replace(", (0, 1, 1)", ""))
     assert int(survey.evaluate(str(path), k=1.3, c=0.2).verdict) == -1
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        (
+            ((0, 1, 1), (1, 0, 0)),
+            r"conserved = .*one combination of the states alone can be stated; give its coefficients, 3 numbers",
+        ),
+        (
+            lambda p: ((0, 1, 1), (1, 0, 0)),
+            r"conserved\(p\) returns 6 numbers, not 3: one combination of the states alone",
+        ),
+        ((0, 1), "there are 3 states, and each needs a number"),
+    ],
+)
+def test_one_combination_alone_is_conserved(rows, words):
+    def A(t, p, out):
+        out[0, 1], out[0, 2] = -1.0, 1.0
+        out[1, 0], out[2, 0] = p[0], -p[0]
+
+    given = {"period": math.pi, "parameters": "k", "states": ("s", "u", "w")}
+    with pytest.raises(BadInput, match=words) as refusal:
+        survey.evaluate(survey.floquet(A, conserved=rows, **given), k=1.3)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_row_of_coefficients_is_one_combination_as_well():
+    def A(t, p, out):
+        out[0, 1], out[0, 2] = -1.0, 1.0
+        out[1, 0], out[2, 0] = p[0], -p[0]
+
+    given = {"period": math.pi, "parameters": "k", "states": ("s", "u", "w")}
+    own = survey.floquet(A, conserved=[[0, 1, 1]], **given)
+    assert own.conserved == (0.0, 1.0, 1.0)

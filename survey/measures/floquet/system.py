@@ -68,9 +68,16 @@ class System:
         rows = [self._value("CONSERVED", self.conserved, p) for p in points]
         rows = [np.full(self.n, np.nan) if row is np.nan else row for row in rows]
         try:
-            return np.array(rows, dtype=float).reshape(len(points), self.n)
+            rows = [np.ravel(np.asarray(row, dtype=float)) for row in rows]
         except (TypeError, ValueError) as error:
             raise Raised("CONSERVED(p)") from error
+        wrong = next((row.size for row in rows if row.size != self.n), None)
+        if wrong is not None:
+            what = (
+                f"CONSERVED(p) returns {wrong} numbers, not {self.n}: one combination of the states"
+            )
+            raise Unsupported(f"{what} alone can be stated", "return its coefficients")
+        return np.array(rows).reshape(len(points), self.n)
 
     @property
     def same_ranges(self):
