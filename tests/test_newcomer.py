@@ -313,7 +313,7 @@ PYTHON = [
         "breaks: 9 lies outside",
     ),
     (
-        lambda ds: survey.floquet(fill, period=0, parameters="a", states="xy"),
+        lambda ds: survey.floquet(fill, period=0, parameters="a", states=("x", "y")),
         "period = 0: it must be a positive number",
     ),
     (
@@ -321,11 +321,13 @@ PYTHON = [
         "give the names of the states",
     ),
     (
-        lambda ds: survey.floquet(fill, period=1, parameters="a", states="xy", structure="even"),
+        lambda ds: survey.floquet(
+            fill, period=1, parameters="a", states=("x", "y"), structure="even"
+        ),
         "must be one of 'none'",
     ),
     (
-        lambda ds: survey.floquet(period=1, parameters="a", states="xy"),
+        lambda ds: survey.floquet(period=1, parameters="a", states=("x", "y")),
         "give either A(t, p, out), or K(t, p, out)",
     ),
     (

@@ -496,7 +496,7 @@ class FloquetScene(TracedScene):
         """Raise BadInput unless the functions, run as Python, fill their matrices."""
         for name, function in self.matrices.items():
             m = self._size_of(name)
-            sizes = f"PARAMETERS names {len(self.own)} and out is {m} x {m}"
+            sizes = f"PARAMETERS names {self._named} and out is {m} x {m}"
             self._tried(function, f"{name}(t, p, out)", (0.25, point), (m, m), sizes, f"{m} x {m}")
 
 

@@ -98,6 +98,12 @@ class FunctionScene:
     def _where(self, point):
         return ", ".join(f"{p.name} = {value:g}" for p, value in zip(self.own, point, strict=True))
 
+    @property
+    def _named(self):
+        """How many parameters are named: one text, of several letters, is one name."""
+        n, first = len(self.own), self.own[0].name
+        return str(n) if n > 1 or len(first) == 1 else f"1 ({first!r}; several are ('a', 'b', ...))"
+
     def _refuse(self, what, remedy):
         raise refusal(self.NAME, f"{what}; {remedy}")
 
@@ -118,7 +124,8 @@ class FunctionScene:
         if "only integers" in str(error):
             self._refuse_name(call)
         self._refuse(
-            f"{call} indexes beyond an array ({error})", f"PARAMETERS names {n}: p[0] to p[{n - 1}]"
+            f"{call} indexes beyond an array ({error})",
+            f"PARAMETERS names {self._named}: p[0] to p[{n - 1}]",
         )
 
 

@@ -284,7 +284,7 @@ class OrbitScene(TracedScene):
     def _try(self, point, x):
         """Raise BadInput unless f, run as Python, fills its array."""
         n = len(self.states)
-        sizes = f"STATES names {n} for x and out, PARAMETERS {len(self.own)} for p"
+        sizes = f"STATES names {n} for x and out, PARAMETERS {self._named} for p"
         self._tried(
             self.f, "f(t, x, p, out)", (0.25, x.copy(), point), (n,), sizes, f"of {n} numbers"
         )
@@ -342,7 +342,7 @@ class OrbitScene(TracedScene):
                     "correct PERIOD",
                 )
         if self.jacobian is not None:
-            sizes = f"STATES names {n} for x, out is {n} x {n}, PARAMETERS {len(self.own)} for p"
+            sizes = f"STATES names {n} for x, out is {n} x {n}, PARAMETERS {self._named} for p"
             call = "jacobian(t, x, p, out)"
             what = f"{n} x {n}"
             # also away from the start, where what depends on the states may happen to be 0

@@ -961,6 +961,13 @@ def _symmetry(
 
 
 def _state_names(states: Any, refuse: Callable[[str], NoReturn]) -> tuple[str, ...]:
+    """The names of the states; a text of several letters is refused, as it may mean one or many."""
+    if isinstance(states, str) and len(states) > 1 and states.isidentifier():
+        refuse(
+            f"STATES = {states!r} may be one name or several; write ({states!r},), or {tuple(states)!r}"
+            if len(set(states)) == len(states) and states.isalpha()
+            else f"STATES = {states!r} is a text, not a list of names; write ({states!r},)"
+        )
     names = (
         (states,)
         if isinstance(states, str)

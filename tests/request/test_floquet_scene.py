@@ -230,6 +230,12 @@ def wrong(t, p, out):
         ({"K": None}, "give either A"),
         ({"states": ()}, "give the names of the states"),
         ({"states": ("x", "x")}, "give the names of the states"),
+        (
+            {"states": "abcd"},
+            r"may be one name or several; write \('abcd',\), or \('a', 'b', 'c', 'd'\)",
+        ),
+        ({"states": "x1"}, r"states = 'x1' is a text.*write \('x1',\)"),
+        ({"states": "x, y"}, r"write \('x', 'y'\)"),
         ({"structure": "hamiltonian"}, "must be one of 'none', 'symplectic', 'reversible'"),
         ({"period": 0.0}, "it must be a positive number"),
         ({"breaks": 9.0}, "lies outside"),
@@ -306,6 +312,10 @@ def test_methods_and_partial_functions_are_functions():
     ("given", "words"),
     [
         ({"K": wrong}, r"K\(t, p, out\) fails \(RuntimeError: no\)"),
+        (
+            {"K": lambda t, p, out: p[1], "parameters": "delta"},
+            r"names 1 \('delta'; several are \('a', 'b'",
+        ),
         ({"K": larger}, r"K\(t, p, out\) indexes beyond an array .*out is 1 x 1"),
         ({"K": lambda t, p, out: p["delta"]}, "accesses a parameter by name"),
         ({"K": lambda t, p, out: np.zeros((2, 2))}, r"returns an array of shape \(2, 2\)"),
@@ -326,8 +336,10 @@ def test_methods_and_partial_functions_are_functions():
     ],
 )
 def test_wrong_functions_are_one_line(given, words):
+    own = scene(**given)
+    others = {"epsilon": 0.3, "zeta": 0.1} if len(own.own) > 1 else {}
     with pytest.raises(BadInput, match=words) as refusal:
-        survey.evaluate(scene(**given), delta=[1.0, 2.0], epsilon=0.3, zeta=0.1)
+        survey.evaluate(own, delta=[1.0, 2.0], **others)
     assert "\n" not in str(refusal.value)
 
 
@@ -542,3 +554,7 @@ def test_a_row_of_coefficients_is_one_combination_as_well():
     given = {"period": math.pi, "parameters": "k", "states": ("s", "u", "w")}
     own = survey.floquet(A, conserved=[[0, 1, 1]], **given)
     assert own.conserved == (0.0, 1.0, 1.0)
+
+
+def test_a_state_with_a_long_name_is_one_of_a_tuple():
+    assert scene(states=("angle",)).states == ("angle", "dangle")
