@@ -29,7 +29,8 @@ without harm, so there it is 1. It is -1 where the error bars leave it open.
 On request, the outputs of `survey.floquet` for the canonical system in x = xi, q = eta' + xi, p =
 xi' - eta, m = -eta: `multiplier_re`, `multiplier_im`, `spectral_radius`, `exponent` (per radian of
 f), `krein`, `crossing`, `monodromy`. They are in float64: beyond 1 - e = 1e-7 a point has no value
-(`overflow`) where they are named.
+(`overflow`) where they are named. `crossing` is by the nearest place on the circle, 1 too, although
+multipliers meet there at mu = 0 alone; which loss can happen says `collision`.
 
 What is known. e = 0 is the circular problem: a = 2 cos 2 pi w1 + 2 cos 2 pi w2, stable for 27 mu (1
 - mu) < 1 (Routh). mu = 0 is Kepler's problem: a = 4, b = 6, unstable by a secular term. a and b are
