@@ -14,6 +14,7 @@ from survey.measures.floquet.system import KEPT, TRIED, Raised, is_undefined
 from survey.measures.floquet.trace import Graph, Unsupported
 
 MOST_STEPS = 2_000  # of an orbit
+ALIKE = 1e-9  # relative: what counts as the same f
 LOCK = threading.Lock()
 
 
@@ -140,6 +141,22 @@ class Equation:
             numbers = programs.numbers(points[inside])
             every = [programs.slopes(numbers, s * T[inside], x[inside])[0] for s in TRIED]
             found[inside] = np.isfinite(every).all(axis=(0, 2))
+        return found
+
+    def angles(self, points, x, T):
+        """Which states (n) are angles: is f the same, within rounding, where they are 2 pi more? Tried at
+        the states x (N, n) and at TRIED shares of the periods T (N).
+        """
+        found = np.ones(self.n, bool)
+        for inside, programs in self.traced(points, x):
+            numbers = programs.numbers(points[inside])
+            for share in TRIED:
+                t, here = share * T[inside], x[inside]
+                f = programs.slopes(numbers, t, here)[0]
+                for k in np.flatnonzero(found):
+                    on = here + 2 * np.pi * (np.arange(self.n) == k)
+                    off = abs(programs.slopes(numbers, t, on)[0] - f)
+                    found[k] &= (off <= ALIKE * (1.0 + abs(f))).all()
         return found
 
     def recorded(self, point, x0):

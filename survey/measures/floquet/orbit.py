@@ -16,6 +16,7 @@ import numpy as np
 
 from survey import status
 from survey.kernels.floquet.flow import ORDER
+from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import existence, monodromy, shooting, stability
 from survey.measures.floquet.continuation import ContinuedCurves
 from survey.measures.floquet.newton import chosen, located
@@ -23,6 +24,7 @@ from survey.measures.floquet.recomputed import recomputed
 from survey.scene import Output
 
 NO_ORBIT = status.FIRST_OF_SCENE
+SOME = 4  # points at which it is tried which states are angles
 CHUNK = 2048  # points that are solved together
 SAME = 1e-6  # relative: what one orbit is, found twice
 ROWS = 64  # whose curves are followed together
@@ -76,7 +78,13 @@ def solve_branches(equation, points, branch, continued, method, rtol, wanted):
             full = np.ones(len(own), bool)
             parts.append(found.outputs(full, rtol, wanted, callable(equation.period)))
             count += len(own)
-    order = [numbered(orbits, equation.free and equation.symmetry is None) for orbits in of_point]
+    several = [k for k, orbits in enumerate(of_point) if len(orbits) > 1][:SOME]
+    angles = None
+    if several:
+        x, T = (np.array([getattr(of_point[k][0], name) for k in several]) for name in ("x0", "T"))
+        angles = equation.angles(different[several], x, T)
+    free = equation.free and equation.symmetry is None
+    order = [numbered(orbits, free, angles) for orbits in of_point]
     empty = OrbitResults(equation, 1).outputs(
         np.ones(1, bool), rtol, wanted, callable(equation.period)
     )
@@ -137,8 +145,10 @@ class KnownOrbit(NamedTuple):
         return cls(found.square[i], tuple(found.x[i]), found.T[i], number, tuple(found.dx[i]))
 
 
-def numbered(orbits, free):
-    """The numbers of the different ones among KnownOrbits, by the mean squares of their states, then x0."""
+def numbered(orbits, free, angles=None):
+    """The numbers of the different ones among KnownOrbits, by the mean squares of their states, then
+    x0. States that are `angles` (n) are taken modulo 2 pi.
+    """
     kept = []
     for one in sorted(orbits):
         if free:
@@ -147,7 +157,7 @@ def numbered(orbits, free):
                 for other in kept
             )
         else:
-            same = (_is_same(one, other) for other in kept)
+            same = (_is_same(one, other, angles) for other in kept)
         if not any(same):
             kept.append(one)
     for i in range(1, len(kept)):
@@ -158,9 +168,14 @@ def numbered(orbits, free):
     return [one.number for one in kept]
 
 
-def _is_same(one, other):
+def _is_same(one, other, angles):
     """Do two forced orbits start at the same state, or within each other's bars, as where both are 0?"""
-    apart = abs(np.subtract(one.x0, other.x0))
+    apart = np.subtract(one.x0, other.x0)
+    if angles is not None and angles.any():
+        turns = np.where(angles, np.round(apart / (2 * np.pi)), 0.0)
+        apart = abs(apart - 2 * np.pi * turns) - 16 * EPS * abs(turns)
+        return (apart <= np.add(one.bars, other.bars)).all()
+    apart = abs(apart)
     alike = _near(one.square, other.square) and apart.max() <= SAME * one.square**0.5
     return alike or (apart <= np.add(one.bars, other.bars)).all()
 

@@ -266,3 +266,32 @@ def test_both_orbits_are_found_next_to_a_fold(F, near, inward):
         assert verdicts.count(1) == 2 and verdicts.count(0) == 1  # none is undecided
         beyond = survey.evaluate(scene(), F=F, w=fold - 3.2 * d * inward, branch=1)
         assert int(beyond.orbits) == 1
+
+
+def test_an_angle_is_taken_modulo_2_pi():
+    """The forced, damped pendulum: orbits are counted once, not with their copies 2 pi further on."""
+
+    def f(t, x, p, out):
+        out[0] = x[1]
+        out[1] = -0.5 * x[1] - math.sin(x[0]) + p[0] * math.cos(2 * t / 3)
+
+    T = 3 * math.pi
+    system = survey.orbit(
+        f, states=("angle", "v"), period=T, parameters=("F",), start=(0.0, 0.0),
+        continuation=("F", 0.01, 1.2),
+    )  # fmt: skip
+    F = [0.3, 0.55, 1.05]
+    ds = survey.evaluate(system, F=F, branch=[1.0, 2.0, 3.0, 4.0])
+    assert ds.orbits.isel(branch=0).values.tolist() == [1, 1, 3]
+    for i, force in enumerate(F):
+        here = ds.x0.isel(F=i).dropna("branch").values
+        assert len(here) == int(ds.orbits[i, 0])
+        for x in here:
+
+            def slope(t, y, force=force):
+                return [y[1], -0.5 * y[1] - math.sin(y[0]) + force * math.cos(2 * t / 3)]
+
+            assert abs(period_map(slope, T, x) - x).max() < 1e-8
+        apart = here[:, None, 0] - here[None, :, 0]
+        apart = np.hypot(np.angle(np.exp(1j * apart)), here[:, None, 1] - here[None, :, 1])
+        assert (apart + 10 * np.eye(len(here)) > 0.01).all()
