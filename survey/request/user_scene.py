@@ -582,6 +582,14 @@ def _form(name: str, module: ModuleType, matrices: dict[str, Any]) -> str:
     if hasattr(module, "f") and hasattr(module, "g"):
         return "abel"
     if matrices.keys() & {"A", "K"}:
+        own = next(key for key in "AK" if key in matrices)
+        of_orbits = ["f"] if _arguments(getattr(module, "f", None)) == 4 else []
+        of_orbits += ["START"] if hasattr(module, "START") else []
+        if of_orbits:
+            raise BadInput(
+                f"{name}: it holds {own}, of a linear periodic system, and {' and '.join(of_orbits)}, of periodic "
+                "orbits; leave one of the two out, or give it another name"
+            )
         return "floquet"
     if hasattr(module, "f"):
         return "orbit" if hasattr(module, "STATES") or _arguments(module.f) > 2 else "abel"

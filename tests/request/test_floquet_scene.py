@@ -459,6 +459,33 @@ def test_a_file_without_its_names_is_one_line(tmp_path):
             survey.evaluate(str(path), delta=1.0, epsilon=0.3, zeta=0.1)
 
 
+@pytest.mark.parametrize(
+    ("more", "named"),
+    [
+        ("def f(t, x, p, out):\n    out[0] = x[1]\n", "K, of a linear periodic system, and f, of"),
+        ("START = (1.0, 0.0)\n", "K, of a linear periodic system, and START, of"),
+        (
+            "def f(t, x, p, out):\n    out[0] = x[1]\ndef START(p):\n    return 1.0, 0.0\n",
+            "K, .* and f and START, of",
+        ),
+    ],
+)
+def test_a_file_of_two_systems_is_refused(tmp_path, more, named):
+    path = tmp_path / "both.py"
+    path.write_text(SCENE + more)
+    with pytest.raises(
+        BadInput, match=f"both.py: it holds {named}.*leave one of the two out"
+    ) as refusal:
+        survey.evaluate(str(path), delta=1.0, epsilon=0.3, zeta=0.1)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_may_call_its_own_helper_f(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text(SCENE + "def f(t):\n    return cos(2 * t)\n")
+    assert int(survey.evaluate(str(path), delta=1.0, epsilon=0.3, zeta=0.1).status) == 0
+
+
 def test_equal_reversible_oscillators_are_told_what_decides():
     def equal(t, p, out):
         out[0, 0] = out[1, 1] = p[0] + p[1] * math.cos(2 * t)
