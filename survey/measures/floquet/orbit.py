@@ -185,11 +185,11 @@ def _near(a, b):
 
 
 def _defined(equation, points):
-    """Where (N) f is finite at the start."""
+    """Where (N) f is finite at the start, whose period may be unknown if it is sought."""
     found = np.zeros(len(points), bool)
     guess, period = equation.begin(points)
-    # where f does not depend on t, a period that is not known says nothing of f
-    period = np.where(np.isnan(period), 1.0, period) if equation.free else period
+    if equation.free:
+        period = np.where(np.isfinite(period), period, 1.0)  # f does not depend on time
     some = np.flatnonzero(np.isfinite(guess).all(axis=1) & np.isfinite(period))
     found[some] = equation.defined(points[some], guess[some], period[some])
     return found

@@ -307,6 +307,16 @@ def test_no_orbit():
         assert np.isnan(ds.x0).all() and (ds.verdict == -1).all()
     # the orbits of a centre are a family: none of them is alone
     assert status(survey.evaluate(scenes[1], a=0.0)) == [16]
+    # nor are points invalid where orbits are followed from others, so that no period is guessed
+    followed = survey.orbit(
+        spirals,
+        states=("x", "v"),
+        period=None,
+        parameters="a",
+        start=lambda p: (1.0, 0.0, 6.0 if p[0] < 0.5 else math.nan),
+        continuation=("a", 0.2, 0.8),
+    )
+    assert status(survey.evaluate(followed, a=[0.3, 0.7], branch=1)) == [16, 16]
 
 
 def test_invalid_points():
