@@ -39,6 +39,7 @@ POINTS_PER_NODE = 4  # a panel pays if there are this many points for each that 
 SMALLEST = 16  # points of an axis
 FEWEST = 4096  # points on their own from which on series pay
 BEST, SHARE = 1e-14, 1e-3  # accuracy of M at the nodes; of the requested one, where that is less
+FINER = 0.1  # of that accuracy, where it is what a panel lacks
 MOST_DEEP = 12  # halvings
 LEAST = 0.5  # the share of those that their own bounds answer, below which cutting is of no use
 MOST = 0.9  # the share of the nodes answered to the requested accuracy from which on a panel serves
@@ -389,18 +390,33 @@ def _panel(key, sides, budget):
         spent += len(x) + len(tried)
         if known is None:
             return None, spent, None
-    values, bars = known
+    panel, cut = _tested(key, middle, radius, sizes, x, tried, *known)
+    if panel is None and SHARE * key.rtol > BEST and spent + len(x) + len(tried) <= budget:
+        # where multipliers are close to each other, more accurate nodes may do
+        values, bars = known
+        if _tested(key, middle, radius, sizes, x, tried, values, FINER * bars)[0] is not None:
+            known = _coefficients(key, middle, radius, np.concatenate([x, tried]), FINER)
+            spent += len(x) + len(tried)
+            if known is not None:
+                panel, cut = _tested(key, middle, radius, sizes, x, tried, *known)
+    return panel, spent, cut
+
+
+def _tested(key, middle, radius, sizes, x, tried, values, bars):
+    """(the RootPanel of values and bounds at the nodes x and at `tried`, None) if it serves, else (None, the
+    side to be cut or None).
+    """
     panel = _expanded(key, middle, radius, sizes, values[: len(x)], bars[: len(x)])
     if panel is None:
-        return None, spent, longest
+        return None, int(np.argmax(sizes))
     served = _served(key, panel, x)
-    if served < MOST or not _holds(panel, tried, values[len(x) :], bars[len(x) :]):
-        # what varies most is cut: the size of the coefficients, or what they need
-        own = bars[: len(x)].T.reshape(-1, *(sizes if len(sizes) == 2 else (1, sizes[0])))
-        nodes_alone = replace(panel, doubts=_in_parts(own))
-        hopeless = _served(key, nodes_alone, x) < LEAST
-        return None, spent, None if hopeless else _steepest(sizes, values[: len(x)])
-    return panel, spent, None
+    if served >= MOST and _holds(panel, tried, values[len(x) :], bars[len(x) :]):
+        return panel, None
+    # what varies most is cut: the size of the coefficients, or what they need
+    own = bars[: len(x)].T.reshape(-1, *(sizes if len(sizes) == 2 else (1, sizes[0])))
+    nodes_alone = replace(panel, doubts=_in_parts(own))
+    hopeless = _served(key, nodes_alone, x) < LEAST
+    return None, None if hopeless else _steepest(sizes, values[: len(x)])
 
 
 def _degrees(key, middle, radius, budget):
@@ -437,19 +453,19 @@ def _degrees(key, middle, radius, budget):
 def _terms(key, line, bars):
     """The number of terms that count in the series of coefficients (nodes, K) known within `bars`."""
     series = abs(chebyshev.by_columns(len(line)).T @ line)
-    noise = np.maximum(4.0 * bars.max(axis=0), 1e-15 * abs(line).max(axis=0))
+    noise = np.maximum(0.25 * bars.max(axis=0), 1e-15 * abs(line).max(axis=0))
     noise = np.maximum(noise, 1e-3 * key.rtol * (1.0 + abs(line).min(axis=0)))
     return 1 + int(np.flatnonzero((series > noise).any(axis=1)).max(initial=0))
 
 
-def _coefficients(key, middle, radius, x):
+def _coefficients(key, middle, radius, x, share=1.0):
     """Coefficients (N, K) of the polynomial at x (N, sides) on a panel, and their bounds; None if
-    there are none.
+    there are none. `share`: of the accuracy of M that is usual there.
     """
     points = key.points(
         *(m + r * x[:, k] for k, (m, r) in enumerate(zip(middle, radius, strict=True)))
     )
-    return at_points(key.system, key.structure, points, max(BEST, SHARE * key.rtol))
+    return at_points(key.system, key.structure, points, max(BEST, share * SHARE * key.rtol))
 
 
 def at_points(system, structure, points, accuracy):
