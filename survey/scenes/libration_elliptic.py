@@ -136,11 +136,12 @@ def _with_family(out, point, request, asked):
     given = np.stack([mu, e], axis=-1), request.method, request.rtol, asked, lines
     found = stability.solve(_system(), structure, *given)
     own, theirs = out["status"], found.pop("status")
-    lost = (own == status.OK) & (theirs != status.OK)
+    known = (own == status.OK) & (theirs == status.OK)
     for name, values in (out | found).items():
-        kept = lost.reshape(lost.shape + (1,) * (values.ndim - lost.ndim))
-        out[name] = np.where(kept, np.nan if values.dtype.kind == "f" else -1, values)
-    return out | {"status": np.where(lost, theirs, own)}
+        nothing = np.nan if values.dtype.kind == "f" else 0 if name == "krein" else -1
+        here = known.reshape(known.shape + (1,) * (values.ndim - known.ndim))
+        out[name] = np.where(here, values, nothing).astype(values.dtype)
+    return out | {"status": np.where(own == status.OK, theirs, own)}
 
 
 @cache

@@ -185,9 +185,12 @@ def test_what_the_family_gives_agrees_with_the_map_and_leaves_it_alone():
 
 def test_beyond_the_reach_of_float64_the_named_outputs_have_no_value_and_the_others_keep_theirs():
     given = {"mu": 0.01, "e": 1 - 1e-11}
-    ds = survey.evaluate("libration_elliptic", variables=["a", "spectral_radius"], **given)
+    names = ["a", "verdict", "collision", "spectral_radius", "krein", "crossing"]
+    ds = survey.evaluate("libration_elliptic", variables=names, **given)
     assert ds.status.attrs["flag_meanings"].split()[int(ds.status)] == "overflow"
     assert np.isnan(ds.a) and np.isnan(ds.spectral_radius)
+    assert int(ds.verdict) == int(ds.collision) == int(ds.crossing) == -1
+    assert (ds.krein == 0).all()
     assert int(survey.evaluate("libration_elliptic", **given).status) == 0
 
 

@@ -1,9 +1,11 @@
 """The truth of linear systems of one's own, against multipliers that are known exactly."""
 
+import math
+
 import mpmath
 import numpy as np
 import pytest
-from floquet_truth import hard, multipliers, rotating
+from floquet_truth import PERIOD, hard
 
 import survey
 from survey.precision.cases import own_file
@@ -28,17 +30,44 @@ def A(t, p, out):
 """
 
 
+def turning(n):
+    """The system of `floquet_truth.rotating`, without numpy, whose matrices mpmath's numbers do not fill."""
+
+    def A(t, p, out):
+        c, s = math.cos(t), math.sin(t)
+        R = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        for i in range(n):
+            for j in range(n):
+                total = 0.0
+                for k in range(n):
+                    for m in range(n):
+                        total = total + R[i][k] * p[n * k + m] * R[j][m]
+                out[i, j] = total
+        out[0, 1] = out[0, 1] - 1.0
+        out[1, 0] = out[1, 0] + 1.0
+
+    names = [f"b{k}" for k in range(n * n)]
+    return survey.floquet(A, period=PERIOD, parameters=names, states=[f"x{k}" for k in range(n)])
+
+
 @pytest.mark.parametrize("n", [2, 3])
 def test_radii_of_turning_systems(n):
     """Simple, defective and non-normal matrices: within the doubt, which is small where they are simple."""
     B = hard(n, 5, 7)
     given = {f"b{k}": B.reshape(len(B), -1)[:, k] for k in range(n * n)}
-    value, low, doubt = own_systems.own(rotating(n))(given, {"status": np.zeros(len(B))})[
+    value, low, doubt = own_systems.own(turning(n))(given, {"status": np.zeros(len(B))})[
         "spectral_radius"
     ]
-    with mpmath.workdps(40):
+    with mpmath.workdps(60):
         for i, matrix in enumerate(B):
-            exact = max(abs(x) for x in multipliers(matrix))
+            T, R = (
+                mpmath.mpf(PERIOD),
+                mpmath.eye(n),
+            )  # which is not 2 pi: R has not quite turned once
+            R[0, 0] = R[1, 1] = mpmath.cos(T)
+            R[0, 1], R[1, 0] = -mpmath.sin(T), mpmath.sin(T)
+            flow = R * mpmath.expm(T * mpmath.matrix(matrix.tolist()))
+            exact = max(abs(x) for x in mpmath.eig(flow, left=False, right=False))
             off = abs(mpmath.mpf(value[i]) + mpmath.mpf(low[i]) - exact)
             assert off <= doubt[i] + 1e-30 * exact
     assert np.median(doubt) < 1e-18
