@@ -37,7 +37,7 @@ def solve(question, method="auto", rtol=1e-10, **values):
     return gyrostat.solve(point, Request({"question": question}, method, rtol))
 
 
-@pytest.mark.parametrize("method", ["auto", "dop853"])
+@pytest.mark.parametrize("method", ["auto", pytest.param("dop853", marks=pytest.mark.slow)])
 def test_w_alone_is_that_of_a_survey_with_times(method):
     """Random systems at angles on both sides, some of which are beyond turning points."""
     random = np.random.default_rng(11)

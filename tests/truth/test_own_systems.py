@@ -50,7 +50,7 @@ def turning(n):
     return survey.floquet(A, period=PERIOD, parameters=names, states=[f"x{k}" for k in range(n)])
 
 
-@pytest.mark.parametrize("n", [2, 3])
+@pytest.mark.parametrize("n", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_radii_of_turning_systems(n):
     """Simple, defective and non-normal matrices: within the doubt, which is small where they are simple."""
     B = hard(n, 5, 7)
