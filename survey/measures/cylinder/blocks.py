@@ -28,15 +28,13 @@ def dense(point, names, name):
     points = [i for i in range(len(shape)) if i not in dense]
     order = points + dense
     columns = int(np.prod([shape[i] for i in dense], dtype=int))
-    own = arrays[-1].reshape((1,) * (len(shape) - arrays[-1].ndim) + arrays[-1].shape)
-    own = np.broadcast_to(
-        own, [shape[i] if i in dense else own.shape[i] for i in range(len(shape))]
-    )
-    own, number = own.transpose(order), int(np.prod([shape[i] for i in points], dtype=int))
-    if own.shape[: len(points)] == (1,) * len(points):  # the same for all rows: not copied
-        last = np.broadcast_to(own.reshape(1, columns), (number, columns))
+    last = np.broadcast_to(arrays[-1], shape).transpose(order)
+    if not any(last.strides[: len(points)]):  # the same for all rows: not copied
+        number = int(np.prod([shape[i] for i in points], dtype=int))
+        first = last[(slice(1),) * len(points)].reshape(-1, columns)
+        last = np.broadcast_to(first, (number, columns))
     else:
-        last = np.broadcast_to(own, [shape[i] for i in order]).reshape(-1, columns)
+        last = last.reshape(-1, columns)
     small = [shape[i] if i in points else 1 for i in range(len(shape))]
     rows = np.empty((*small, len(names)))
     for i, array in enumerate(arrays[:-1]):
