@@ -6,21 +6,25 @@ sums written out. A function of floats that is made of + - * /, abs, `largest`, 
 lists is therefore written as such, and run once for each kernel that calls it; every operation
 writes one instruction, in the order in which Python does it, so compiled and plain code give the
 same bits.
+
+A number may also stand for several that follow each other in an array (`consecutive`), of which
+every instruction then serves all.
 """
 
 import inspect
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array
 
-_FABS = "llvm.fabs"
+_ALIGNED = 8  # bytes: numbers that follow each other begin anywhere in an array
 
 
 class _Number:
-    """A float64 that a kernel will compute."""
+    """A float64 that a kernel will compute, or several, or of each whether something holds."""
 
     __slots__ = ("builder", "value")
 
@@ -29,7 +33,7 @@ class _Number:
 
     def _with(self, name, left, right):
         emit = getattr(self.builder, name)
-        return _Number(self.builder, emit(_value(left), _value(right)))
+        return _Number(self.builder, emit(*_alike(self.builder, left, right)))
 
     def __add__(self, other):
         return self._with("fadd", self, other)
@@ -59,9 +63,16 @@ class _Number:
         return _Number(self.builder, self.builder.fneg(self.value))
 
     def __abs__(self):
-        double = self.value.type
-        fabs = self.builder.module.declare_intrinsic(_FABS, (double,))
+        kind = self.value.type
+        several = f"v{kind.count}" if isinstance(kind, ir.VectorType) else ""
+        fabs = self.builder.module.declare_intrinsic(
+            f"llvm.fabs.{several}f64", fnty=ir.FunctionType(kind, [kind])
+        )
         return _Number(self.builder, self.builder.call(fabs, [self.value]))
+
+    def __le__(self, other):
+        emit = self.builder.fcmp_ordered("<=", *_alike(self.builder, self, other))
+        return _Number(self.builder, emit)
 
 
 class _Index:
@@ -90,7 +101,7 @@ class _Unknown:
     __add__ = __radd__ = __sub__ = __rsub__ = __mul__ = __rmul__ = __truediv__ = __rtruediv__ = (
         _same
     )
-    __neg__ = __abs__ = __getitem__ = __setitem__ = _same
+    __neg__ = __abs__ = __getitem__ = __setitem__ = __le__ = _same
 
 
 class _Array:
@@ -116,6 +127,24 @@ def _value(x):
     return x.value if isinstance(x, _Number) else ir.Constant(ir.DoubleType(), float(x))
 
 
+def _alike(builder, *numbers):
+    """The values of numbers; where one of them stands for several, each does."""
+    values = [_value(x) for x in numbers]
+    counts = [v.type.count if isinstance(v.type, ir.VectorType) else 1 for v in values]
+    most = max(counts)
+    return [
+        _repeated(builder, value, most) if count < most else value
+        for value, count in zip(values, counts, strict=True)
+    ]
+
+
+def _repeated(builder, value, count):
+    empty = ir.Constant(ir.VectorType(value.type, count), ir.Undefined)
+    one = builder.insert_element(empty, value, ir.IntType(32)(0))
+    firsts = ir.Constant(ir.VectorType(ir.IntType(32), count), [0] * count)
+    return builder.shuffle_vector(one, empty, firsts)
+
+
 def _whole(i):
     return i.value if isinstance(i, _Index) else ir.Constant(ir.IntType(64), i)
 
@@ -123,7 +152,7 @@ def _whole(i):
 def largest(a, b):
     """max(a, b) of numbers or symbols."""
     return _chosen(
-        lambda: max(a, b),
+        lambda: max(a, b) if np.ndim(a) == 0 else np.where(b > a, b, a),
         lambda builder, x, y: builder.select(builder.fcmp_ordered(">", y, x), y, x),
         a,
         b,
@@ -134,6 +163,62 @@ def summed(terms):
     """The sum of numbers or symbols, in their order; that of Python begins with 0."""
     first, *others = terms
     return sum(others, first)
+
+
+def consecutive(array, index, count):
+    """`count` numbers of an array, from `index` on along its last axis."""
+    if isinstance(array, _Unknown):
+        return array
+    if not isinstance(array, _Array):
+        return array[(*index[:-1], slice(index[-1], index[-1] + count))].copy()
+    kind = ir.VectorType(ir.DoubleType(), count)
+    return _Number(array.builder, array.builder.load(_place(array, index, kind), align=_ALIGNED))
+
+
+def put(array, index, numbers, where=None):
+    """Set numbers of an array, from `index` on along its last axis: all, or those for which `where` holds."""
+    if isinstance(array, _Unknown):
+        return
+    if not isinstance(array, _Array):
+        here = np.arange(len(numbers)) if where is None else np.flatnonzero(where)
+        array[(*index[:-1], index[-1] + here)] = numbers[here]
+        return
+    builder, values = array.builder, numbers.value
+    place = _place(array, index, values.type)
+    if where is None:
+        builder.store(values, place, align=_ALIGNED)
+        return
+    whole, chosen = ir.IntType(32), where.value
+    kinds = [values.type, place.type, whole, chosen.type]
+    store = builder.module.declare_intrinsic(
+        f"llvm.masked.store.v{values.type.count}f64.p0", fnty=ir.FunctionType(ir.VoidType(), kinds)
+    )
+    builder.call(store, [values, place, whole(_ALIGNED), chosen])
+
+
+def _place(array, index, kind):
+    return array.builder.bitcast(array._pointer(index), kind.as_pointer())
+
+
+def selected(where, numbers):
+    """The numbers for which `where` holds, and 0 for the others."""
+    if isinstance(where, _Unknown):
+        return where
+    if not isinstance(where, _Number):
+        return np.where(where, numbers, 0.0)
+    nothing = _repeated(where.builder, _value(0.0), numbers.value.type.count)
+    return _Number(where.builder, where.builder.select(where.value, numbers.value, nothing))
+
+
+def counted(where):
+    """For how many numbers `where` holds, as a float."""
+    if isinstance(where, _Unknown):
+        return where
+    if not isinstance(where, _Number):
+        return float(np.count_nonzero(where))
+    bits = where.builder.bitcast(where.value, ir.IntType(where.value.type.count))
+    number = where.builder.ctpop(bits)
+    return _Number(where.builder, where.builder.uitofp(number, ir.DoubleType()))
 
 
 def changes_sign(a, b):
@@ -153,7 +238,7 @@ def _chosen(plain, emit, a, b):
     if not (isinstance(a, _Number) or isinstance(b, _Number)):
         return plain()
     builder = a.builder if isinstance(a, _Number) else b.builder
-    return _Number(builder, emit(builder, _value(a), _value(b)))
+    return _Number(builder, emit(builder, *_alike(builder, a, b)))
 
 
 def unroll(function):

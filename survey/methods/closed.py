@@ -130,6 +130,7 @@ def _store(out, phi0, x, w, bar_x, bar_w):
 def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     """See `steps.abels`; tolerance and limit have no meaning here."""
     data = closed.scratch()
+    planes[:] = math.nan
     for i in range(len(P)):
         phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
         kind, side = closed.start(P[i], phi0, w0, data)

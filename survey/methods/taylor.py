@@ -149,7 +149,7 @@ def flow_abels_ahead():
     """Compile what `flow_abels` waits for."""
     P, none = np.empty((0, COLUMNS)), np.empty((0, EXACT_START))
     P.flags.writeable = False
-    planes, status = np.empty((STATE, 0, 2)), np.empty((0, 2), np.int64)
+    planes, status = np.empty((STATE, 0, 2)), np.empty((0, 2), np.int8)
     ahead = np.empty((0, lockstep_phi.STATE))
     _abels_in_angle(P, none, none, 0.0, 0, ahead, planes, status, True)
 

@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from survey.kernels.jit import kernel
-from survey.kernels.unroll import changes_sign, largest, unroll
+from survey.kernels.unroll import (
+    changes_sign,
+    consecutive,
+    counted,
+    largest,
+    put,
+    selected,
+    unroll,
+)
 
 
 @unroll
@@ -52,6 +60,37 @@ def test_compiled_as_plain():
     zero = compiled == 0
     np.testing.assert_array_equal(np.signbit(compiled[zero]), np.signbit(plain[zero]))
     assert np.isnan(compiled).any() and np.isfinite(compiled).any()
+
+
+@unroll
+def eight(table, row, first, limit, scale, out):
+    """Every operation on eight numbers at once, with one number before and behind it."""
+    x = consecutive(table, (row, first), 8)
+    few = x <= limit
+    y = 2.0 - (abs(x) * scale + largest(x - scale, 0.25)) / (scale + x) - -x
+    put(out, (row, first), y)
+    put(out, (row + 1, first + 1), selected(few, y * scale), few)
+    return counted(few)
+
+
+@kernel
+def of_rows(table, first, limit, scale, out):
+    return eight(table, 1, first, limit, scale, out)
+
+
+@pytest.mark.parametrize("first", [0, 3])
+@pytest.mark.parametrize("limit", [-inf, 0.0, 0.3, inf, nan])
+def test_several_numbers_compiled_as_plain(first, limit):
+    table = np.random.default_rng(3).normal(size=(2, 12))
+    table[1, 4:8] = 0.0, -0.0, inf, nan
+    compiled, plain = np.zeros((3, 12)), np.zeros((3, 12))
+    number = of_rows(table, first, limit, 0.3, compiled)
+    with np.errstate(all="ignore"):
+        assert number == eight(table, 1, first, limit, 0.3, plain)
+    np.testing.assert_array_equal(compiled, plain)
+    assert number == (table[1, first : first + 8] <= limit).sum() == np.count_nonzero(compiled[2])
+    assert compiled[1, first : first + 8].any() and not compiled[0].any()
+    assert not np.delete(compiled[1], np.s_[first : first + 8]).any()
 
 
 @pytest.mark.parametrize("a", [-1.0, -0.0, 0.0, 2.0])

@@ -46,7 +46,7 @@ from survey.kernels.cylinder.lockstep import (
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, finite, row_of, unturned
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.kernels.unroll import summed, unroll
+from survey.kernels.unroll import consecutive, counted, largest, put, selected, summed, unroll
 
 ORDER = 16
 VARIED = 4  # order of the integral of g / w^2
@@ -63,9 +63,17 @@ FIXED = BOUND_G + 1  # rows of what stays fixed: as the columns of `flow.coeffic
 # Of a step: the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|.
 W_WITHIN, LOWEST, STEEPEST = range(3)
 STEP = 3
+# Where the tables begin in the work space of all lanes: the series, the states after and before the
+# step, the step, and what stays fixed.
+AFTER = TABLE
+BEFORE = AFTER + STATE
+OF_STEP = BEFORE + STATE
+WHAT_STAYS = OF_STEP + STEP
+ROWS = WHAT_STAYS + FIXED
+_END, _TURNS = LANES * (AFTER + AT), LANES * (BEFORE + TURNED)  # in one row
 FAR = 2.0  # phi is the variable while w^2 is greater than this times the bound of |g|, ...
 SURE = 1e-3  # and while the error bound of w is smaller than this share of it
-BLOCK = 8
+BLOCK = 16  # targets at once: two vectors
 _SHORT = 1.0 / 8.0  # as in `lockstep`
 # bits of numbers: those of the exponent, those of 1, and 15 / 16 of the latter
 _EXPONENT, _ONE, _ROOT_OF_1 = (
@@ -284,99 +292,92 @@ def _advance(T, state, before, step, fixed, tolerance):
         state[RATE, i] = rate
 
 
-@inline
-def _eight(table, row, column):
-    """Eight numbers of a row, all read before any is used: else no vector code."""
-    # nor with an index that may count from the end
-    i, j = np.uint64(row), np.uint64(column)
-    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
-    k = j + four
-    return (
-        table[i, j], table[i, j + one], table[i, j + two], table[i, j + three],
-        table[i, k], table[i, k + one], table[i, k + two], table[i, k + three],
-    )  # fmt: skip
+def _at_lane(row, size):
+    @unroll
+    def read(work, i):
+        # of one array, whose rows are LANES apart: offsets known to LLVM, which else computes 40 products a call
+        return tuple(work[i + LANES * (row + n)] for n in range(size))
+
+    return read
 
 
-@inline
-def _eight_of(block, first):
-    """Eight numbers of the block, likewise."""
-    return (
-        block[first], block[first + 1], block[first + 2], block[first + 3],
-        block[first + 4], block[first + 5], block[first + 6], block[first + 7],
-    )  # fmt: skip
+_omega_at, _integral_at = _at_lane(OMEGA, ORDER + 1), _at_lane(INTEGRAL, ORDER + 1)
+_before_at, _step_at = _at_lane(BEFORE, STATE), _at_lane(OF_STEP, STEP)
+_after_at = _at_lane(AFTER, STATE)
 
 
-@inline
-def _set_eight(table, row, column, numbers):
-    """Set eight numbers of a row, see `_eight`."""
-    i, j = np.uint64(row), np.uint64(column)
-    one, two, three, four = np.uint64(1), np.uint64(2), np.uint64(3), np.uint64(4)
-    k = j + four
-    table[i, j], table[i, j + one] = numbers[0], numbers[1]
-    table[i, j + two], table[i, j + three] = numbers[2], numbers[3]
-    table[i, k], table[i, k + one] = numbers[4], numbers[5]
-    table[i, k + two], table[i, k + three] = numbers[6], numbers[7]
-
-
-@inline
-def _within(target, turns, psi, end):
-    """How far a target lies into the step, what its rounding may shift, and whether it is passed."""
-    x = unturned(target, turns)
+@unroll
+def _reached(work, i, targets, k, first):
+    """How far BLOCK targets lie into the step, what their rounding may shift, and which are passed."""
+    before, end = _before_at(work, i), _after_at(work, i)[AT]
+    target = consecutive(targets, (k, first), BLOCK)
+    x = (target - before[TURNED] * TWO_PI) - before[TURNED] * TWO_PI_LOW
     passed = x <= end
-    return max(x - psi, 0.0) if passed else 0.0, 3e-16 * abs(target), passed
+    return selected(passed, largest(x - before[AT], 0.0)), 3e-16 * abs(target), passed
+
+
+def _recording(whole):
+    """What records a block: (w and its error bounds, and counts the targets in the step; t and its own).
+
+    Where there is room for the `whole` block, what lies beyond the step is written too, and replaced later.
+    """
+
+    @unroll
+    def values(work, i, targets, at, first, planes, k):
+        s, slip, passed = _reached(work, i, targets, at, first)
+        w, step, where = _before_at(work, i)[W], _step_at(work, i), None if whole else passed
+        put(planes, (rc.VALUE, k, first), w + w * _rise(_omega_at(work, i), s), where)
+        bars = 1.02 * (step[W_WITHIN] + step[STEEPEST] * slip)
+        put(planes, (rc.VALUE_BAR, k, first), bars, where)
+        return counted(passed)
+
+    @unroll
+    def times(work, i, targets, at, first, planes, k):
+        s, slip, passed = _reached(work, i, targets, at, first)
+        before, where = _before_at(work, i), None if whole else passed
+        inverse, slowest = 1.0 / before[W], 1.0 / _step_at(work, i)[LOWEST]
+        t = before[TIME] + (_elapsed(_integral_at(work, i), s) * inverse + before[TIME_LOW])
+        put(planes, (rc.TIME, k, first), t, where)
+        bars = 1.02 * (_after_at(work, i)[T_BOUND] + slip * slowest) + 4e-16 * t
+        put(planes, (rc.TIME_BAR, k, first), bars, where)
+
+    return values, times
+
+
+_whole_values, _whole_times = _recording(True)
+_last_values, _last_times = _recording(False)
 
 
 @kernel
-def _record(T, before, state, step, i, block, targets, k, first, size, planes, timed):
-    """Record lane i at the targets of row k, from the `first` on, within the step, with the times if
-    `timed`; returns the next.
-
-    Where there is room a whole block is recorded: what lies beyond the step is replaced later.
+def record(work, i, targets, k, first, size, planes, timed):
+    """Record lane i of the work space, in one row, at the targets of row k, from the `first` on, within
+    the step, with the times if `timed`; returns the next.
     """
-    psi, turns, w, t, t_low = (
-        before[AT, i],
-        before[TURNED, i],
-        before[W, i],
-        before[TIME, i],
-        before[TIME_LOW, i],
-    )
-    inverse, end = 1.0 / w, state[AT, i]
-    high, slope = step[W_WITHIN, i], step[STEEPEST, i]
-    time_bar, slowest = state[T_BOUND, i], 1.0 / step[LOWEST, i]
-    at = min(k, len(targets) - 1)
+    at, end, turns = min(k, len(targets) - 1), work[_END + i], work[_TURNS + i]
     while True:
-        # read anew: broadcast from memory, where 34 vectors would be kept on the stack
-        omega, given, count = _omega(T, i), _eight(targets, at, first), 0
-        for j in range(BLOCK):
-            block[j] = given[j]
-        if timed:
-            integral = _integral(T, i)
-            for j in range(BLOCK):
-                s, slip, passed = _within(block[j], turns, psi, end)
-                count += passed
-                value, time = w + w * _rise(omega, s), t + (_elapsed(integral, s) * inverse + t_low)
-                block[BLOCK + j], block[2 * BLOCK + j] = value, time
-                block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
-                block[4 * BLOCK + j] = 1.02 * (time_bar + slip * slowest) + 4e-16 * time
-        else:
-            for j in range(BLOCK):
-                s, slip, passed = _within(block[j], turns, psi, end)
-                count += passed
-                block[BLOCK + j] = w + w * _rise(omega, s)
-                block[3 * BLOCK + j] = 1.02 * (high + slope * slip)
         if first + BLOCK <= size:
-            _set_eight(planes[rc.VALUE], k, first, _eight_of(block, BLOCK))
-            _set_eight(planes[rc.VALUE_BAR], k, first, _eight_of(block, 3 * BLOCK))
+            count = int(_whole_values(work, i, targets, at, first, planes, k))
             if timed:
-                _set_eight(planes[rc.TIME], k, first, _eight_of(block, 2 * BLOCK))
-                _set_eight(planes[rc.TIME_BAR], k, first, _eight_of(block, 4 * BLOCK))
+                _whole_times(work, i, targets, at, first, planes, k)
         else:
-            for n in range(0, rc.STATE, 1 if timed else 2):
-                for j in range(count):
-                    planes[n, k, first + j] = block[(n + 1) * BLOCK + j]
+            count = int(_last_values(work, i, targets, at, first, planes, k))
+            if timed:
+                _last_times(work, i, targets, at, first, planes, k)
         first += count
         if count < BLOCK or not unturned(targets[at, first], turns) <= end:
             return first
+
+
+@inline
+def nothing(planes, k, timed):
+    """Row k before anything is known: NaN, times only if `timed`.
+
+    In cache, where it is soon replaced; of all rows at once it costs a way through memory.
+    """
+    for n in range(0, rc.STATE, 1 if timed else 2):
+        own = planes[n, k]
+        for j in range(len(own)):
+            own[j] = math.nan
 
 
 @inline
@@ -393,11 +394,14 @@ def _far(w, bound, most_g):
 
 
 @kernel
-def _refill(P, starts, targets, status, waiting, state, fixed, row, sizes, goal, ahead):
-    """Give free lanes the rows that wait, whose status is OK at first; returns the first that still waits."""
+def _refill(P, starts, targets, planes, status, timed, waiting, state, fixed, row, sizes, goal):
+    """Give free lanes the rows that wait, whose status is OK at first and whose numbers are NaN;
+    returns the first that still waits.
+    """
     width = status.shape[1]
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
+            nothing(planes, waiting, timed)
             p, w0, own = P[waiting], starts[waiting, rc.START_W], row_of(targets, waiting)
             if math.isfinite(own[0]) and w0 > 0.0:
                 psi, turns = reduced(starts[waiting, rc.START_PHI])
@@ -436,21 +440,18 @@ def abels(P, starts, targets, tolerance, limit, ahead, planes, status, timed):
     `ahead` (rows, STATE), zeros when called: how far. W stays 0 where a row has not begun, and
     COLUMN is the number of its targets where all are known.
     """
-    work = np.zeros((TABLE + 2 * STATE + STEP + FIXED, LANES))  # LLVM: rows do not overlap
-    second = TABLE + STATE
-    third = second + STATE
-    fourth = third + STEP
-    T, state, before = work[:TABLE], work[TABLE:second], work[second:third]
-    step, fixed = work[third:fourth], work[fourth:]
+    work = np.zeros((ROWS, LANES))  # LLVM: rows do not overlap
+    T, state, before = work[:AFTER], work[AFTER:BEFORE], work[BEFORE:OF_STEP]
+    step, fixed, flat = work[OF_STEP:WHAT_STAYS], work[WHAT_STAYS:], work.reshape(-1)
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
-    goal, block = np.zeros(LANES), np.zeros((1 + rc.STATE) * BLOCK)
+    goal = np.zeros(LANES)
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
     free, ended = True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
             waiting = _refill(
-                P, starts, targets, status, waiting, state, fixed, row, sizes, goal, ahead
+                P, starts, targets, planes, status, timed, waiting, state, fixed, row, sizes, goal
             )
             if not busy(row):
                 return
@@ -471,7 +472,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, planes, status, timed):
             k, sound = row[i], math.isfinite(state[W, i]) and state[W_BOUND, i] < SURE * state[W, i]
             size, j = sizes[i], int(state[COLUMN, i])
             if sound:
-                j = _record(T, before, state, step, i, block, targets, k, j, size, planes, timed)
+                j = record(flat, i, targets, k, j, size, planes, timed)
             far = _far(state[W, i], state[W_BOUND, i], fixed[BOUND_G, i])
             if j < size and sound and far and state[COUNT, i] < limit:
                 state[COLUMN, i], goal[i] = j, row_of(targets, k)[j]

@@ -502,7 +502,9 @@ def _enter_far(
     lead,
     starts,
     targets,
+    planes,
     status,
+    timed,
     waiting,
     state,
     fixed,
@@ -512,14 +514,16 @@ def _enter_far(
     sizes,
     goal,
 ):
-    """Give free lanes the rows of the program `lead` that wait, whose status is OK at first; returns
-    the first that still waits.
+    """Give free lanes the rows of the program `lead` that wait, whose status is OK at first and whose
+    numbers are NaN; returns the first that still waits.
     """
     circle = P[lead, ON_CIRCLE] > 0.0
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
             p, w0 = P[waiting], starts[waiting, rc.START_W]
             own = row_of(targets, waiting)
+            if leads[waiting] == lead:
+                far.nothing(planes, waiting, timed)
             if leads[waiting] == lead and math.isfinite(own[0]) and w0 > 0.0:
                 phi, turns = starts[waiting, rc.START_PHI], 0.0
                 if circle:
@@ -554,24 +558,26 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
     """As `lockstep_phi.abels`, of the rows of P that have the program `lead`."""
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
     circle = p[ON_CIRCLE] > 0.0
-    work = np.zeros((far.TABLE + 2 * far.STATE + far.STEP + far.FIXED, LANES))
-    second = far.TABLE + far.STATE
-    third = second + far.STATE
-    fourth = third + far.STEP
-    T, state, before = work[: far.TABLE], work[far.TABLE : second], work[second:third]
-    step, fixed = work[third:fourth], work[fourth:]
+    work = np.zeros((far.ROWS, LANES))
+    T, state, before = (
+        work[: far.AFTER],
+        work[far.AFTER : far.BEFORE],
+        work[far.BEFORE : far.OF_STEP],
+    )
+    step, fixed, flat = work[far.OF_STEP : far.WHAT_STAYS], work[far.WHAT_STAYS :], work.reshape(-1)
     operations, numbers, S, K, degree = _tables(p, 1)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     forms = np.zeros((2 * far.ORDER, LANES))
     radius = np.ones(LANES)
     points, over, known, out, bounds = _ball_tables(p)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
-    goal, block = np.zeros(LANES), np.zeros((1 + rc.STATE) * far.BLOCK)
+    goal = np.zeros(LANES)
     waiting, free, ended = np.int64(lead), True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
             waiting = _enter_far(
-                P, leads, lead, starts, targets, status, waiting, state, fixed, numbers, radius, row, sizes, goal
+                P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, radius, row,
+                sizes, goal
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
@@ -615,9 +621,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
             sound = math.isfinite(w) and bound < far.SURE * w
             size, j = sizes[i], int(state[far.COLUMN, i])
             if sound:
-                j = far._record(
-                    T, before, state, step, i, block, targets, k, j, size, planes, timed
-                )
+                j = far.record(flat, i, targets, k, j, size, planes, timed)
             if j < size and sound and far._far(w, bound, fixed[BOUND_G, i]):
                 if state[far.COUNT, i] < limit:
                     state[far.COLUMN, i], goal[i] = j, row_of(targets, k)[j]

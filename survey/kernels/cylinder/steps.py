@@ -197,6 +197,7 @@ def abels(setting, begin, at, P, starts, targets, tolerance, limit, planes, stat
     """`abel` for each row of P; a row of targets ends at its first infinity, and one may serve all;
     planes (STATE, rows, n) are filled.
     """
+    planes[:] = math.nan
     for i in range(len(P)):
         size = finite(row_of(targets, i))
         phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]

@@ -31,12 +31,12 @@ METHODS = {
             ("P", "starts", "times", "tolerance", "limit", "turnings"),
         ),
         "flow_abels": Function(
-            "fill planes (STATE: VALUE to TIME_BAR, rows, n) and status (rows, n) at ascending targets (rows or 1, n), "
-            "phi >= phi0, for w0 >= 0",
+            "fill planes (STATE: VALUE to TIME_BAR, rows, n, NaN where nothing is known) and status (rows, n; zeros "
+            "when called) at ascending targets (rows or 1, n), phi >= phi0, for w0 >= 0",
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
         "flow_abels_untimed": Function(
-            "the same without times, whose planes are left as they are where that saves time",
+            "the same without times, whose planes may hold anything where that saves time",
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
         "flow_abels_by_row": Function(

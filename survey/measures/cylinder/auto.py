@@ -89,9 +89,12 @@ def _trajectories(method, rtol, rows, times, served):
 
 
 def _abel(method, rtol, before, timed, rows, targets, served):
-    solve = partial(solution.abel, rtol=rtol, before=before, timed=timed)
+    # where a closed form serves it gives times too
+    solve = partial(solution.abel, rtol=rtol, before=before, timed=timed or served)
     if not served:
-        results = solve(method, rows, targets)
+        results, met = solution.abel_and_met(method, rows, targets, rtol, before, timed=timed)
+        if met and rtol >= FINEST:
+            return results
         return _completed(
             results, _left_open(results, rtol, timed), partial(solve, taylor_double), rows, targets
         )

@@ -37,5 +37,5 @@ def _compile(p, options):
         fates = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
         taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *fates)
     if question == "portrait":
-        planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int64)
+        planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)
         taylor.flow_abels_by_row(p[None][:0], none, none, 0.0, 0, planes, status)

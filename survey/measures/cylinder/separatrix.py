@@ -64,7 +64,7 @@ def trajectories(method, rows, times, rtol, stable, left):
 def abel(method, rows, targets, rtol, stable, left):
     """As `solution.abel`, and the HEADS of each row; with None the best method is chosen."""
     floats = np.full((*targets.shape, rc.STATE), np.nan)
-    status = np.zeros(targets.shape, np.int64)
+    status = np.zeros(targets.shape, np.int8)
     starts = Starts(method, rows, stable, left)
     side, sign_w = (-1.0 if left else 1.0), (-1.0 if stable != left else 1.0)
     order = np.argsort(side * targets, axis=1, kind="stable")

@@ -122,7 +122,7 @@ def _in_time(method, rows, times, rtol):
         return floats, turnings, status
 
     asked = np.isfinite(times)
-    results = _repeated(run, asked, attempts(method, rtol), rtol)
+    results, _met = _repeated(run, asked, attempts(method, rtol), rtol)
     if hasattr(method, "flow_turnings") and (rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0):
         _count(method, rows, times, attempts(method, rtol)[-1], asked, results)
     return back(results)
@@ -153,13 +153,18 @@ def abel(method, rows, targets, rtol, before=False, by_row=False, timed=True):
     `by_row`: one row after the other, which is compiled 12 s sooner than lock step: for those who
     need few. Unless `timed`, TIME and TIME_BAR need not be known, and say nothing.
     """
+    return abel_and_met(method, rows, targets, rtol, before, by_row, timed)[0]
+
+
+def abel_and_met(method, rows, targets, rtol, before=False, by_row=False, timed=True):
+    """As `abel`, and whether every point is known to meet the requested accuracy."""
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
     least = distinct(targets).min(axis=1, keepdims=True, initial=np.inf)
     if targets.size and (past == past[0]).all() and (least >= phi0).all():  # as a rule
         return _branch(method, rows, targets, rtol, 1.0, past[0], by_row, timed)
     floats = np.full((*targets.shape, rc.STATE), np.nan)
-    status = np.zeros(targets.shape, dtype=np.int64)
+    status = np.zeros(targets.shape, dtype=np.int8)
     for side in (1.0, -1.0):
         onward = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):
@@ -172,31 +177,33 @@ def abel(method, rows, targets, rtol, before=False, by_row=False, timed=True):
             if (mine == mine[0]).all() and same[-1] - same[0] < same.size:
                 at = slice(same[0], same[-1] + 1)
                 some = slice(None) if picked.all() else picked
-                floats[some, at], status[some, at] = _branch(
+                (floats[some, at], status[some, at]), _met = _branch(
                     method, rows[some], targets[some, at], rtol, side, past, by_row, timed
                 )
                 continue
             at = np.where(mine, targets[picked], side * np.inf)
-            found = _branch(method, rows[picked], at, rtol, side, past, by_row, timed)
+            found, _met = _branch(method, rows[picked], at, rtol, side, past, by_row, timed)
             for result, new in zip((floats, status), found, strict=True):
                 held = result[picked]
                 held[mine] = new[mine]
                 result[picked] = held
-    return floats, status
+    return (floats, status), False
 
 
 def _branch(method, rows, targets, rtol, side, past, by_row, timed):
-    """As `abel`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
+    """As `abel_and_met`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
     rows = reverse(rows) if past else rows
     rows = mirror(rows) if side < 0 else rows
-    floats, status = _in_phi(
+    (floats, status), met = _in_phi(
         method, rows, side * targets if side < 0 else targets, rtol, by_row, timed
     )
     if side < 0 or past:
         floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
-        floats[..., rc.TIME] *= -1.0 if past else 1.0
-        floats += 0.0  # no negative zeros
-    return floats, status
+        if timed and past:
+            floats[..., rc.TIME] *= -1.0
+        for value in (rc.VALUE, rc.TIME)[: 1 + timed]:
+            floats[..., value] += 0.0  # no negative zeros
+    return (floats, status), met
 
 
 def _in_phi(method, rows, targets, rtol, by_row, timed):
@@ -211,25 +218,28 @@ def _in_phi(method, rows, targets, rtol, by_row, timed):
         starts[:, rc.START_W] = np.abs(starts[:, rc.START_W])
         starts += 0.0  # no negative zeros
         shape = len(P), targets.shape[1]
-        planes = np.zeros((rc.STATE, *shape))
-        planes[:: 1 if timed else 2] = np.nan  # zeros that no one needs cost nothing
-        status = np.zeros(shape, dtype=np.int64)
+        planes, status = np.empty((rc.STATE, *shape)), np.zeros(shape, dtype=np.int8)
         own = distinct(targets)
         at = np.array(own if len(own) < len(targets) else own[pick], order="C")
         solve(P, starts, at, tolerance, budget, planes, status)
         return planes.transpose(1, 2, 0), status
 
     asked = np.isfinite(distinct(targets))
-    return back(_repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol, timed))
+    results, done = _repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol, timed)
+    return back(results), done
 
 
 def _repeated(run, asked, ladder, rtol, timed=True):
-    """Solve all rows, then again, finer, those that miss the requested accuracy; keep the better of two."""
+    """Solve all rows, then again, finer, those that miss the requested accuracy; keep the better of
+    two. With whether every point is known to meet it.
+    """
     first, *others = ladder
     results = run(slice(None), first)
     for tolerance in others:
         if met(results, rtol, timed):
-            break
+            return results, True
+        if not timed:
+            results[0][..., rc.TIME :: 2] = 0.0  # of which nothing is known
         coarse = (missed(results, rtol) & asked).any(axis=1)
         if not coarse.any() or tolerance >= first:
             break
@@ -239,7 +249,7 @@ def _repeated(run, asked, ladder, rtol, timed=True):
         for result, old, new in zip(results, kept, finer, strict=True):
             old[better] = new[better]
             result[coarse] = old
-    return results
+    return results, False
 
 
 def met(results, rtol, timed=True):

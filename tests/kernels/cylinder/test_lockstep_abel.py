@@ -25,7 +25,7 @@ def solved(rows, over, tolerance=1e-13, run=taylor.flow_abels, limit=solution.ST
     rows = np.asarray(rows, float)
     P, starts = solution.split(rows)
     targets = rows[:, 6:7] + np.asarray(over, float)
-    planes, status = np.full((4, *targets.shape), np.nan), np.full(targets.shape, 99)
+    planes, status = np.empty((4, *targets.shape)), np.full(targets.shape, 99, np.int8)
     run(P, starts, targets, tolerance, limit, planes, status)
     return np.moveaxis(planes, 0, 2), status
 
@@ -98,6 +98,7 @@ def test_phi_is_the_variable_far_from_turning_points():
         ahead,
         again,
         codes,
+        True,
     )
     assert (ahead[:, lockstep_phi.COLUMN] == len(over)).all() and (status == steps.OK).all()
     np.testing.assert_array_equal(np.moveaxis(again, 0, 2), floats)

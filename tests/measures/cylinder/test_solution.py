@@ -47,8 +47,7 @@ def in_phi(six, phi, w, places, solve=solution, rtol=1e-10):
 def solved_once(row, places):
     """floats and status by the Taylor series with steps of one tolerance."""
     P, starts = solution.split(row)
-    planes = np.full((4, 1, places.size), np.nan)
-    status = np.zeros((1, places.size), dtype=np.int64)
+    planes, status = np.empty((4, 1, places.size)), np.zeros((1, places.size), dtype=np.int8)
     taylor.flow_abels(P, starts, places[None], 1e-13, solution.STEPS, planes, status)
     return np.moveaxis(planes, 0, 2), status
 
