@@ -31,13 +31,9 @@ from survey.kernels.cylinder.flow import (
 )
 from survey.kernels.floquet import runge_kutta
 from survey.kernels.hill import dop853 as hill
-from survey.kernels.hill.dop853 import DOUBT, LARGEST, SMALLEST, STEP_LIMIT
+from survey.kernels.hill.dop853 import DOUBT
 from survey.kernels.jit import inline, kernel
-from survey.kernels.libration import danby
-from survey.kernels.libration.danby import COLUMN, COLUMNS
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
-from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.kernels.math.runge_kutta import fundamental
 
 ORDER = 8
 SERVES = ("abel", "body", "cylinder", "danby", "floquet", "hill", "orbit")
@@ -46,7 +42,7 @@ COST = {
     "abel": 20.0,
     "body": 60.0,
     "cylinder": 60.0,
-    "danby": 2500.0,
+    "danby": 4000.0,
     "floquet": 10.0,
     "hill": 80.0,
     "orbit": 20.0,
@@ -57,7 +53,7 @@ ABOUT = {
     "abel": _ABOUT + "phi' = w, w' = f w + g in time, " + _CHECK,
     "body": _ABOUT + "the six equations (1)-(6) in time, " + _CHECK,
     "cylinder": _ABOUT + "phi' = w, w' = f w + g in time, " + _CHECK,
-    "danby": _ABOUT + "the four linear equations about L4 in the eccentric anomaly, " + _CHECK,
+    "danby": _ABOUT + "the four linear equations about L4 over half a period, " + _CHECK,
     "floquet": _ABOUT + "x' = A(t) x, " + _CHECK,
     "hill": _ABOUT + "y'' + z y = 0, " + _CHECK,
     "orbit": _ABOUT + "x' = f(t, x) and its variational equation, " + _CHECK,
@@ -69,9 +65,6 @@ ADAPTIVE = True
 NODES = tuple(C[:STAGES])
 _WEIGHT = float(np.abs(B).sum())  # 12.9: some of B are negative
 _OTHER = 0.3
-# of a slope of Danby's equations, of the largest one: steps show at most 3.7 where their estimate
-# does not exceed it
-_SLOPE_ROUNDINGS = 4.0
 
 
 floquet_factors = runge_kutta.factors
@@ -254,68 +247,3 @@ def _body_begin(G, state, tolerance, T, V):
 def body_trajectories(G, starts, times, tolerance, limit, floats, status):
     """See `kernels.body.motion.trajectories`."""
     motion.trajectories(_body_begin, _body_at, G, starts, times, tolerance, limit, floats, status)
-
-
-@inline
-def _danby_slope(given, i, state, out):
-    """Slopes in the eccentric anomaly: df = sqrt(1 - e^2) / (1 - e cos E) dE, r df = dE / sqrt(1 - e^2)."""
-    e, d1, d2, angle, h = given
-    small, scale = math.sin(0.5 * (angle + C[i] * h)), math.sqrt((1.0 - e) * (1.0 + e))
-    turn = scale / ((1.0 - e) + 2.0 * e * small * small)
-    for c in range(4):
-        x, q, p, m = state[4 * c], state[4 * c + 1], state[4 * c + 2], state[4 * c + 3]
-        dx, dm = turn * (p - m), turn * (x - q)
-        out[4 * c], out[4 * c + 1] = dx, -dx - d2 / scale * m
-        out[4 * c + 2], out[4 * c + 3] = d1 / scale * x - dm, dm
-
-
-@kernel
-def _danby_step(e, d1, d2, angle, h, slopes, state, work):
-    """Columns of the step's propagator and their errors into `work`; returns the largest error."""
-    fundamental(A, STAGES, _danby_slope, (e, d1, d2, angle, h), 4, h, state, slopes)
-    worst = 0.0
-    for c in range(4):
-        one = COLUMNS + COLUMN * c
-        error = size = rate = 0.0
-        for i in range(4):
-            start = 1.0 if i == c else 0.0
-            change = fifth = third = 0.0
-            for j in range(STAGES):
-                slope = slopes[j, 4 * c + i]
-                change += B[j] * slope
-                fifth += E5[j] * slope
-                third += E3[j] * slope
-                rate = max(rate, abs(slope))
-            # one addition, whose rounding is the one that the bar counts
-            value = start + h * change
-            # an error of order h^9 is h^3 of the estimate of order h^6
-            error = max(error, abs(h) * combined(fifth, third) + abs(h) ** 4 * DOUBT * abs(fifth))
-            size = max(size, abs(value))
-            work[one + i, 0], work[one + 4 + i, 0] = value, start
-        worst = max(worst, error)
-        work[one + 9, 0] = 0.0
-        work[one + 8, 0] = error + ROUNDOFF_UP * (size + _SLOPE_ROUNDINGS * _WEIGHT * h * rate)
-    return worst
-
-
-@kernel
-def danby_walk(e, d1, d2, tolerance, out):
-    """Points (N each), each with its tolerance, in steps of the eccentric anomaly; see `chain`."""
-    work, slopes, state = np.empty((danby.OWN, 1)), np.empty((STAGES, 16)), np.empty(16)
-    for i in range(len(e)):
-        danby.start(work, 1)
-        angle, h, steps = 0.0, 0.1 * math.sqrt(1.0 - e[i]), 0
-        for _ in range(STEP_LIMIT):
-            last = angle + 1.01 * h >= math.pi
-            h = math.pi - angle if last else h
-            error = _danby_step(e[i], d1[i], d2[i], angle, h, slopes, state, work)
-            if error <= tolerance[i]:
-                danby.advance(work, 0)
-                angle, steps = angle + h, steps + 1
-                if last:
-                    break
-            h *= min(LARGEST, max(SMALLEST, 0.9 * (tolerance[i] / (error + 1e-300)) ** 0.125))
-            h = min(h, 1.0)
-        danby.finish(work, 0, steps, out[i])
-        if not last:
-            out[i, :] = np.nan

@@ -20,10 +20,8 @@ from numpy.polynomial import legendre
 from survey.kernels.floquet import steps
 from survey.kernels.jit import kernel, splice
 from survey.kernels.lanes import chain, scatter
-from survey.kernels.libration import danby
-from survey.kernels.libration.danby import COLUMN, COLUMNS, D1, D2, OWN, TILE, E
 from survey.kernels.math.roundoff import ROUNDOFF
-from survey.kernels.unroll import largest, unroll
+from survey.kernels.unroll import unroll
 
 ORDER = 16
 SERVES = ("danby", "floquet", "hill", "orbit")
@@ -35,7 +33,7 @@ ABOUT = {
     "hill": _ABOUT + "of both fundamental solutions of y'' + z y = 0.",
     "orbit": _ABOUT + "of the orbit and of the propagator of small deviations from it.",
 }
-COST = {"danby": 10.0}  # time, relative to the default of each family
+COST = {"danby": 600.0}  # time, relative to the default of each family
 
 _DEGREE = 9
 _POINTS, _WEIGHTS = legendre.leggauss(_DEGREE + 1)
@@ -57,7 +55,6 @@ _TAIL, _SIZE, _ALIAS = _DEGREE + 1, _DEGREE + 2, _DEGREE + 3
 # a faster fall than this of two Legendre coefficients to the next two is not trusted
 _SLOWEST = 0.02
 _ROUNDING = 4.0 * ROUNDOFF  # of an entry of one step, about four roundings
-_ENDS = OWN + WIDTH
 
 
 floquet_factors = steps.factors
@@ -207,90 +204,3 @@ def hill_chain(samples, c2, h, p, order, starts, ends, out):
 @kernel
 def hill_scatter(samples, c2, h, p, order, starts, out):
     scatter(_hill_row, hill_step, WIDTH, samples, c2, h, p, order, starts, out)
-
-
-def danby_steps(e, rtol):
-    """Steps of half a period for accuracy rtol."""
-    x = -np.log1p(-e)
-    return max(rtol, 1e-14) ** (-1 / ORDER) * (0.6 + 1.15 * np.sqrt(x) + 0.4 * x)
-
-
-@splice
-def _danby_row(v, k, work, count):
-    """Powers of x in k r(f) (rows OWN to OWN + 9), and a bound of the Legendre coefficients left
-    out (OWN + 10).
-    """
-    paired, series = np.empty((_HALF, TILE)), np.empty((_HALF, TILE))
-    for i in range(count):
-        work[OWN + _TAIL, i] = work[OWN + _SIZE, i] = 0.0
-    for parity in range(2):
-        sign = 1.0 - 2.0 * parity
-        for j in range(_HALF):
-            left, right = v[_HALF - 1 - j], v[_HALF + j]
-            for i in range(count):
-                e = work[E, i]
-                paired[j, i] = k / ((1.0 - e) + e * right) + sign * (k / ((1.0 - e) + e * left))
-        for j in range(_HALF):
-            for i in range(count):
-                series[j, i] = _product(_TO_LEGENDRE[parity], j, paired, i)
-        for j in range(_HALF):
-            for i in range(count):
-                work[OWN + 2 * j + parity, i] = _product(_TO_POWERS[parity], j, series, i)
-        for i in range(count):
-            work[OWN + _TAIL, i] += abs(series[_HALF - 1, i])
-            work[OWN + _SIZE, i] += abs(series[_HALF - 2, i])
-    for i in range(count):  # those left out, at the rate at which the last four fall
-        tail = work[OWN + _TAIL, i]
-        work[OWN + _TAIL, i] = tail * (2.0 * tail / (work[OWN + _SIZE, i] + 1e-150) + 0.004)
-
-
-@unroll
-def _danby_column(f, i, k, d1, d2, x0, q0, p0, m0):
-    """A column of Y at both ends of a step, and the bound of its errors."""
-    r = [f[OWN + j, i] for j in range(_DEGREE + 1)]
-    x, q, p, m = [x0], [q0], [p0], [m0]
-    for n in range(ORDER):
-        share = 1 / (n + 1)
-        x_next, m_next = k * (p[n] - m[n]) * share, k * (x[n] - q[n]) * share
-        q.append(-x_next - d2 * _convolved(r, m, n) * share)
-        p.append(d1 * _convolved(r, x, n) * share - m_next)
-        x.append(x_next)
-        m.append(m_next)
-    even = [series[0] + _sums(series[2::2])[0] for series in (x, q, p, m)]
-    odd = [_sums(series[1::2])[0] for series in (x, q, p, m)]
-    # Truncation: the next two coefficients, at the rate at which the last four fall, with a margin
-    # of 2.
-    sizes = [
-        largest(largest(abs(x[n]), abs(q[n])), largest(abs(p[n]), abs(m[n])))
-        for n in range(ORDER + 1)
-    ]
-    last, before = sizes[15] + sizes[16], sizes[13] + (sizes[14] + 1e-150)
-    error = last * (2.0 * last / before + 0.004)
-    # What the projection left out acts only through the solutions' own components of that degree.
-    error = error + 4.0 * d1 * f[OWN + _TAIL, i] * (abs(x[9]) + abs(x[10]) + abs(m[9]) + abs(m[10]))
-    ends = [a + b for a, b in zip(even, odd, strict=True)] + [
-        a - b for a, b in zip(even, odd, strict=True)
-    ]
-    return (*ends, error, error)
-
-
-@splice
-def danby_columns(v, h, work, count):
-    """See `kernels.libration.danby.chain`."""
-    k = 0.5 * h
-    _danby_row(v, k, work, count)
-    for c in range(4):
-        x, q, p, m = 1.0 * (c == 0), 1.0 * (c == 1), 1.0 * (c == 2), 1.0 * (c == 3)
-        for i in range(count):  # into rows that are constants, else it would not become vector code
-            ends = _danby_column(work, i, k, work[D1, i], work[D2, i], x, q, p, m)
-            for j in range(COLUMN):
-                work[_ENDS + j, i] = ends[j]
-        for j in range(COLUMN):
-            for i in range(count):
-                work[COLUMNS + COLUMN * c + j, i] = work[_ENDS + j, i]
-
-
-@kernel
-def danby_chain(v, h, e, d1, d2, out):
-    """See `kernels.libration.danby.chain`."""
-    danby.chain(danby_columns, WIDTH + COLUMN, v, h, e, d1, d2, out)

@@ -39,16 +39,14 @@ are given, as accurate as requested, to about 1 - e = 1e-13 (then `overflow`, as
 the range of float32). For mu below about 1e-26, e > 0, all is too near Kepler's problem for a
 verdict.
 
-`auto` takes Taylor series in float64 and, where these leave the verdict or `collision` open or miss
-`rtol`, in double-double; the other methods are float64 alone.
+`auto` takes Chebyshev series in both parameters and, where these leave the verdict or `collision` open
+or miss `rtol`, Taylor series in double-double; the other methods take steps in float64 alone.
 
 Source: J. M. A. Danby, Astron. J. 69 (1964) 165; checked and completed in `libration_elliptic.md`
 beside this file.
 """
 
 from dataclasses import replace
-from functools import cache
-from math import cos, pi, sqrt
 
 import numpy as np
 
@@ -56,7 +54,6 @@ from survey import status
 from survey.measures import linear_motion
 from survey.measures.floquet import stability
 from survey.measures.floquet.compile_ahead import compile_ahead as _family_ahead
-from survey.measures.floquet.system import System
 from survey.measures.libration import danby, motion
 from survey.measures.libration.danby_double import compile_ahead as _double_ahead
 from survey.measures.rows import Rows
@@ -65,7 +62,7 @@ from survey.scene import Parameter, Trajectory, plus_minus
 TITLE = "Stability of the triangular libration points of the elliptic problem"
 FAMILY = "danby"
 STATUS = {}
-AUDIT = ("dop853",)
+AUDIT = ("taylor16",)
 REFERENCES = (
     "J. M. A. Danby, Astronomical Journal 69 (1964) 165",
     "A. P. Markeev, Libration points in celestial mechanics and cosmodynamics (1978)",
@@ -103,7 +100,7 @@ structure = "symplectic"
 
 def cost(options, sizes):
     """Seconds per point, roughly: a series for every row of one e, its values and their verdicts."""
-    return 4e-5 / sizes["mu"] + 1e-7 if sizes["mu"] >= danby.DENSE else 2e-6
+    return 4e-5 / sizes["mu"] + 1e-7 if sizes["mu"] >= danby.DENSE else 8e-7
 
 
 def solve(point, request):
@@ -111,19 +108,18 @@ def solve(point, request):
     block = Rows((point["e"],), point["mu"])
     line = request.line("mu")
     dense = line is not None and line[0] >= danby.DENSE
-    many = request.ranges.get("mu", (0,))[0] >= danby.MANY
     e, mu = block.per_row(point["e"]), block.per_point(point["mu"])
-    out = danby.solve(e, mu, request.method, request.rtol, dense, many)
+    out = danby.solve(e, mu, request.method, request.rtol, dense)
     out = {name: block.back(values) for name, values in out.items()}
     asked = {o.name for o in _FAMILY} & set(request.variables)
     return _with_family(out, point, request, asked) if asked else out
 
 
 def compile_ahead(variables, options):
-    """Compile what points that are solved one by one need, then what the family "floquet" needs
-    (see `survey.scenes`).
+    """Compile what double-double arithmetic needs, then what the family "floquet" needs (see
+    `survey.scenes`).
     """
-    _double_ahead(variables, options)
+    yield from _double_ahead(variables, options)
     if not {o.name for o in _FAMILY}.isdisjoint(variables):
         yield
         _family_ahead(variables, options)
@@ -134,7 +130,7 @@ def _with_family(out, point, request, asked):
     mu, e = np.broadcast_arrays(point["mu"], point["e"])
     lines = {i: request.line(name) for i, name in enumerate(("mu", "e")) if request.line(name)}
     given = np.stack([mu, e], axis=-1), request.method, request.rtol, asked, lines
-    found = stability.solve(_system(), structure, *given)
+    found = stability.solve(danby.SYSTEM, structure, *given)
     own, theirs = out["status"], found.pop("status")
     known = (own == status.OK) & (theirs == status.OK)
     for name, values in (out | found).items():
@@ -142,27 +138,6 @@ def _with_family(out, point, request, asked):
         here = known.reshape(known.shape + (1,) * (values.ndim - known.ndim))
         out[name] = np.where(here, values, nothing).astype(values.dtype)
     return out | {"status": np.where(own == status.OK, theirs, own)}
-
-
-@cache
-def _system():
-    """The canonical equations (3) of `libration_elliptic.md` in the angle v, tan(f/2) = tan(v/2) / k,
-    k^4 = (1 - e) / (1 + e): half-way to the eccentric anomaly, where steps can be longest.
-    """
-
-    def fill(v, p, out):
-        mu, e = p
-        square = sqrt((1.0 - e) / (1.0 + e))  # k^2
-        cosine, sine = 0.5 + 0.5 * cos(v), 0.5 - 0.5 * cos(v)  # squares, of v / 2
-        turn = sqrt(square) / (square * cosine + sine)  # df / dv
-        pull = sqrt(square) / (sqrt((1.0 - e) * (1.0 + e)) * (cosine + square * sine))  # r df / dv
-        d1 = 1.5 + 1.5 * sqrt(1.0 - 3.0 * mu * (1.0 - mu))
-        d2 = 6.75 * mu * (1.0 - mu) / d1
-        out[0, 2] = out[2, 1] = out[3, 0] = turn
-        out[0, 3] = out[1, 2] = out[3, 1] = -turn
-        out[1, 3], out[2, 0] = turn - d2 * pull, d1 * pull - turn
-
-    return System({"A": fill}, len(states), 2 * pi, (), symplectic=True)
 
 
 def equation(names, ends, options):

@@ -303,8 +303,9 @@ def _call(points, method, those, row_at, group, count, sharp):
         steps.carried(F, error, doubt, first, which, n, found.V, found.W, found.extra)
         found.sharp[:] = np.isfinite(found.extra).all(axis=(1, 2))
     back = scale[:, :, None] / scale[:, None, :]
-    for matrix in (found.M, found.E, found.R):
-        matrix *= back
+    with np.errstate(over="ignore", invalid="ignore"):
+        for matrix in (found.M, found.E, found.R):
+            matrix *= back
     found.V *= scale[:, :, None]
     found.W /= scale[:, None, :]
     return found

@@ -6,17 +6,17 @@ half a period gives all (`traces`; `scenes/libration_elliptic.md`): stable <=> A
 0 and 0 < t < 2, decided by the error bounds of these; A B = 0 means multipliers -1, K = 0 two pairs
 that meet.
 
-Points climb a ladder of steps (`survey.measures.answers`). Dense rows (one e, many mu) are five
-Chebyshev series in s = sqrt(1 - 3 mu (1 - mu)), which come from series in both parameters
-(`panels`), as do very many points. e = 0 and mu = 0 have closed forms. What these leave open, or
-not as accurate as asked, is solved in double-double.
+Its factors are Chebyshev series in s = sqrt(1 - 3 mu (1 - mu)) and artanh e (`panels`): rows (one e,
+many mu) are series in s made of these. e = 0 and mu = 0 have closed forms. What they leave open, or
+not as accurate as asked, is solved in double-double. Other methods solve the canonical equations as
+a member of the family "floquet", over half a period, by a ladder of steps.
 """
 
-from functools import lru_cache
+from math import cos, pi, sqrt
 
 import numpy as np
 
-from survey import measures, methods, status
+from survey import status
 from survey.kernels.libration import traces
 from survey.kernels.libration.traces import (
     INVARIANTS,
@@ -31,9 +31,10 @@ from survey.kernels.libration.traces import (
 )
 from survey.kernels.math.roundoff import EPS
 from survey.measures.answers import Ladder
+from survey.measures.floquet import monodromy
+from survey.measures.floquet.system import System
 from survey.measures.libration import danby_double, panels
 from survey.measures.libration.answers import Answers
-from survey.methods import taylor16
 from survey.scene import Output
 
 VERDICTS = {"undecided": UNDECIDED, "unstable": UNSTABLE, "stable": STABLE}
@@ -45,27 +46,17 @@ OUTPUTS = (
     Output("collision", "how stability is lost, or would be lost first: multipliers meet at -1, or two pairs meet",
            flags=COLLISIONS),
 )  # fmt: skip
-# Numbers of steps; a point climbs to 1.7 times as many. Of adaptive methods: tolerances of a step.
-_NUMBERS = np.array([2, 3, 4, 5, 6, 7, 8, *((5 + i % 4) << (i // 4 + 1) for i in range(49))])
-STEP_COUNTS = Ladder(_NUMBERS, np.arange(_NUMBERS.size) + 3, slice(INVARIANTS, RESULTS), most=5)
-TOLERANCES = Ladder(
-    10.0 ** -np.arange(4.0, 16.0), np.arange(12) + 1, slice(INVARIANTS, RESULTS), most=5
-)
-FINEST = 1e-14
-# The least number of points in a row for which a series pays, and of points on their own: a panel
-# costs 30,000 of them.
-DENSE = 3 * NODES
-MANY = 30_000
-# Keep a kernel call below about a second: steps, or points of an adaptive method.
-CALL_WORK, WALKS = 3_000_000, 500
+# Factors of the numbers of steps of other methods, by 1.5 each.
+LADDER = Ladder(1.5 ** np.arange(16), np.arange(16) + 1, slice(INVARIANTS, RESULTS), most=16)
+DENSE = 3 * NODES  # the least number of points in a row for which a series of its own pays
+CHUNK = 4096  # points of another method that are solved together: bounds the memory
 
 
-def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
+def solve(e, mu, method="auto", rtol=1e-10, dense=False):
     """The outputs for rows e (R) of points mu (R, L), all (R, L): a, b, their bounds, verdict,
     collision, status.
 
-    `dense`: the rows are long enough for series (see DENSE), `many`: the points are enough,
-    wherever they are cut.
+    `dense`: the rows are long enough for series of their own (see DENSE), wherever they are cut.
     """
     answers = Answers(mu.size)
     valid = np.isfinite(e)[:, None] & np.isfinite(mu)
@@ -75,17 +66,14 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
         answers.replace(np.flatnonzero(closed), closed_form(mu[closed], rtol))
     if method == "auto" and dense:
         _by_series(e, mu, rtol, answers, left)
-    elif method == "auto" and many:
-        points = np.flatnonzero(left)
-        own = Answers(points.size)
-        own.assess(panels.points(e[points // mu.shape[1]], mu[left]), rtol)
-        answers.replace(points, own)
     elif left.any():
-        used = taylor16 if method == "auto" else measures.method(method)
         points = np.flatnonzero(left)
-        answers.replace(
-            points, _point_by_point(e[points // mu.shape[1]], *rates(mu[left]), used, rtol)
-        )
+        own, at = Answers(points.size), (e[points // mu.shape[1]], mu[left])
+        if method == "auto":
+            own.assess(panels.points(*at), rtol)
+        else:
+            _by_steps(*at, method, rtol, own)
+        answers.replace(points, own)
     if method == "auto":
         points = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
         if points.size:
@@ -100,6 +88,25 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False, many=False):
     }
 
 
+def canonical(v, p, out):
+    """The equations (3) of `scenes/libration_elliptic.md` in the angle v, tan(f/2) = tan(v/2) / k, k^4 =
+    (1 - e) / (1 + e): half-way to the eccentric anomaly, where steps can be longest. p = (mu, e).
+    """
+    mu, e = p
+    square = sqrt((1.0 - e) / (1.0 + e))  # k^2
+    cosine, sine = 0.5 + 0.5 * cos(v), 0.5 - 0.5 * cos(v)  # squares, of v / 2
+    turn = sqrt(square) / (square * cosine + sine)  # df / dv
+    pull = sqrt(square) / (sqrt((1.0 - e) * (1.0 + e)) * (cosine + square * sine))  # r df / dv
+    d1 = 1.5 + 1.5 * sqrt(1.0 - 3.0 * mu * (1.0 - mu))
+    d2 = 6.75 * mu * (1.0 - mu) / d1
+    out[0, 2] = out[2, 1] = out[3, 0] = turn
+    out[0, 3] = out[1, 2] = out[3, 1] = -turn
+    out[1, 3], out[2, 0] = turn - d2 * pull, d1 * pull - turn
+
+
+SYSTEM, HALF = (System({"A": canonical}, 4, period, (), symplectic=True) for period in (2 * pi, pi))
+
+
 def rates(mu):
     """d1, d2 = (3 / 2)(1 +- s); the smaller from the product, which loses no digits."""
     x = 6.75 * mu * (1.0 - mu)
@@ -107,11 +114,9 @@ def rates(mu):
     return d1, x / d1
 
 
-def factors(e, mu, rtol=1e-13):
-    """A, B, C, D, t (N, 5) and their error bounds (N, 5), to what midpoint Taylor can."""
-    results = np.empty((e.size, RESULTS))
-    _point_by_point(e, *rates(mu), taylor16, rtol, results)
-    return results[:, :INVARIANTS], results[:, INVARIANTS:]
+def factors(e, mu):
+    """A, B, C, D, t (N, 5) and their error bounds (N, 5), from series."""
+    return np.split(panels.points(e, mu), 2, axis=1)
 
 
 def _by_series(e, mu, rtol, answers, left):
@@ -122,84 +127,52 @@ def _by_series(e, mu, rtol, answers, left):
     traces.dense(series, bars, some, mu, rtol, status.OVERFLOW, *answers.all)
 
 
-def _point_by_point(e, d1, d2, method, rtol, results=None):
-    """Answers of points (N each), each on a rung of its own; fills `results` (N, RESULTS) if they
-    are given.
-    """
-    results = np.empty((e.size, RESULTS)) if results is None else results
-    adaptive = methods.adaptive(method)
-    run, ladder = (_walk, TOLERANCES) if adaptive else (_chain, STEP_COUNTS)
-    asked = max(rtol, FINEST)
-    if adaptive:
-        rung = np.full(e.size, np.searchsorted(-ladder.rungs, -0.01 * asked))
-    else:
-        rung = np.searchsorted(ladder.rungs, method.danby_steps(e, asked))
+def _by_steps(e, mu, method, rtol, answers):
+    """Answers of points (N each), each on a rung of its own."""
+    method = monodromy.method_of(method)
+    for first in range(0, e.size, CHUNK):
+        some = slice(first, first + CHUNK)
+        points = monodromy.SystemPoints(HALF, np.stack([mu[some], e[some]], axis=1))
+        own, where = Answers(len(points.points)), np.flatnonzero(points.valid)
+        own.status[~points.valid] = status.NO_CONVERGENCE
 
-    def solve_at(points, rung):
-        return run(method, e[points], d1[points], d2[points], ladder.rungs[rung])
+        def solved(those, rung, points=points, where=where):
+            found = monodromy.solve(
+                points, method, rtol, LADDER.rungs[rung], where[those], sharp=False
+            )
+            with np.errstate(over="ignore", invalid="ignore"):
+                return _of_propagator(found.M, found.E)
 
-    def assess(points, results):
-        found = Answers(points.size)
-        found.assess(results, rtol)
-        return found
+        def assessed(those, results):
+            found = Answers(len(results))
+            found.assess(results, rtol)
+            return found
 
-    answers = Answers(e.size)
-    answers.status[rung > ladder.top] = status.STEP_LIMIT
-    first = np.flatnonzero(rung <= ladder.top)
-    results[first] = solve_at(first, rung[first])
-    answers.assess(results, rtol)
-    ladder.climb(rung, results, answers, solve_at, assess)
-    return answers
+        rung = np.zeros(where.size, dtype=np.int64)
+        results = solved(np.arange(where.size), rung)
+        best = assessed(slice(None), results)
+        LADDER.climb(rung, results, best, solved, assessed)
+        own.replace(where, best)
+        answers.replace(np.arange(e.size)[some], own)
 
 
-def _chain(method, e, d1, d2, number):
-    """Results (N, RESULTS) by `number` (N) fixed steps; points of one mesh together, in calls of
-    bounded work.
-    """
-    results = np.empty((e.size, RESULTS))
-    key = number * 1000 + grading(e)
-    order = np.argsort(key, kind="stable")
-    nodes = tuple(method.NODES)
-    for same in np.split(order, np.flatnonzero(np.diff(key[order])) + 1):
-        if not same.size:
-            continue
-        steps = int(number[same[0]])
-        v, h = mesh(steps, int(grading(e[same[:1]])[0]), nodes)
-        most = max(64, CALL_WORK // steps)
-        for first in range(0, same.size, most):
-            some = same[first : first + most]
-            out = np.empty((some.size, RESULTS))
-            method.danby_chain(v, h, e[some], d1[some], d2[some], out)
-            results[some] = out
+def _of_propagator(M, E):
+    """Results (N, RESULTS) from the propagators over half a period and bounds of their entries (N, 4, 4)."""
+    results = np.empty((len(M), RESULTS))
+    halves = slice(2), slice(2, 4)
+    for j, (row, column) in enumerate(
+        ((0, 0), (1, 1), (1, 0), (0, 1))
+    ):  # A of P, B of T, C of Q, D of S
+        (a, b), (c, d) = (M[:, halves[row], halves[column]][:, i].T for i in range(2))
+        (ea, eb), (ec, ed) = (E[:, halves[row], halves[column]][:, i].T for i in range(2))
+        results[:, j] = a * d - b * c
+        bar = ea * abs(d) + ed * abs(a) + ea * ed + eb * abs(c) + ec * abs(b) + eb * ec
+        results[:, INVARIANTS + j] = bar + EPS * 2.0 * (abs(a * d) + abs(b * c))
+    P, T, EP, ET = M[:, :2, :2], M[:, 2:, 2:], E[:, :2, :2], E[:, 2:, 2:]
+    results[:, traces.T] = (P * T).sum(axis=(1, 2))
+    bar = EP * abs(T) + ET * abs(P) + EP * ET + 4.0 * EPS * abs(P * T)
+    results[:, traces.T_BAR] = bar.sum(axis=(1, 2))
     return results
-
-
-def _walk(method, e, d1, d2, tolerance):
-    """Results (N, RESULTS) of points one by one, each with its tolerance (N)."""
-    results = np.empty((e.size, RESULTS))
-    for first in range(0, e.size, WALKS):
-        some = slice(first, first + WALKS)
-        method.danby_walk(e[some], d1[some], d2[some], tolerance[some], results[some])
-    return results
-
-
-def grading(e):
-    """How far the steps crowd towards f = pi, where r is singular at pi +- i arccosh(1 / e): see `mesh`."""
-    return np.rint(0.25 * np.log2((1.0 + e) / (1.0 - e))).astype(int)
-
-
-@lru_cache(maxsize=256)
-def mesh(steps, grade, nodes):
-    """1 + cos f at the nodes of each step (steps, nodes), and the steps' lengths (steps).
-
-    They are even in psi, tan((pi - f) / 2) = 2^-grade tan(psi / 2): between true (0) and eccentric
-    anomaly, so that the singularities of the equation and of this map lie about as far away.
-    """
-    psi = np.pi * np.arange(steps, -1, -1) / steps
-    y = 2.0 * np.arctan(2.0**-grade * np.tan(0.5 * psi))
-    y[0] = np.pi
-    h = y[:-1] - y[1:]
-    return 2.0 * np.sin(0.5 * (y[:-1, None] - h[:, None] * np.array(nodes))) ** 2, h
 
 
 def closed_form(mu, rtol):

@@ -37,9 +37,13 @@ def solve(e, mu, rtol, answers, points, dense=False):
 
 
 def compile_ahead(variables, options):
-    """Compile the kernels of points that are solved one by one (see `survey.scenes`)."""
+    """Compile what panels are made of, then what else points need that are solved one by one (see
+    `survey.scenes`).
+    """
     one = np.full(1, 1e-3)
-    traces_double.measure(_results(one, one), 1e-9, status.OVERFLOW, *Answers(1).all)
+    results = _results(one, one)
+    yield
+    traces_double.measure(results, 1e-9, status.OVERFLOW, *Answers(1).all)
 
 
 def _take(answers, points, own):

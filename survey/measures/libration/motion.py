@@ -4,7 +4,7 @@ trace and b.
 xi'' - 2 eta' = d1 r xi,   eta'' + 2 xi' = d2 r eta,   r = 1 / (1 + e cos f)
 """
 
-from math import ceil, pi
+from math import ceil, log2, pi
 
 import numpy as np
 
@@ -35,9 +35,7 @@ def coefficients(mu, e):
     4); their lengths.
     """
     d1, d2 = (float(rate[0]) for rate in danby.rates(np.array([mu])))
-    height, lengths = danby.mesh(
-        STEPS, int(danby.grading(np.array([e]))[0]), tuple(linear_motion.NODES)
-    )
+    height, lengths = _mesh(STEPS, round(0.25 * log2((1.0 + e) / (1.0 - e))))
     r = 1.0 / ((1.0 - e) + e * height)
     r, lengths = (
         np.concatenate([r, linear_motion.mirrored(r)]),
@@ -48,6 +46,19 @@ def coefficients(mu, e):
     matrices[..., 2, 0], matrices[..., 3, 1] = d1 * r, d2 * r
     matrices[..., 2, 3], matrices[..., 3, 2] = 2.0, -2.0
     return matrices, lengths
+
+
+def _mesh(steps, grade):
+    """1 + cos f at the nodes of each step of half a turn (steps, nodes), and the steps' lengths (steps).
+
+    They are even in psi, tan((pi - f) / 2) = 2^-grade tan(psi / 2): between true (0) and eccentric
+    anomaly, as r is singular at pi +- i arccosh(1 / e), where steps crowd.
+    """
+    psi = np.pi * np.arange(steps, -1, -1) / steps
+    y = 2.0 * np.arctan(2.0**-grade * np.tan(0.5 * psi))
+    y[0] = np.pi
+    h = y[:-1] - y[1:]
+    return 2.0 * np.sin(0.5 * (y[:-1, None] - h[:, None] * np.array(linear_motion.NODES))) ** 2, h
 
 
 def multipliers(a, a_bar, b, b_bar):

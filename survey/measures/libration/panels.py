@@ -12,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from survey import status, waiting
 from survey.kernels.libration import danby_double as kernels
 from survey.kernels.libration import panels, traces
 from survey.kernels.libration.traces import INVARIANTS
 from survey.kernels.libration.traces_double import NODES
 from survey.kernels.math.chebyshev import lebesgue, tail
 from survey.kernels.math.roundoff import EPS, PAIR_ROUNDOFF, PAIR_SUM_ROUNDOFF
+from survey.measures.libration.answers import Answers
 
 DIGITS = 40
 LEAST = 1e-17  # of the largest coefficient: what is less counts at no single point
@@ -45,6 +47,9 @@ class TracePanel(NamedTuple):
 @lru_cache(maxsize=64)
 def panel(number):
     """The TracePanel of this number."""
+    if waiting.other_compiler:  # it compiles the chain, the longest
+        _compile_others()
+        waiting.wait()
     shapes, weights, middle = nodes(number)
     rates, matrix = tables()
     results = np.empty((NODES**2, kernels.RESULTS))
@@ -63,6 +68,29 @@ def panel(number):
     left_out[:, : panels.TERMS, : traces.NODES][:, IN_S < lengths[:, None]] = 0.0
     short_bars = bars + left_out.sum(axis=(1, 2)) + (ROUNDING * abs(short)).sum(axis=(1, 2))
     return TracePanel(middle, series, bars, short, lengths, short_bars)
+
+
+def _compile_others():
+    """Compile, by calls on nothing, what values at nodes, rows and points are used by."""
+    series, short = (
+        np.empty((INVARIANTS, 2, 0, 0)),
+        np.empty((INVARIANTS, panels.TERMS, traces.NODES)),
+    )
+    bars, middle, lengths = np.zeros(INVARIANTS), np.zeros(4), np.zeros(panels.TERMS, np.int64)
+    results, answers = np.empty((0, traces.RESULTS)), Answers(0)
+    panels.fit(
+        np.empty((0, kernels.RESULTS)),
+        series[0],
+        np.empty((0, 2)),
+        series,
+        *np.zeros((2, INVARIANTS)),
+    )
+    none, of_rows = np.empty(0), np.empty((0, INVARIANTS, traces.NODES))
+    panels.rows(none, True, middle, short, bars, of_rows, np.empty((0, INVARIANTS)))
+    panels.points(none, none, True, middle, short, lengths, bars, results)
+    given = np.empty(0, np.int64), np.empty((0, 0)), 0.0, status.OVERFLOW
+    traces.dense(of_rows, np.empty((0, INVARIANTS)), *given, *answers.all)
+    answers.assess(results, 0.0)
 
 
 def rows(e):

@@ -5,18 +5,13 @@
 import json
 from functools import cache
 from importlib import resources
-from unittest.mock import patch
 
 import numpy as np
 
-from survey.kernels.libration import danby as lanes
 from survey.measures.libration import danby
-from survey.methods import taylor16
-from survey.precision.flops import Counted
 from survey.precision.peers import PeerSystem
 
 ERROR = "b"
-LIMITED = "taylor16"
 LARGEST = 0.7  # of e
 MOST = {"dop853": 200, "rk4": 300}
 
@@ -93,47 +88,3 @@ def outcome(ends):
     a, b = 4 * t - 4, 6 - 8 * t + 16 * product
     stable = (b + 2 * a + 2 > 0) & (b - 2 * a + 2 > 0) & (a * a - 4 * b + 8 > 0) & (abs(a) < 4)
     return {ERROR: b, "verdict": stable.astype(int)}
-
-
-class _Counted(Counted):
-    """Takes part in comparisons too."""
-
-    def __lt__(self, other):
-        return False
-
-    __gt__ = __lt__
-
-
-def operations_of(run):
-    """Operations of midpoint Taylor's steps, counted from their formulas, while `run()` solves a work."""
-    steps = []
-    chain = taylor16.danby_chain
-
-    def counting(v, h, e, d1, d2, out):
-        steps.append(h.size * e.size)
-        chain(v, h, e, d1, d2, out)
-
-    with patch.object(taylor16, "danby_chain", counting):
-        run()
-    return sum(steps) * _one_step()
-
-
-def _one_step():
-    """All that `kernels.libration.danby.chain` does per lane and step."""
-    number = _Counted()
-    work = np.full((lanes.OWN + taylor16.WIDTH + lanes.COLUMN, 1), number, dtype=object)
-
-    def plain(module):
-        return {
-            name: value.py_func for name, value in vars(module).items() if hasattr(value, "py_func")
-        }
-
-    def empty(shape):
-        return np.full(shape, number, dtype=object)
-
-    Counted.operations = 0
-    with patch.multiple(taylor16, **plain(taylor16)), patch.multiple(lanes, **plain(lanes)):
-        with patch.object(taylor16.np, "empty", empty):
-            taylor16.danby_columns(np.full(10, 0.5), 0.1, work, 1)
-        lanes.advance(work, 0)
-    return Counted.operations
