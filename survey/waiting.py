@@ -8,17 +8,27 @@ import time
 
 from survey.kernels import jit
 
-other_compiler = None  # at a first use, waits for what is compiled elsewhere
+other_compiler = (
+    None  # at a first use, waits for the next of what is compiled elsewhere, and names it
+)
+_done = set()
 _waited = 0.0
 
 
-def wait():
-    """Wait for what is compiled elsewhere: it is done sooner than if this process began now."""
+def wait(name=None):
+    """Wait for the next of what is compiled elsewhere, or for what has this name: it is done sooner than
+    if this process began now.
+    """
     global _waited
     function = other_compiler
-    if function is not None:
+    if function is not None and name not in _done:
         began = time.perf_counter()
-        function()
+        while line := function():  # empty at the end
+            if name is None:
+                break
+            _done.add(line.strip())
+            if name in _done:
+                break
         _waited = max(_waited, time.perf_counter() - began)  # threads wait side by side
 
 

@@ -122,7 +122,7 @@ def compile_ahead(variables, options):
     yield from _double_ahead(variables, options)
     if not {o.name for o in _FAMILY}.isdisjoint(variables):
         yield
-        _family_ahead(variables, options)
+        yield from _family_ahead(variables, options)
 
 
 def _with_family(out, point, request, asked):

@@ -12,12 +12,12 @@ from survey.sweep.dispatch import cpus
 
 
 def program(ahead, request):
-    """The Python program that calls a scene's `compile_ahead` for what is asked; where that yields,
-    it says so.
+    """The Python program that calls a scene's `compile_ahead` for what is asked; what that yields, it
+    prints.
     """
     call = f"({list(request.variables)}, {dict(request.options)})"
-    steps = f"from {ahead.__module__} import {ahead.__name__} as ahead\nfor _ in ahead{call} or (): print(flush=True)"
-    return f"import gc; gc.disable(); {steps}"
+    steps = f"for name in ahead{call} or (): print(name, flush=True)"
+    return f"import gc; gc.disable(); from {ahead.__module__} import {ahead.__name__} as ahead\n{steps}"
 
 
 @contextlib.contextmanager
@@ -35,7 +35,9 @@ def compiling_ahead(scene, request):
         yield
         return
     command = [sys.executable, "-c", program(ahead, request)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    ) as process:
         waiting.other_compiler = process.stdout.readline  # a line, or the end
         try:
             yield

@@ -90,7 +90,7 @@ BRUN = [
     "lanes_double:end",
     "brun_lanes:enter",
 ]
-FLOQUET = ["leverrier:answer_matrices"]
+FLOQUET = ["leverrier:fill_matrices", "characteristic:answer"]
 DANBY = ["danby_double:chain", "traces_double:measure"]
 
 

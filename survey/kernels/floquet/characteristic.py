@@ -36,19 +36,34 @@ MULTIPLIERS, RADIUS, VERDICT, CROSSING, KREIN = range(5)  # columns of `asked`
 TIE = 1e-9
 
 
+def blocks(number, K, d):
+    """Room for c, bars, z, y and points of so many blocks, as `answer` takes them."""
+    shapes = (K, LANES), (K, LANES), (d, LANES), (d, LANES)
+    return *(np.empty((number, *shape)) for shape in shapes), np.empty((number, LANES), np.int64)
+
+
 @kernel
-def answer(c, bars, z, y, points, n, paired, asked, rtol, floats, signs, verdict, crossing, missed):
+def answer(
+    c, bars, z, y, points, begun, n, paired, asked, rtol, floats, signs, verdict, crossing, missed
+):
     """Answer blocks of LANES points from their coefficients c, known to within `bars` (blocks, K,
     LANES), and the roots z + i y at the nearest nodes (blocks, d, LANES), which are used up.
 
     points (blocks, LANES): their columns of `floats`, `signs`, ... as in `stability.Answers`; -1 where a block ends
     earlier. Of K = 2 d coefficients the last d are those of the Krein form. Points whose roots are not found from those
-    of the node, as where real ones have become complex, begin at a circle once all others are answered.
+    of the node, as where real ones have become complex, begin at a circle once all others are answered; unless
+    `begun`, where no roots are known, all do.
     """
     blocks, K, d = len(c), c.shape[1], z.shape[1]
     own_c, own_bars = np.empty((K, LANES)), np.empty((K, LANES))
     own_points, found = np.empty(LANES, np.int64), np.empty(LANES, np.bool_)
     left, number, done, b = np.empty(blocks * LANES, np.int64), 0, 0, 0
+    if d > 2 and not begun:
+        b = blocks
+        for k in range(blocks * LANES):
+            if points[k // LANES, k % LANES] >= 0:
+                left[number] = k
+                number += 1
     while b < blocks or done < number:
         later, own = b == blocks, min(b, blocks - 1)
         count = min(LANES, number - done) if later else 0

@@ -14,60 +14,50 @@ import math
 
 import numpy as np
 
-from survey.kernels.floquet.characteristic import LANES, answer_lanes, from_circle
+from survey.kernels.floquet.characteristic import LANES
 from survey.kernels.floquet.steps import copy
 from survey.kernels.jit import kernel
 from survey.kernels.math.roundoff import EPS
 
 
 @kernel
-def answer_matrices(
-    M, E, det, change, forms, paired, asked, rtol, floats, signs, verdict, crossing, missed
-):
-    """Answer N points from M (N, n, n), known within E: columns of `floats`, `signs`, ... as in
-    `stability.Answers`; det (2, N) or (2, 0): its determinant, and to within what it is known.
+def fill_matrices(M, E, det, change, forms, paired, c, bars, points):
+    """Fill the coefficients that `characteristic.answer` takes of N points from M (N, n, n), known
+    within E; det (2, N) or (2, 0): its determinant, and to within what it is known.
 
     Row j of change (m + 1, m + 1), m = n / 2, and of forms (m, m): l^j + l^-j (1 for j = 0) as a
     polynomial of s = l + 1 / l, from the constant term on. Without `forms`, of size (0, 0), there
     are no Krein signs.
     """
     N, n = M.shape[:2]
-    m, of_forms = n // 2, len(forms) > 0
+    m, of_forms, K = n // 2, len(forms) > 0, c.shape[1]
     d = m if paired else n
-    K = 2 * d if of_forms else d
     squares, sums, powers = np.empty((7, n, n)), np.empty((5, n + 1)), np.empty((0, n, n))
     ones, others, other_bars = np.ones(n), np.zeros(n + 1), np.full(n + 1, math.inf)
-    c, bars = np.empty((K, LANES)), np.empty((K, LANES))
-    z, y = np.empty((d, LANES)), np.empty((d, LANES))
-    outputs, found = np.empty(LANES, np.int64), np.empty(LANES, np.bool_)
-    for first in range(0, N, LANES):
-        count = min(LANES, N - first)
-        for lane in range(count):
-            p = first + lane
-            outputs[lane] = p
+    for b in range(len(c)):
+        own, own_bars, count = c[b], bars[b], min(LANES, N - b * LANES)
+        for lane in range(LANES):
+            p = b * LANES + lane
+            if lane >= count:
+                points[b, lane] = -1
+                for k in range(K):
+                    own[k, lane], own_bars[k, lane] = own[k, 0], own_bars[k, 0]
+                continue
+            points[b, lane] = p
             _leverrier(M[p], E[p], ones, others, other_bars, 0.0, powers, squares, sums)
             if paired:
-                _in_sums(sums[0], sums[2], m, change, c, bars, 0, lane)
+                _in_sums(sums[0], sums[2], m, change, own, own_bars, 0, lane)
                 if of_forms:
-                    _in_sums(sums[3], sums[4], m, forms, c, bars, d, lane)
+                    _in_sums(sums[3], sums[4], m, forms, own, own_bars, d, lane)
                 if not _palindromic(sums[0], sums[2]):
                     for k in range(K):
-                        bars[k, lane] = math.inf
+                        own_bars[k, lane] = math.inf
             else:
                 for k in range(n):
-                    c[k, lane], bars[k, lane] = sums[0, k + 1], sums[2, k + 1]
-                if det.shape[1] and det[1, p] < bars[n - 1, lane]:
-                    c[n - 1, lane] = -det[0, p] if n % 2 else det[0, p]
-                    bars[n - 1, lane] = det[1, p]
-        for lane in range(count, LANES):
-            for k in range(K):
-                c[k, lane], bars[k, lane] = c[k, 0], bars[k, 0]
-        if d > 2:
-            from_circle(c, d, z, y)
-        answer_lanes(
-            c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed,
-            found,
-        )  # fmt: skip
+                    own[k, lane], own_bars[k, lane] = sums[0, k + 1], sums[2, k + 1]
+                if det.shape[1] and det[1, p] < own_bars[n - 1, lane]:
+                    own[n - 1, lane] = -det[0, p] if n % 2 else det[0, p]
+                    own_bars[n - 1, lane] = det[1, p]
 
 
 @kernel

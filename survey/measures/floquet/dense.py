@@ -270,6 +270,7 @@ def _scaled(values, panel, side):
 def _answer(key, panel, x, y, outputs, answer):
     """Answer the points of a panel at x (rows), y (columns), between -1 and 1."""
     n1, n2 = panel.sizes
+    waiting.wait("series")
     near = _part(x, n1), _part(y, n2)
     columns = min(len(y), TOGETHER)
     rows = max(1, TOGETHER // columns)
@@ -290,6 +291,7 @@ def _answer(key, panel, x, y, outputs, answer):
 def _answer_points(key, panel, x, outputs, answer):
     """Answer the points of a panel at x (2, N), each between -1 and 1."""
     n1, n2 = panel.sizes
+    waiting.wait("series")
     near = np.stack([_part(x[0], n1), _part(x[1], n2)])
     # terms beyond these, of all n2 series, are a tenth of the bounds at most
     rest = np.cumsum(abs(panel.series[::-1]), axis=0)[::-1].reshape(n1, -1, n2)
@@ -313,9 +315,7 @@ class _Blocks:
         self.key, self.asked = key, np.array(key.asked)
         K, d = len(panel.doubts), panel.starts.shape[2]
         self.needed = d if characteristic.is_short(key.system.n, self.asked) else K
-        of_coefficients, of_roots = (number, K, LANES), (number, d, LANES)
-        shapes = of_coefficients, of_coefficients, of_roots, of_roots
-        self.arrays = *map(np.empty, shapes), np.empty((number, LANES), np.int64)
+        self.arrays = characteristic.blocks(number, K, d)
 
     def first(self, number):
         """The arrays of the first blocks."""
@@ -323,9 +323,8 @@ class _Blocks:
 
     def answer(self, used, answer):
         key = self.key
-        waiting.wait()
         characteristic.answer(
-            *used, key.system.n, key.paired, self.asked, key.rtol, answer.floats, answer.signs, answer.verdict,
+            *used, True, key.system.n, key.paired, self.asked, key.rtol, answer.floats, answer.signs, answer.verdict,
             answer.crossing, answer.missed,
         )  # fmt: skip
 

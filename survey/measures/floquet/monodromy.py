@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from survey import measures
+from survey import measures, waiting
 from survey.kernels.floquet import sizes, steps
 from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import ROUNDOFF_UP
@@ -300,6 +300,7 @@ def _call(points, method, those, row_at, group, count, sharp):
         )
         found.centre[which], found.V[which] = np.linalg.eig(found.M[which])
         found.W[which] = inverse(found.V[which])
+        waiting.wait("carried")
         steps.carried(F, error, doubt, first, which, n, found.V, found.W, found.extra)
         found.sharp[:] = np.isfinite(found.extra).all(axis=(1, 2))
     back = scale[:, :, None] / scale[:, None, :]

@@ -11,7 +11,7 @@ undecided   the error bounds allow either
 import numpy as np
 
 from survey import status, waiting
-from survey.kernels.floquet import leverrier
+from survey.kernels.floquet import characteristic, leverrier
 from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
 from survey.measures.floquet import dense, maslov, monodromy, multipliers
@@ -94,9 +94,13 @@ def by_coefficients(matrices, structure, rtol, asked, period=None, growth=None):
         with np.errstate(over="ignore", invalid="ignore"):
             det = np.exp(growth[0]) * np.stack([np.ones(N), np.expm1(growth[1]) + 8 * EPS])
     found.floats[:] = np.nan
-    waiting.wait()
-    leverrier.answer_matrices(
-        M, E, det, change, forms, paired, np.array(dense.flags(asked)), rtol, found.floats, found.signs,
+    waiting.wait("matrices")
+    d = n // 2 if paired else n
+    blocks = -(-N // characteristic.LANES)
+    c, bars, z, y, places = characteristic.blocks(blocks, 2 * d if len(forms) else d, d)
+    leverrier.fill_matrices(M, E, det, change, forms, paired, c, bars, places)
+    characteristic.answer(
+        c, bars, z, y, places, False, n, paired, np.array(dense.flags(asked)), rtol, found.floats, found.signs,
         found.verdict, found.crossing, found.missed,
     )  # fmt: skip
     _note_missed(found, matrices, rtol, asked, period)

@@ -14,17 +14,15 @@ from survey.measures.floquet.answers import Answers
 def answered(coefficients, doubts, starts, n, paired, rtol=1.0, multipliers=True):
     """The Answers of one point, as a series of one term."""
     answer, asked = Answers(1, n), np.array([multipliers, True, True, False, False])
-    K, d = len(coefficients), len(starts)
-    of_coefficients, of_roots = (1, K, characteristic.LANES), (1, d, characteristic.LANES)
-    shapes = of_coefficients, of_coefficients, of_roots, of_roots
-    block = *map(np.empty, shapes), np.empty((1, characteristic.LANES), np.int64)
+    K = len(coefficients)
+    block = characteristic.blocks(1, K, len(starts))
     characteristic.fill_rows(
         np.array(coefficients, dtype=float).reshape(1, -1), np.array(doubts, dtype=float).reshape(-1, 1, 1),
         np.zeros(1), np.zeros(1), np.zeros(2, np.int64),
         np.stack([starts.real, starts.imag], axis=-1).reshape(1, 1, -1, 2), np.zeros((1, 1), np.int64), K, *block,
     )  # fmt: skip
     characteristic.answer(
-        *block, n, paired, asked, rtol, answer.floats, answer.signs, answer.verdict, answer.crossing, answer.missed
+        *block, True, n, paired, asked, rtol, answer.floats, answer.signs, answer.verdict, answer.crossing, answer.missed
     )  # fmt: skip
     return answer
 
