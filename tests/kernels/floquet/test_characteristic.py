@@ -22,7 +22,8 @@ def answered(coefficients, doubts, starts, n, paired, rtol=1.0, multipliers=True
         np.stack([starts.real, starts.imag], axis=-1).reshape(1, 1, -1, 2), np.zeros((1, 1), np.int64), K, *block,
     )  # fmt: skip
     characteristic.answer(
-        *block, True, n, paired, asked, rtol, answer.floats, answer.signs, answer.verdict, answer.crossing, answer.missed
+        *block, True, n, paired, asked, rtol, answer.floats, answer.signs, answer.verdict, answer.crossing,
+        answer.missed,
     )  # fmt: skip
     return answer
 
