@@ -2,6 +2,8 @@
 block's shape.
 """
 
+from math import prod
+
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
@@ -23,14 +25,15 @@ def dense(point, names, name):
     The dimensions along which only `name` varies become columns: one solution serves them all.
     """
     arrays = [np.asarray(point[key], dtype=float) for key in (*names, name)]
+    own = list(zip(*(array.shape for array in arrays[:-1]), strict=True))  # by dimension
     shape = np.broadcast_shapes(*(array.shape for array in arrays))
-    dense = [i for i in range(len(shape)) if all(array.shape[i] == 1 for array in arrays[:-1])]
+    dense = [i for i in range(len(shape)) if set(own[i]) == {1}]
     points = [i for i in range(len(shape)) if i not in dense]
     order = points + dense
-    columns = int(np.prod([shape[i] for i in dense], dtype=int))
+    columns = prod(shape[i] for i in dense)
     last = np.broadcast_to(arrays[-1], shape).transpose(order)
     if not any(last.strides[: len(points)]):  # the same for all rows: not copied
-        number = int(np.prod([shape[i] for i in points], dtype=int))
+        number = prod(shape[i] for i in points)
         first = last[(slice(1),) * len(points)].reshape(-1, columns)
         last = np.broadcast_to(first, (number, columns))
     else:
@@ -98,9 +101,11 @@ def at_angles(results, good, back, timed=True):
         status = np.where(good, status, INVALID_PARAMETERS)
     results = {"status": back(status)}
     nothing = np.broadcast_to(np.nan, results["status"].shape)
+    all_reached = not status.any()  # as a rule
     for names, code in ((("w", "t"), OK), (("phi_turning", "t_turning"), TURNING)):
-        here = status == code
-        some, every = here.any(), here.all()
+        here = None if all_reached else status == code
+        some = code == OK if all_reached else here.any()
+        every = some and (all_reached or here.all())
         for name, value, bar in zip(
             names[: 1 + timed], (rc.VALUE, rc.TIME), (rc.VALUE_BAR, rc.TIME_BAR), strict=False
         ):
