@@ -200,6 +200,15 @@ def _place(array, index, kind):
     return array.builder.bitcast(array._pointer(index), kind.as_pointer())
 
 
+def spread(number, like):
+    """One number, for each of those that `like` stands for."""
+    if isinstance(number, _Unknown):
+        return number
+    if not isinstance(like, _Number):
+        return np.full(np.shape(like), number)
+    return _Number(like.builder, _alike(like.builder, number, like)[0])
+
+
 def selected(where, numbers):
     """The numbers for which `where` holds, and 0 for the others."""
     if isinstance(where, _Unknown):

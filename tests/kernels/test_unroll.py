@@ -13,6 +13,7 @@ from survey.kernels.unroll import (
     largest,
     put,
     selected,
+    spread,
     unroll,
 )
 
@@ -70,6 +71,7 @@ def eight(table, row, first, limit, scale, out):
     y = 2.0 - (abs(x) * scale + largest(x - scale, 0.25)) / (scale + x) - -x
     put(out, (row, first), y)
     put(out, (row + 1, first + 1), selected(few, y * scale), few)
+    put(out, (0, first), spread(scale * scale, x))
     return counted(few)
 
 
@@ -89,8 +91,10 @@ def test_several_numbers_compiled_as_plain(first, limit):
         assert number == eight(table, 1, first, limit, 0.3, plain)
     np.testing.assert_array_equal(compiled, plain)
     assert number == (table[1, first : first + 8] <= limit).sum() == np.count_nonzero(compiled[2])
-    assert compiled[1, first : first + 8].any() and not compiled[0].any()
-    assert not np.delete(compiled[1], np.s_[first : first + 8]).any()
+    assert (
+        compiled[1, first : first + 8].any() and (compiled[0, first : first + 8] == 0.3 * 0.3).all()
+    )
+    assert not np.delete(compiled[:2], np.s_[first : first + 8], axis=1).any()
 
 
 @pytest.mark.parametrize("a", [-1.0, -0.0, 0.0, 2.0])

@@ -46,7 +46,16 @@ from survey.kernels.cylinder.lockstep import (
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, finite, row_of, unturned
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.kernels.unroll import consecutive, counted, largest, put, selected, summed, unroll
+from survey.kernels.unroll import (
+    consecutive,
+    counted,
+    largest,
+    put,
+    selected,
+    spread,
+    summed,
+    unroll,
+)
 
 ORDER = 16
 VARIED = 4  # order of the integral of g / w^2
@@ -308,12 +317,13 @@ _after_at = _at_lane(AFTER, STATE)
 
 @unroll
 def _reached(work, i, targets, k, first):
-    """How far BLOCK targets lie into the step, what their rounding may shift, and which are passed."""
+    """How far BLOCK targets lie into the step, what rounding may shift the farthest, and which are passed."""
     before, end = _before_at(work, i), _after_at(work, i)[AT]
     target = consecutive(targets, (k, first), BLOCK)
     x = (target - before[TURNED] * TWO_PI) - before[TURNED] * TWO_PI_LOW
     passed = x <= end
-    return selected(passed, largest(x - before[AT], 0.0)), 3e-16 * abs(target), passed
+    farthest = abs(before[AT] + before[TURNED] * TWO_PI) + (end - before[AT])
+    return selected(passed, largest(x - before[AT], 0.0)), 3e-16 * farthest, passed
 
 
 def _recording(whole):
@@ -327,8 +337,8 @@ def _recording(whole):
         s, slip, passed = _reached(work, i, targets, at, first)
         w, step, where = _before_at(work, i)[W], _step_at(work, i), None if whole else passed
         put(planes, (rc.VALUE, k, first), w + w * _rise(_omega_at(work, i), s), where)
-        bars = 1.02 * (step[W_WITHIN] + step[STEEPEST] * slip)
-        put(planes, (rc.VALUE_BAR, k, first), bars, where)
+        bar = 1.02 * (step[W_WITHIN] + step[STEEPEST] * slip)
+        put(planes, (rc.VALUE_BAR, k, first), spread(bar, s), where)
         return counted(passed)
 
     @unroll
@@ -369,14 +379,11 @@ def record(work, i, targets, k, first, size, planes, timed):
 
 
 @inline
-def nothing(planes, k, timed):
-    """Row k before anything is known: NaN, times only if `timed`.
-
-    In cache, where it is soon replaced; of all rows at once it costs a way through memory.
-    """
+def nothing(planes, k, first, timed):
+    """Nothing is known in row k from the `first` column on: NaN, times only if `timed`."""
     for n in range(0, rc.STATE, 1 if timed else 2):
         own = planes[n, k]
-        for j in range(len(own)):
+        for j in range(first, len(own)):
             own[j] = math.nan
 
 
@@ -401,7 +408,7 @@ def _refill(P, starts, targets, planes, status, timed, waiting, state, fixed, ro
     width = status.shape[1]
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            nothing(planes, waiting, timed)
+            begun = False
             p, w0, own = P[waiting], starts[waiting, rc.START_W], row_of(targets, waiting)
             if math.isfinite(own[0]) and w0 > 0.0:
                 psi, turns = reduced(starts[waiting, rc.START_PHI])
@@ -425,6 +432,9 @@ def _refill(P, starts, targets, planes, status, timed, waiting, state, fixed, ro
                         sizes[i] = finite(own)
                     for k in range(sizes[i]):
                         status[waiting, k] = OK
+                    begun = True
+            if not begun:
+                nothing(planes, waiting, 0, timed)
             waiting += 1
         if row[i] < 0:
             state[AT, i], state[W, i] = 0.0, 1.0  # a free lane moves too
@@ -477,6 +487,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, planes, status, timed):
             if j < size and sound and far and state[COUNT, i] < limit:
                 state[COLUMN, i], goal[i] = j, row_of(targets, k)[j]
                 continue
+            nothing(planes, k, j, timed)
             for n in range(STATE):
                 ahead[k, n] = state[n, i] if sound else before[n, i]
             ahead[k, COLUMN] = j

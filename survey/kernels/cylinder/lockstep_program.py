@@ -522,8 +522,7 @@ def _enter_far(
         while waiting < len(P) and row[i] < 0:
             p, w0 = P[waiting], starts[waiting, rc.START_W]
             own = row_of(targets, waiting)
-            if leads[waiting] == lead:
-                far.nothing(planes, waiting, timed)
+            begun = leads[waiting] != lead
             if leads[waiting] == lead and math.isfinite(own[0]) and w0 > 0.0:
                 phi, turns = starts[waiting, rc.START_PHI], 0.0
                 if circle:
@@ -544,6 +543,9 @@ def _enter_far(
                     sizes[i], goal[i] = finite(own), own[0]
                     for k in range(sizes[i]):
                         status[waiting, k] = OK
+                    begun = True
+            if not begun:
+                far.nothing(planes, waiting, 0, timed)
             waiting += 1
         if row[i] < 0:
             state[far.AT, i], state[far.W, i] = 0.0, 1.0  # a free lane moves too
@@ -626,6 +628,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                 if state[far.COUNT, i] < limit:
                     state[far.COLUMN, i], goal[i] = j, row_of(targets, k)[j]
                     continue
+            far.nothing(planes, k, j, timed)
             for n in range(far.STATE):
                 ahead[k, n] = state[n, i] if sound else before[n, i]
             ahead[k, far.COLUMN] = j
