@@ -382,6 +382,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
     saa, sab, sbb = slip * slip, 0.0, 0.0
     j, size, doubt = 0, len(targets), -1  # doubt: the first target in doubt
+    ending = OK  # of no targets
     if at_rest(p, phi, phi0, w0, targets, floats, status):
         return
     while j < size or doubt >= 0:
