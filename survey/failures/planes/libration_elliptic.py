@@ -7,8 +7,8 @@ from survey.truth.danby import truth
 
 ABOUT = """The monodromy matrix grows as a power of 1 / (1 - e); at the tip (mu = 0.0469908, e = 0.3145072) two
 curves touch, where all multipliers are -1 and both invariants' first differences vanish; as mu goes to 0 two
-multipliers go to 1. `auto` takes panels of series over dense rows and 16th-order Taylor steps, and double-double
-where float64 misses rtol or leaves a verdict open."""
+multipliers go to 1. `auto` takes panels of series in both parameters, and double-double where these miss rtol or
+leave a verdict open; the other methods take steps over half a period."""
 SOURCE = (
     "Truth: Taylor series of order 32 in double-double, in the eccentric anomaly; M multiplied out."
 )
