@@ -46,8 +46,9 @@ OUTPUTS = (
     Output("collision", "how stability is lost, or would be lost first: multipliers meet at -1, or two pairs meet",
            flags=COLLISIONS),
 )  # fmt: skip
-# Factors of the numbers of steps of other methods, by 1.5 each.
-LADDER = Ladder(1.5 ** np.arange(16), np.arange(16) + 1, slice(INVARIANTS, RESULTS), most=16)
+# Factors of the numbers of steps that other methods ask for at first, of which there are at most FIRST.
+LADDER = Ladder(2.0 ** np.arange(7), np.arange(7) + 1, slice(INVARIANTS, RESULTS), most=6)
+FIRST = 5000
 DENSE = 3 * NODES  # the least number of points in a row for which a series of its own pays
 CHUNK = 4096  # points of another method that are solved together: bounds the memory
 
@@ -133,8 +134,11 @@ def _by_steps(e, mu, method, rtol, answers):
     for first in range(0, e.size, CHUNK):
         some = slice(first, first + CHUNK)
         points = monodromy.SystemPoints(HALF, np.stack([mu[some], e[some]], axis=1))
-        own, where = Answers(len(points.points)), np.flatnonzero(points.valid)
-        own.status[~points.valid] = status.NO_CONVERGENCE
+        own = Answers(len(points.points))
+        every, one = np.arange(own.status.size), np.ones(own.status.size)
+        short = points.steps(method.floquet_reach(rtol), one, every)[:, 0] <= FIRST
+        own.status[:] = np.where(short, status.NO_CONVERGENCE, status.STEP_LIMIT)
+        where = np.flatnonzero(points.valid & short)
 
         def solved(those, rung, points=points, where=where):
             found = monodromy.solve(

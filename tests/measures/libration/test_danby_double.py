@@ -197,7 +197,7 @@ def lies(mu, e, method, rtol):
 def test_bars_hold_at_the_ends_of_mu_and_e(method, rtol):
     assert (
         lies(
-            *hard_points(np.random.default_rng(1), 1000 if method != "dop853" else 100),
+            *hard_points(np.random.default_rng(1), 1000 if method == "auto" else 100),
             method,
             rtol,
         )
