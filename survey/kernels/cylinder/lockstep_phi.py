@@ -327,7 +327,8 @@ def _reached(work, i, targets, k, first):
 
 
 def _recording(whole):
-    """What records a block: (w and its error bounds, and counts the targets in the step; t and its own).
+    """Two functions that record a block: w and its error bounds, which returns how many targets lie in
+    the step, and t and its own.
 
     Where there is room for the `whole` block, what lies beyond the step is written too, and replaced later.
     """
@@ -402,8 +403,8 @@ def _far(w, bound, most_g):
 
 @kernel
 def _refill(P, starts, targets, planes, status, timed, waiting, state, fixed, row, sizes, goal):
-    """Give free lanes the rows that wait, whose status is OK at first and whose numbers are NaN;
-    returns the first that still waits.
+    """Give free lanes the rows that wait, whose status is OK at first; returns the first that still
+    waits. Of rows that do not begin here nothing is known yet.
     """
     width = status.shape[1]
     for i in range(LANES):

@@ -514,8 +514,8 @@ def _enter_far(
     sizes,
     goal,
 ):
-    """Give free lanes the rows of the program `lead` that wait, whose status is OK at first and whose
-    numbers are NaN; returns the first that still waits.
+    """Give free lanes the rows of the program `lead` that wait, whose status is OK at first; returns
+    the first that still waits. Of rows that do not begin here nothing is known yet.
     """
     circle = P[lead, ON_CIRCLE] > 0.0
     for i in range(LANES):

@@ -164,9 +164,8 @@ def _of_propagator(M, E):
     """Results (N, RESULTS) from the propagators over half a period and bounds of their entries (N, 4, 4)."""
     results = np.empty((len(M), RESULTS))
     halves = slice(2), slice(2, 4)
-    for j, (row, column) in enumerate(
-        ((0, 0), (1, 1), (1, 0), (0, 1))
-    ):  # A of P, B of T, C of Q, D of S
+    # A of P, B of T, C of Q, D of S
+    for j, (row, column) in enumerate(((0, 0), (1, 1), (1, 0), (0, 1))):
         (a, b), (c, d) = (M[:, halves[row], halves[column]][:, i].T for i in range(2))
         (ea, eb), (ec, ed) = (E[:, halves[row], halves[column]][:, i].T for i in range(2))
         results[:, j] = a * d - b * c
