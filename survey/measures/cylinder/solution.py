@@ -234,16 +234,21 @@ def _repeated(run, asked, ladder, rtol, timed=True):
     two. With whether every point is known to meet it.
     """
     first, *others = ladder
+
+    def without_times(results):
+        if not timed:
+            results[0][..., rc.TIME :: 2] = 0.0  # they hold anything: no choice may depend on them
+        return results
+
     results = run(slice(None), first)
     for tolerance in others:
         if met(results, rtol, timed):
             return results, True
-        if not timed:
-            results[0][..., rc.TIME :: 2] = 0.0  # of which nothing is known
+        without_times(results)
         coarse = (missed(results, rtol) & asked).any(axis=1)
         if not coarse.any() or tolerance >= first:
             break
-        finer = run(coarse, tolerance)
+        finer = without_times(run(coarse, tolerance))
         kept = [result[coarse] for result in results]
         better = badness(finer) <= badness(kept)
         for result, old, new in zip(results, kept, finer, strict=True):
