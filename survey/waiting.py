@@ -8,10 +8,9 @@ import time
 
 from survey.kernels import jit
 
-other_compiler = (
-    None  # at a first use, waits for the next of what is compiled elsewhere, and names it
-)
-_done = set()
+# at a first use, waits for the next of what is compiled elsewhere, and names it
+other_compiler = None
+_done = set()  # names; what is compiled stays so
 _waited = 0.0
 
 

@@ -21,8 +21,8 @@ Where a scene gives a status of its own, the verdict is -1, and maps and counts 
 
 In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything
 that is known of one point, {name: array}, flags as words. `compile_ahead` runs in a process of its
-own at the first use of a question, and the solver waits for its end, or for its next `yield`, where
-it needs what is compiled there (see `survey.waiting`).
+own at the first use of a question, and the solver waits for its end, or for its next `yield` or that
+of a name, where it needs what is compiled there (see `survey.waiting`).
 """
 
 import ast

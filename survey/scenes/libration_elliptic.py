@@ -121,7 +121,6 @@ def compile_ahead(variables, options):
     """
     yield from _double_ahead(variables, options)
     if not {o.name for o in _FAMILY}.isdisjoint(variables):
-        yield
         yield from _family_ahead(variables, options)
 
 

@@ -49,7 +49,9 @@ def test_references_lie_within_the_bars(method, rtol):
             error = [
                 abs(float(mpf(v) - x)) for v, x in zip(ds[name].values.tolist(), exact, strict=True)
             ]
-            assert 1e-5 < max(error / ds[f"{name}_error"].values) <= 1
+            assert (
+                (1e-4 if method == "auto" else 1e-5) < max(error / ds[f"{name}_error"].values) <= 1
+            )
             size = np.array([1 + abs(float(x)) for x in exact])
             near = np.array([row["e"] < 0.7 for row in POINTS])
             assert (ds[f"{name}_error"].values < rtol * size)[near].all()

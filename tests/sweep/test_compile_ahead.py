@@ -6,6 +6,7 @@ import sys
 
 import pytest
 
+from survey import waiting
 from survey.sweep import dispatch
 
 # between tongues: nothing stays undecided, for which more would be compiled
@@ -135,3 +136,17 @@ def test_kernels_are_compiled_ahead_for_the_arguments_of_the_call(tmp_path, call
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [f"{name} {READ}" for name in kernels]
+
+
+def test_what_has_a_name_is_waited_for_once(monkeypatch):
+    lines = iter(["None\n", "first\n", "second\n", "third\n", "", "", ""])
+    monkeypatch.setattr(waiting, "other_compiler", lambda: next(lines))
+    monkeypatch.setattr(waiting, "_done", set())
+    waiting.wait()
+    waiting.wait("second")
+    waiting.wait("first")
+    waiting.wait("second")
+    assert next(lines) == "third\n"
+    waiting.wait("never")
+    waiting.wait()
+    assert list(lines) == [""]

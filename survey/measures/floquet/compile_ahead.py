@@ -2,6 +2,8 @@
 `survey.sweep.compile_ahead`).
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from survey.kernels.floquet import steps
@@ -30,14 +32,7 @@ def compile_ahead(variables, options):
 def _compile_series(asked):
     """Compile what answers maps, by a series that is 0."""
     terms = 4
-    key = dense.SeriesMap(_OfStates(N), "none", 1e-10, dense.flags(asked), (), ())
+    key = dense.SeriesMap(SimpleNamespace(n=N), "none", 1e-10, dense.flags(asked), (), ())
     doubts, starts = np.zeros((N, dense.PARTS, dense.PARTS * terms)), np.zeros((1, terms, N, 2))
     panel = dense.RootPanel((0.0,), (1.0,), np.zeros((1, N * terms)), doubts, starts)
     dense._answer(key, panel, np.zeros(1), np.zeros(1), np.zeros((1, 1), np.int64), Answers(1, N))
-
-
-class _OfStates:
-    """A system of which only the number of states is known."""
-
-    def __init__(self, n):
-        self.n = n

@@ -20,7 +20,7 @@ def solve(e, mu, rtol, answers, points, dense=False):
     """Answer the `points` (ascending) of rows e (R) of mu (R, L), in place; by the rows' series
     first, if `dense`.
     """
-    waiting.wait()
+    waiting.wait("double")
     row_of = points // mu.shape[1]
     if dense:
         for row in np.unique(row_of):
@@ -42,8 +42,9 @@ def compile_ahead(variables, options):
     """
     one = np.full(1, 1e-3)
     results = _results(one, one)
-    yield
+    yield "chain"
     traces_double.measure(results, 1e-9, status.OVERFLOW, *Answers(1).all)
+    yield "double"
 
 
 def _take(answers, points, own):

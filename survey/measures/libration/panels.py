@@ -49,7 +49,7 @@ def panel(number):
     """The TracePanel of this number."""
     if waiting.other_compiler:  # it compiles the chain, the longest
         _compile_others()
-        waiting.wait()
+        waiting.wait("chain")
     shapes, weights, middle = nodes(number)
     rates, matrix = tables()
     results = np.empty((NODES**2, kernels.RESULTS))
@@ -71,7 +71,7 @@ def panel(number):
 
 
 def _compile_others():
-    """Compile, by calls on nothing, what values at nodes, rows and points are used by."""
+    """Compile, by calls on nothing, what makes series of values at nodes, and what rows and points call."""
     series, short = (
         np.empty((INVARIANTS, 2, 0, 0)),
         np.empty((INVARIANTS, panels.TERMS, traces.NODES)),
