@@ -142,6 +142,13 @@ class SystemPoints:
                 abs(part) + abs(self.growth[0, own])
             )
 
+    def group_of(self, those):
+        """The number (K) of the group of each of some points, -1 of those in none."""
+        number = np.full(len(self.points), -1)
+        for g, group in enumerate(self.groups):
+            number[group.own] = g
+        return number[those]
+
     def steps(self, reach, factor, those):
         """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""
         length = np.diff(self.edges[those], axis=1)
@@ -227,11 +234,9 @@ def solve(points, method, rtol, factor, those, sharp):
     n = points.n
     count = points.steps(method.floquet_reach(rtol), factor, those)
     found = Matrices.empty(len(those), n)
-    number = np.full(len(points.points), -1)
+    number = points.group_of(those)
     for g, group in enumerate(points.groups):
-        number[group.own] = g
-    for g, group in enumerate(points.groups):
-        mine = np.flatnonzero(number[those] == g)
+        mine = np.flatnonzero(number == g)
         row_at = np.empty(len(points.points), dtype=np.int64)
         row_at[group.own] = np.arange(len(group.own))
         work = np.cumsum(count[mine].sum(axis=1)) * n * n

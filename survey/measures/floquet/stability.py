@@ -5,6 +5,7 @@ stable      asymptotically: every multiplier is certainly inside the unit circle
             strongly: they are on the circle, and simple or, where they meet, of one Krein sign, and
             stay there when the system is changed a little within its kind
 unstable    one is certainly outside
+marginal    in systems without a stated structure: no solution grows, and some do not decay (see `marginal`)
 undecided   the error bounds allow either
 """
 
@@ -14,7 +15,7 @@ from survey import status, waiting
 from survey.kernels.floquet import characteristic, leverrier
 from survey.kernels.math.roundoff import EPS
 from survey.measures import answers
-from survey.measures.floquet import dense, maslov, monodromy, multipliers
+from survey.measures.floquet import dense, marginal, maslov, monodromy, multipliers
 from survey.measures.floquet.answers import Answers
 from survey.measures.floquet.existence import deflated
 from survey.measures.floquet.multipliers import (
@@ -270,6 +271,8 @@ def _solve_some(system, structure, given, method, rtol, wanted, rows, answer, re
             )
         found = judged(system, given[own], found)
         out = assess(found, structure, rtol, asked, points.period[own], points.growth[:, own])
+        if structure == "none" and system.conserved is None and "verdict" in asked:
+            _by_what_is_exact(points, own, found, rtol, asked, out)
         if np.any(broken):  # what is said of A is not true here: nothing follows from it
             out.status[broken], out.missed[broken] = status.INVALID_PARAMETERS, False
             out.verdict[broken] = UNDECIDED
@@ -292,6 +295,28 @@ def _solve_some(system, structure, given, method, rtol, wanted, rows, answer, re
     for name in ("verdict", "crossing"):
         getattr(answer, name)[rows[lost]] = UNDECIDED
     answer.signs[:, rows[lost]] = 0
+
+
+def _by_what_is_exact(points, those, matrices, rtol, asked, answer):
+    """Decide undecided points `those`, of which `answer` is the Answers, by what is exact in A."""
+    open_ = np.flatnonzero((answer.verdict == UNDECIDED) & (answer.status == status.OK))
+    if not open_.size:
+        return
+
+    def judge(matrices, structure):
+        return assess(matrices, structure, rtol, {"verdict"}).verdict
+
+    found = marginal.verdicts(points, those[open_], matrices[open_], judge)
+    known = found != UNDECIDED
+    own = open_[known]
+    if not own.size:
+        return
+    answer.verdict[own] = found[known]
+    bounded = own[found[known] == MARGINAL]
+    answer.floats[-2, bounded], answer.floats[-1, bounded] = 1.0, 0.0
+    # what of the accuracy asked for is missed besides
+    rest = asked - {"verdict", "spectral_radius", "exponent"}
+    answer.missed[bounded] = assess(matrices[bounded], "none", rtol, rest).missed if rest else False
 
 
 def outputs(answer, results, period, computed, wanted):

@@ -260,7 +260,7 @@ def test_constant_systems_and_one_state():
     )
     exact = np.exp(2 * math.pi * np.array([-0.2, 0.0, 0.1]))[:, None]
     assert (abs(ds.spectral_radius - exact) <= ds.spectral_radius_error + 1e-15 * exact).all()
-    assert ds.verdict.values.tolist() == [[1, 1], [-1, -1], [0, 0]]
+    assert ds.verdict.values.tolist() == [[1, 1], [2, 2], [0, 0]]
 
 
 def test_bits_do_not_depend_on_the_block():
