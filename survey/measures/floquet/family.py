@@ -68,7 +68,27 @@ class Family:
                 between = lattice.take(each[step :: 2 * step], across).ravel()
                 _points, x, T = self._near(self.x[between])
                 self._locate(between, x, T, ALIKE)
+            self._extend(lattice)
         self._interpolate(lattice)
+
+    def _extend(self, lattice):
+        """Find orbits of the `lattice` next to known ones, from where two or three of these in a row
+        lead, until no more are found: beside the end of the family lines are too far apart.
+        """
+        ways = [np.moveaxis(lattice, axis, 0)[::side] for axis in (0, 1) for side in (1, -1)]
+        tried = np.zeros((len(ways), self.T.size), dtype=bool)
+        progress = True
+        while progress:
+            progress = False
+            for way, before in zip(ways, tried, strict=True):
+                first, second, next_ = (way[k : len(way) - 2 + k].ravel() for k in range(3))
+                known = np.isfinite(self.T)
+                own = known[first] & known[second] & ~known[next_] & ~before[next_]
+                first, second, next_ = first[own], second[own], next_[own]
+                before[next_] = True
+                x, T = (2.0 * values[second] - values[first] for values in (self.states, self.T))
+                self._locate(next_, self.equation.pinned(self.points[next_], x), T, ALIKE)
+                progress |= bool(np.isfinite(self.T[next_]).any())
 
     def _locate(self, those, x, T, alike=np.inf):
         """Find orbits number `those` from x and T, from which they differ by less than `alike`."""
