@@ -11,7 +11,8 @@ import xarray as xr
 from survey import api, measures, modules, status
 from survey.analysis.given import check_names, options_at, parameters
 from survey.errors import BadInput
-from survey.file.labels import flag_attributes
+from survey.file.labels import FILL, flag_attributes
+from survey.measures.segments import UNKNOWN
 from survey.request import physical, user_scene
 from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
@@ -52,7 +53,8 @@ def edge(
     Returns
     -------
     xarray.Dataset along the dimension `place`, ascending: `edge` (in the unit of the parameter), `edge_error`, a bound,
-    `edge_class`, and `edge_index` where boundaries have numbers (of tongues). The attribute `searched` is the range
+    `edge_class`, and `edge_index` where boundaries have numbers (of tongues; the Maslov index above an edge of a
+    symplectic system). The attribute `searched` is the range
     (low, high) that was searched, parts included where parameters are invalid; `complete` is 1 where it is shown that
     there are no others in it, 0 where not, and absent where this is not known. A closed gap is two boundaries at one
     place; where a motion is marginal at a single value between two sides of the same verdict, such as `rho` = 0 of an
@@ -266,8 +268,9 @@ def _described(module, measure, used, along, fixed, found, index, complete, sear
         "edge_class": ("place", found.kind.astype(np.int8), flag_attributes(classes) | {"long_name": title}),
     }  # fmt: skip
     if index is not None:
-        data["edge_index"] = ("place", index.astype(np.int32), {
-            "long_name": "number of the tongue, twice its rotation number", "symbol": "n"})  # fmt: skip
+        number = "number of the tongue, twice its rotation number" if hill else measure.NUMBER
+        about = {"long_name": number, "symbol": "n"}
+        data["edge_index"] = ("place", index.astype(np.int32), about, {FILL: np.int32(UNKNOWN)})
     coordinates = {key: ((), value, {"long_name": used[key].long_name, "units": used[key].units})
                    for key, value in fixed.items() if np.isfinite(value)}  # fmt: skip
     attributes = {

@@ -37,6 +37,9 @@ QUESTIONS = {
         ),
         "CLASSES": Value("{name: code} of the curves' classes", dict),
         "TITLE": Value("what a class is, one line", str),
+        "NUMBER": Value(
+            "what the number of a curve is, one line, if the Curves have an `index`", str
+        ),
         "ALONG": Value("survey.scene.Output of what is known at each point of a curve", tuple),
         "trace": Function(
             "the FollowedCurves through `seeds`, edges in the Square; solve(q, p, wanted) gives outputs of the scene",

@@ -19,7 +19,8 @@ class Curves:
     Per point its `parameters` (m, 2), its `error` (m), in the unit square of the map, and `along`:
     {name of ALONG: (values, errors)}. `unexplained`: segments of lines across the map along which a
     curve is missing, by what is known at their ends; None where nothing is counted. `complete`: is
-    it shown that there are no others? None where this is not known.
+    it shown that there are no others? None where this is not known. `index`: the number of each curve,
+    `segments.UNKNOWN` where it is not certain; None where curves have no numbers.
     """
 
     count: np.ndarray
@@ -29,6 +30,7 @@ class Curves:
     along: dict
     unexplained: int | None = None
     complete: bool | None = None
+    index: np.ndarray | None = None
 
 
 def sampled(position, low, high, first=FIRST):

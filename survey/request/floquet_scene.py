@@ -176,7 +176,9 @@ class FloquetScene(TracedScene):
         if answer["verdict"] == "unstable":
             return f"{radius}: it is certainly above 1"
         if answer["verdict"] == "marginal":
-            return "spectral radius 1, by what is exact in A here: no motion grows, and not all decay"
+            return (
+                "spectral radius 1, by what is exact in A here: no motion grows, and not all decay"
+            )
         if answer["verdict"] == "undecided":
             words = f"{radius}: the error bar allows multipliers outside the unit circle, and inside or on it"
             return f"{words}{self._why_never(answer)}"

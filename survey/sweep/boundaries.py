@@ -20,8 +20,9 @@ import numpy as np
 import xarray as xr
 
 from survey import measures
-from survey.file.labels import flag_attributes, meaning
+from survey.file.labels import FILL, flag_attributes, meaning
 from survey.grid import Grid, logarithmic
+from survey.measures.segments import UNKNOWN
 from survey.measures.square import Square
 from survey.measures.tasks import in_turn
 from survey.scene import Request
@@ -93,7 +94,7 @@ def along(scene, options, name, ends, fixed):
     measure = measures.curves(scene)
     if hasattr(measure, "refusal"):
         found = on_line(scene, options, name, ends, fixed)
-        return found, None, found.complete
+        return found, found.index, found.complete
     parameters = {name: ((name,), np.array(ends))} | {
         key: ((), np.float64(value)) for key, value in fixed.items()
     }
@@ -190,6 +191,10 @@ def _closed(workflow, measure, each):
     )
     kind = flagged(measure.TITLE, measure.CLASSES, kind)
     variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
+    if any(curves.index is not None for curves in found):
+        numbers = [np.full(len(c.count), UNKNOWN) if c.index is None else c.index for c in found]
+        variables["curve_index"] = ("curve", np.concatenate(numbers).astype(np.int32), {
+            "long_name": measure.NUMBER, "units": "1", "symbol": "n", FILL: np.int32(UNKNOWN)})  # fmt: skip
     for output in measure.ALONG:
         along, errors = (
             np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1)

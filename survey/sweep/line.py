@@ -21,13 +21,15 @@ SAME = 4.0  # error bounds within which two points are the same
 class OnLine:
     """Boundaries, ascending: `position`, its `error`, `kind` (a code of the family's CLASSES).
 
-    `complete`: is it shown that these are all? None where this is not known.
+    `complete`: is it shown that these are all? None where this is not known. `index`: their numbers, if they
+    have any.
     """
 
     position: np.ndarray
     error: np.ndarray
     kind: np.ndarray
     complete: bool | None = None
+    index: np.ndarray | None = None
 
 
 def on_line(scene, options, along, ends, fixed):
@@ -56,12 +58,14 @@ def on_line(scene, options, along, ends, fixed):
     error = np.asarray(curves.error)[here] * (ends[1] - ends[0]) + np.spacing(abs(position))
     order = np.lexsort((position, kind))
     position, error, kind = position[order], error[order], kind[order]
+    index = None if curves.index is None else np.repeat(curves.index, curves.count)[here][order]
     near = np.diff(position) <= SAME * (error[1:] + error[:-1])
     keep = np.ones(position.size, bool)
     keep[1:] = ~(near & (np.diff(kind) == 0))
     keep = np.flatnonzero(keep)
     keep = keep[np.lexsort((kind[keep], position[keep]))]
-    return OnLine(position[keep], error[keep], kind[keep], curves.complete)
+    index = None if index is None else index[keep]
+    return OnLine(position[keep], error[keep], kind[keep], curves.complete, index)
 
 
 def second_axis(measure, scene, along, fixed, options):

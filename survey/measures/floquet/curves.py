@@ -24,7 +24,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 from scipy.ndimage import binary_erosion
 
 from survey.measures import contours, tips
-from survey.measures.floquet import bifurcations, counted_edges, dips, narrow, row_count
+from survey.measures.floquet import bifurcations, counted_edges, dips, narrow, numbers, row_count
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
@@ -35,6 +35,9 @@ CLASSES = {
     name: CROSSINGS[name] for name in ("plus_one", "minus_one", "neimark_sacker", "collision")
 }
 TITLE = "how a multiplier passes the unit circle"
+NUMBER = (
+    "number of the curve among those of its class: the greater of the Maslov indices on its sides"
+)
 ALONG = (
     Output("angle", "argument of the multiplier on the unit circle", r"\theta", units="rad"),
     Output("outside", "number of other multipliers outside the unit circle: stability is lost or gained where it is 0",
@@ -91,10 +94,9 @@ def searched(scene, square, axes, fixed, options):
         number = LINES_OF_ORBITS
         orbits = scene.family(square, axes, fixed, number)
         matrices = orbits.matrices
-        roughly = orbits.rough
         on_lattice = orbits.on_lattice()
     else:
-        structure, roughly = scene.structure, None
+        structure, orbits = scene.structure, None
         alone = ALONE_DAMPED if structure == "none" else ALONE
         number = LINES if square.across is None else alone
         matrices = matrices_of(scene, square, axes, fixed, options)
@@ -107,14 +109,21 @@ def searched(scene, square, axes, fixed, options):
     )
     drawing = _Drawing(square, matrices, structure)
     for kind, function in functions:
-        for x, error in _zeros(drawing, function, roughly, on_lattice, number):
+        for x, error in _zeros(drawing, function, orbits, on_lattice, number):
             drawing.add(kind, x, error)
     if square.across is not None and scene.FAMILY == "orbit":  # whose family may end in between
         return joined(drawing.found, names)
     indices = _indices(scene, square, axes) if structure == "symplectic" else {}
     solved = _solved(scene, square, axes, fixed, options, "auto", ["monodromy", *indices.values()])
+
+    def index(kind, x):
+        name = indices.get(kind)
+        return None if name is None else solved(x, rtol=ROUGH)[name]
+
     if square.across is not None:
-        return _on_border(drawing, on_lattice, partial(solved, rtol=ROUGH), indices)
+        curves = _on_border(drawing, on_lattice, partial(solved, rtol=ROUGH), indices)
+        curves.index = numbers.of_curves(curves, square, index) if indices else None
+        return curves
     passed = _add_by_indices(drawing, dict(functions), partial(solved, rtol=ROUGH), indices, number)
     if len(on_lattice) > 2:
         passed = {
@@ -126,6 +135,7 @@ def searched(scene, square, axes, fixed, options):
     if scene.FAMILY != "orbit":
         _add_by_number(drawing, row_count.known(counts))
     curves = joined(drawing.found, names)
+    curves.index = numbers.of_curves(curves, square, index) if indices else None
     curves.unexplained = row_count.unexplained(counts, drawing.drawn, passed)[0]
     return curves
 
@@ -170,20 +180,17 @@ def _on_lattice(function, on_lattice, number):
     return values.reshape(open_.shape)
 
 
-def _zeros(drawing, function, roughly, on_lattice, number):
-    """[(positions (m, 2), errors (m))] of the curves on which a function of M is 0."""
+def _zeros(drawing, function, orbits, on_lattice, number):
+    """[(positions (m, 2), errors (m))] of the curves on which a function of M is 0; `orbits`: the Family
+    of those that M belongs to, if there is one.
+    """
     values, square = _on_lattice(function, on_lattice, number), drawing.square
     lines = _lines if square.across is None else partial(_crossings, across=square.across)
 
-    def sharp(x):
-        return function(*drawing.matrices(x, RTOL))
-
-    def nearly(x):
-        return function(*roughly(x))
-
-    if roughly is None:
-        return lines(sharp, square.grain, values)
-    return _sharpened(sharp, lines(nearly, square.grain, values, TRIED_OF_ORBITS), square.grain)
+    if orbits is None:
+        return lines(lambda x: function(*drawing.matrices(x, RTOL)), square.grain, values)
+    nearly = lines(lambda x: function(*orbits.rough(x)), square.grain, values, TRIED_OF_ORBITS)
+    return _sharpened(lambda x: function(*orbits.close(x)), nearly, square.grain)
 
 
 def _add_by_indices(drawing, functions, solved, indices, number):

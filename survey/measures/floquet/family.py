@@ -19,6 +19,7 @@ NOISE = 1e-9  # relative: a guess of the errors on the lattice, where orbits are
 REACHED, ENOUGH = 1e-13, 1e-9
 FOLLOWED = 4  # lines from one that is followed to the next; a power of two
 SAME = 1e-4  # relative: periods of one orbit, from cubic pieces of its curve
+WIDE = 1e-7  # relative: bounds of M above which orbits are shown again with finer steps
 HOLE = 1e-9  # the weight of what is unknown, but for rounding
 ALIKE = 0.05  # relative: how near its guess an orbit between these lines must be
 
@@ -144,19 +145,22 @@ class Family:
             points, np.where(known[:, None], orbits.x, np.nan), np.where(known, orbits.T, np.nan)
         )
 
-    def matrices(self, x, rtol):
+    def matrices(self, x, rtol, wide=np.inf):
         """(M, E) (N, m, m) at positions (N, 2), of the multipliers that are judged: (0 1; -1 2 K),
-        see `symmetry`.
+        see `symmetry`; `wide`: see `orbit.shown`.
         """
         points, start, T = self._near(x)
         M, E = np.full((2, len(x), self.equation.judged, self.equation.judged), np.nan)
         for i in range(0, len(x), orbit.CHUNK):
             own = slice(i, i + orbit.CHUNK)
-            found = orbit.shown(
-                self.equation, points[own], start[own], T[own], self.method, rtol, relax=False
-            )
+            given = self.equation, points[own], start[own], T[own], self.method, rtol
+            found = orbit.shown(*given, relax=False, wide=wide)
             M[own], E[own] = found.others.M, found.others.E
         return M, E
+
+    def close(self, x):
+        """As `matrices`, with the narrowest bounds."""
+        return self.matrices(x, REACHED, WIDE)
 
     def _near(self, x):
         """The parameters at positions (N, 2), and where Newton's method begins there."""

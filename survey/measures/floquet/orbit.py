@@ -29,7 +29,7 @@ CHUNK = 2048  # points that are solved together
 SAME = 1e-6  # relative: what one orbit is, found twice
 ROWS = 64  # whose curves are followed together
 CALL = 200_000  # numbers of a series that are recorded together
-FINER = 4.0  # steps, along symmetric orbits that are not shown to exist otherwise
+FINER = 4.0  # steps, along symmetric orbits that are not shown to exist otherwise, or too coarsely
 
 _of_floquet = {o.name: o for o in stability.OUTPUTS}
 OUTPUTS = (
@@ -207,14 +207,19 @@ def _chunk(equation, points, method, rtol, wanted):
     return found.outputs(known, rtol, wanted, callable(equation.period))
 
 
-def shown(equation, points, guess, period, method, rtol, relax=True):
-    """What is found (N) from guesses of the state (N, n) and of the period (N); see `newton.located`."""
+def shown(equation, points, guess, period, method, rtol, relax=True, wide=np.inf):
+    """What is found (N) from guesses of the state (N, n) and of the period (N); see `newton.located`.
+
+    Symmetric orbits whose multipliers' matrix has a relative bound above `wide` are shown again with
+    FINER steps.
+    """
     N = len(points)
     reach = _reach(rtol)
     found = OrbitResults(equation, N)
     orbits, good = located(equation, points, reach, guess, period, relax)
     _show(found, equation, points, orbits, good, method, reach)
-    left = good[~found.good[good]]
+    M, E = found.others.M[good], found.others.E[good]
+    left = good[~found.good[good] | (E > wide * (1.0 + abs(M))).any(axis=(1, 2))]
     if equation.symmetry is not None and left.size:
         _show(found, equation, points, orbits, left, method, reach / FINER, finer=True)
     return found

@@ -24,14 +24,14 @@ import numpy as np
 from survey.kernels.hill.answers import STABLE, UNSTABLE
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet import curves
-from survey.measures.floquet.curves import ALONG, CLASSES, TITLE, refusal
+from survey.measures.floquet.curves import ALONG, CLASSES, NUMBER, TITLE, refusal
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.hill.edges import COUNTS, has_factors
 from survey.measures.segments import UNKNOWN
 
 ENTRIES = ("y1", "y2", "dy1", "dy2")  # by rows
 
-__all__ = ["ALONG", "CLASSES", "TITLE", "refusal", "searched", "serves"]
+__all__ = ["ALONG", "CLASSES", "NUMBER", "TITLE", "refusal", "searched", "serves"]
 
 
 def serves(scene):

@@ -96,6 +96,38 @@ def test_mathieus_tongues():
             assert inside.min() < 1e-3 and inside.max() > 1.9
 
 
+def number_of(kind, a, q):
+    """How many edges of the class are at `a` or below: characteristic values by scipy."""
+    if kind == "plus_one":
+        edges = [
+            mathieu_a(0, q),
+            *(f(n, q) for n in range(2, 12, 2) for f in (mathieu_a, mathieu_b)),
+        ]
+    else:
+        edges = [f(n, q) for n in range(1, 12, 2) for f in (mathieu_a, mathieu_b)]
+    return int((np.array(edges) <= a + 1e-6).sum())
+
+
+def test_curves_of_hamiltonian_systems_are_numbered():
+    box = ("a", -1.0, 10.0), ("q", 0.5, 3.0)
+    ds = found(mathieu("symplectic"), a=box[0][1:], q=box[1][1:])
+    index = ds.curve_index.values
+    assert (index > 0).all() and index.dtype == np.int32
+    for kind, code in CLASSES.items():
+        for (x, _errors), number in zip(
+            curves(ds, kind, *box), index[ds.curve_class.values == code], strict=True
+        ):
+            assert {number_of(kind, *row) for row in x[1:-1]} == {number}
+    kinds = {code: name for name, code in CLASSES.items()}
+    line = survey.edge(mathieu("symplectic"), along="a", a=(-1.0, 10.0), q=1.5)
+    assert line.place.size == 7
+    for a, code, number in zip(
+        *(line[v].values for v in ("edge", "edge_class", "edge_index")), strict=True
+    ):
+        assert number_of(kinds[int(code)], a, 1.5) == number
+    assert "edge_index" not in survey.edge(mathieu("none"), along="a", a=(-1.0, 10.0), q=1.5, c=0.0)
+
+
 def test_both_edges_of_a_tip():
     """Points of Mathieu's tongues at small q, by the series of DLMF 28.6.1 to q^4, whose rest is
     below 1e-15 here.
