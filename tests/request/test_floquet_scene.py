@@ -523,7 +523,7 @@ def test_a_structure_that_fits_is_named_once(matrices, fitting, caplog):
     own = scene(**given)
     for a in (2.2, 2.5):
         ds = survey.evaluate(own, delta=a, epsilon=0.1, zeta=0.05)
-        assert int(ds.verdict) == (-1 if fitting else 1)
+        assert int(ds.verdict) == (2 if fitting else 1)  # marginal, not stable
     said = [record.getMessage() for record in caplog.records]
     assert len(said) == bool(fitting)
     if fitting:

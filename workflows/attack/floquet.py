@@ -23,6 +23,7 @@ from survey.truth.hill import FACTOR_COLUMNS, TOLERANCE
 from survey.truth.hill_flow import COLUMNS, HARMONICS, TWO_PI
 
 DIGITS = 45
+EXACT = mpf("1e-30")  # what a growth of 0 may be with so many digits
 DOUBT = 1e-20  # multipliers that nearly meet follow from a trace of 30 digits
 VARIABLES = [
     "multiplier_re",
@@ -363,7 +364,7 @@ def _compared(answer, found, period, strict=True):
             wrong[i] = (said == 1 and (growth >= 0 if strict else growth > 0)) or (
                 said == 0 and growth <= 0
             )
-            wrong[i] |= said == 2 and growth != 0
+            wrong[i] |= said == 2 and abs(growth) > EXACT
             if not ok:
                 continue
             theirs = answer["multiplier_re"][i] + 1j * answer["multiplier_im"][i]
