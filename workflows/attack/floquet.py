@@ -23,7 +23,7 @@ from survey.truth.hill import FACTOR_COLUMNS, TOLERANCE
 from survey.truth.hill_flow import COLUMNS, HARMONICS, TWO_PI
 
 DIGITS = 45
-EXACT = mpf("1e-30")  # what a growth of 0 may be with so many digits
+EXACT = mpf("1e-18")  # what a growth of 0 may be, by a trace of 30 digits
 DOUBT = 1e-20  # multipliers that nearly meet follow from a trace of 30 digits
 VARIABLES = [
     "multiplier_re",
