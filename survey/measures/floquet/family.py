@@ -73,7 +73,7 @@ class Family:
         self._interpolate(lattice)
 
     def _extend(self, lattice):
-        """Find orbits of the `lattice` next to known ones, from where two or three of these in a row
+        """Find orbits of the `lattice` next to known ones, from where two of these in a row
         lead, until no more are found: beside the end of the family lines are too far apart.
         """
         ways = [np.moveaxis(lattice, axis, 0)[::side] for axis in (0, 1) for side in (1, -1)]
