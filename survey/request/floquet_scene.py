@@ -176,9 +176,8 @@ class FloquetScene(TracedScene):
         if answer["verdict"] == "unstable":
             return f"{radius}: it is certainly above 1"
         if answer["verdict"] == "marginal":
-            return (
-                "spectral radius 1, by what is exact in A here: no motion grows, and not all decay"
-            )
+            words = "spectral radius 1, by what is exact in A here: no motion grows, not all decay"
+            return f"{words}{self._why_never(answer)}"
         if answer["verdict"] == "undecided":
             words = f"{radius}: the error bar allows multipliers outside the unit circle, and inside or on it"
             return f"{words}{self._why_never(answer)}"
