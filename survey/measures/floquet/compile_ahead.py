@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from survey.kernels.floquet import steps
+from survey.kernels.floquet import characteristic, steps
 from survey.measures.floquet import dense, monodromy, stability
 from survey.measures.floquet.answers import Answers
 
@@ -23,6 +23,7 @@ def compile_ahead(variables, options):
     yield "matrices"
     _compile_series(asked)
     yield "series"
+    characteristic.roots(np.ones((1, N)))
     found = monodromy.Matrices.empty(1, N)
     found.V[:] = found.W[:] = np.eye(N)
     each, first = (np.zeros((1, N, N)), np.zeros(1), np.zeros(1)), np.array([0, 1])
