@@ -121,7 +121,7 @@ def test_what_time_reverses_is_marginal_where_its_multipliers_are_simple_and_on_
     assert (survey.evaluate(given[0], **axes, c=1e-3).verdict != MARGINAL).all()
 
 
-def test_audits_know_marginal_points(tmp_path):
+def test_another_method_agrees():
     e = np.linspace(0.0, 3.0, 6)
     ds = evaluated(free, ("angle", "rate", "x", "v"), c=[0.1, 0.5], e=e)
     assert (ds.verdict == MARGINAL).any()
