@@ -11,8 +11,7 @@ import xarray as xr
 from survey import api, measures, modules, status
 from survey.analysis.given import check_names, options_at, parameters
 from survey.errors import BadInput
-from survey.file.labels import FILL, flag_attributes
-from survey.measures.segments import UNKNOWN
+from survey.file.labels import flag_attributes, variable
 from survey.request import physical, user_scene
 from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
@@ -54,11 +53,11 @@ def edge(
     -------
     xarray.Dataset along the dimension `place`, ascending: `edge` (in the unit of the parameter), `edge_error`, a bound,
     `edge_class`, and `edge_index` where boundaries have numbers (of tongues; the Maslov index above an edge of a
-    symplectic system). The attribute `searched` is the range
-    (low, high) that was searched, parts included where parameters are invalid; `complete` is 1 where it is shown that
-    there are no others in it, 0 where not, and absent where this is not known. A closed gap is two boundaries at one
-    place; where a motion is marginal at a single value between two sides of the same verdict, such as `rho` = 0 of an
-    oblate satellite's librations, there is none.
+    symplectic system, masked where another is too near). The attribute `searched` is the range (low, high) that was
+    searched, parts included where parameters are invalid; `complete` is 1 where it is shown that there are no others in
+    it, 0 where not, and absent where this is not known. A closed gap is two boundaries at one place; where a motion
+    is marginal at a single value between two sides of the same verdict, such as `rho` = 0 of an oblate satellite's
+    librations, there is none.
 
     Raises
     ------
@@ -106,12 +105,12 @@ def _edge(scene, along, near, parameters, alone=False):
         near = _number("near", near, used[along])
     ends = _range(used[along], ends, near)
     user_scene.check(module)
-    found = _find(module, options, used[along], ends, near, fixed, alone)
-    if not (found[0].position.size or alone):
+    found, searched = _find(module, options, used[along], ends, near, fixed, alone)
+    if not (found.position.size or alone):
         _check_inside(
             scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options
         )
-    return _described(module, measure, used, along, fixed, *found)
+    return _described(module, measure, used, along, fixed, found, searched)
 
 
 def _not_searched(module, measure, along, known):
@@ -187,12 +186,10 @@ def _range(parameter, ends, near):
 
 
 def _find(scene, options, parameter, ends, near, fixed, alone):
-    """(OnLine, index or None, complete or None, (low, high) that was searched) between `ends`, or
-    the nearest on each side of `near`.
-    """
+    """(OnLine, (low, high) that was searched) between `ends`, or the nearest on each side of `near`."""
     if ends is not None:
         found = boundaries.along(scene, options, parameter.name, ends, fixed)
-        return *(found if near is None else _nearest(*found, near)), ends
+        return (found if near is None else _nearest(found, near)), ends
 
     def between(first, last):
         return boundaries.along(scene, options, parameter.name, (first, last), fixed)
@@ -204,7 +201,7 @@ def _find(scene, options, parameter, ends, near, fixed, alone):
     ends = {-1.0: (first, low), 1.0: (last, high)}
     for _ in range(MOST - 1):
         width *= WIDER
-        position = np.concatenate([part[0].position for part in parts])
+        position = np.concatenate([part.position for part in parts])
         for side, (end, furthest) in ends.items():
             if end != furthest and not (
                 position.size if alone else (side * (position - near) >= 0.0).any()
@@ -212,19 +209,23 @@ def _find(scene, options, parameter, ends, near, fixed, alone):
                 further = side * min(side * furthest, side * near + width)
                 parts.append(between(min(end, further), max(end, further)))
                 ends[side] = further, furthest
-    return *_nearest(*_together(parts), near), (ends[-1.0][0], ends[1.0][0])
+    return _nearest(_together(parts), near), (ends[-1.0][0], ends[1.0][0])
 
 
 def _together(parts):
-    """(OnLine, index or None, complete or None) of pieces of a line."""
-    found, index, complete = zip(*parts, strict=True)
-    order = np.argsort(np.concatenate([one.position for one in found]), kind="stable")
-    joined = (
-        np.concatenate([getattr(one, name) for one in found])[order]
-        for name in ("position", "error", "kind")
+    """The OnLine of pieces of a line."""
+
+    def all_of(name):
+        values = [getattr(one, name) for one in parts]
+        return None if any(one is None for one in values) else np.concatenate(values)
+
+    complete = [one.complete for one in parts]
+    found = boundaries.OnLine(
+        *map(all_of, ("position", "error", "kind")),
+        None if None in complete else all(complete),
+        all_of("index"),
     )
-    numbers = None if any(i is None for i in index) else np.concatenate(index)[order]
-    return boundaries.OnLine(*joined), numbers, None if None in complete else all(complete)
+    return found[np.argsort(found.position, kind="stable")]
 
 
 def _piece(parameter, near):
@@ -241,21 +242,14 @@ def _piece(parameter, near):
     return low, high
 
 
-def _nearest(found, index, complete, near):
+def _nearest(found, near):
     """Only the last boundary below `near`, and the first above."""
     below = np.flatnonzero(found.position <= near)[-1:]
     above = np.flatnonzero(found.position > near)[:1]
-    chosen = np.concatenate([below, above])
-    return (
-        boundaries.OnLine(
-            *(getattr(found, name)[chosen] for name in ("position", "error", "kind"))
-        ),
-        (None if index is None else index[chosen]),
-        complete,
-    )
+    return found[np.concatenate([below, above])]
 
 
-def _described(module, measure, used, along, fixed, found, index, complete, searched):
+def _described(module, measure, used, along, fixed, found, searched):
     parameter = used[along]
     about = {"units": parameter.units, "symbol": parameter.symbol}
     hill = hasattr(measure, "trace")
@@ -267,10 +261,9 @@ def _described(module, measure, used, along, fixed, found, index, complete, sear
         "edge_error": ("place", found.error, about | {"long_name": "error bound of edge"}),
         "edge_class": ("place", found.kind.astype(np.int8), flag_attributes(classes) | {"long_name": title}),
     }  # fmt: skip
-    if index is not None:
-        number = "number of the tongue, twice its rotation number" if hill else measure.NUMBER
-        about = {"long_name": number, "symbol": "n"}
-        data["edge_index"] = ("place", index.astype(np.int32), about, {FILL: np.int32(UNKNOWN)})
+    if found.index is not None:
+        title = None if hill else measure.NUMBER
+        data["edge_index"] = variable(("place",), *boundaries.numbered(found.index, title))
     coordinates = {key: ((), value, {"long_name": used[key].long_name, "units": used[key].units})
                    for key, value in fixed.items() if np.isfinite(value)}  # fmt: skip
     attributes = {
@@ -278,9 +271,8 @@ def _described(module, measure, used, along, fixed, found, index, complete, sear
         "along": along,
         "searched": searched,
     }
-    return xr.Dataset(
-        data, coordinates, attributes | ({} if complete is None else {"complete": int(complete)})
-    )
+    complete = {} if found.complete is None else {"complete": int(found.complete)}
+    return xr.Dataset(data, coordinates, attributes | complete)
 
 
 def margin(ds):

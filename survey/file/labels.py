@@ -113,7 +113,7 @@ def _dataset(grid, scene, name, request, arrays):
 
     # made here, as xarray takes longer to find out what they are
     data = {
-        key: _variable(dims, arrays[key], attrs)
+        key: variable(dims, arrays[key], attrs)
         for key, (dims, attrs) in variables(grid, scene, request).items()
     }
     coords = {
@@ -123,7 +123,7 @@ def _dataset(grid, scene, name, request, arrays):
     return xr.Dataset(data, coords, attributes(scene, name, request))
 
 
-def _variable(dims, values, attributes):
+def variable(dims, values, attributes):
     """An xarray.Variable; integers that do not apply are masked."""
     import xarray as xr
 

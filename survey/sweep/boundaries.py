@@ -88,19 +88,17 @@ def _about(workflow):
 
 
 def along(scene, options, name, ends, fixed):
-    """(OnLine, index of each or None, are these all?) between `ends` of the parameter `name`;
-    `fixed`: all others.
-    """
+    """The OnLine between `ends` of the parameter `name`; `fixed`: all others."""
     measure = measures.curves(scene)
     if hasattr(measure, "refusal"):
-        found = on_line(scene, options, name, ends, fixed)
-        return found, found.index, found.complete
+        return on_line(scene, options, name, ends, fixed)
     parameters = {name: ((name,), np.array(ends))} | {
         key: ((), np.float64(value)) for key, value in fixed.items()
     }
     line = SimpleNamespace(scene=scene, grid=Grid({name: 2}, parameters), request=Request(options))
     edges = _edges(line, name)
-    return OnLine(edges.position, edges.error, edges.kind), edges.index, bool(edges.complete.all())
+    complete = bool(edges.complete.all())
+    return OnLine(edges.position, edges.error, edges.kind, complete, edges.index)
 
 
 def plan(workflow, cost, threads):
@@ -193,8 +191,7 @@ def _closed(workflow, measure, each):
     variables = _of_curves(workflow, names, count, kind, values, error, "on the curve")
     if any(curves.index is not None for curves in found):
         numbers = [np.full(len(c.count), UNKNOWN) if c.index is None else c.index for c in found]
-        variables["curve_index"] = ("curve", np.concatenate(numbers).astype(np.int32), {
-            "long_name": measure.NUMBER, "units": "1", "symbol": "n", FILL: np.int32(UNKNOWN)})  # fmt: skip
+        variables["curve_index"] = ("curve", *numbered(np.concatenate(numbers), measure.NUMBER))
     for output in measure.ALONG:
         along, errors = (
             np.concatenate([curves.along[output.name][i] for curves in found]) for i in (0, 1)
@@ -337,7 +334,7 @@ def _rows(workflow, axis, other, edges):
         "edge_position": ("edge", edges.position, position | {"ancillary_variables": "edge_position_error"}),
         "edge_position_error": ("edge", edges.error, named | {"long_name": "error bound of edge_position"}),
         "edge_class": ("edge", *_class(workflow, edges.kind)),
-        "edge_index": ("edge", *_index(edges.index)),
+        "edge_index": ("edge", *numbered(edges.index)),
     }  # fmt: skip
 
 
@@ -398,7 +395,7 @@ def _curves(workflow, along, each):
     variables |= {
         "edge_curve": ("edge", curve_of.astype(np.int32), {
             "long_name": f"curve through the edge{seen}, counted from 0", "units": "1"}),
-        "curve_index": ("curve", *_index(all_of("index"))),
+        "curve_index": ("curve", *numbered(all_of("index"))),
         "curve_complete": ("curve", all_of("complete").astype(np.int8),
                            _yes_or_no("is the curve closed, or ended by the map or edge_left_out", "lost complete")),
     }  # fmt: skip
@@ -560,13 +557,13 @@ def flagged(title, classes, kind):
     return kind.astype(np.int8), flag_attributes(classes) | {"long_name": title, "units": "1"}
 
 
-def _index(index):
-    meaning = {
-        "long_name": "number of the tongue, twice its rotation number",
-        "units": "1",
-        "symbol": "n",
-    }
-    return index.astype(np.int32), meaning
+def numbered(index, title=None):
+    """Numbers of edges or curves and their attributes: of tongues, all known, or what `title` says, masked
+    where they are UNKNOWN.
+    """
+    masked = {} if title is None else {FILL: np.int32(UNKNOWN)}
+    title = title or "number of the tongue, twice its rotation number"
+    return index.astype(np.int32), masked | {"long_name": title, "units": "1", "symbol": "n"}
 
 
 def _yes_or_no(question, answers):

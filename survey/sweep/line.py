@@ -31,6 +31,12 @@ class OnLine:
     complete: bool | None = None
     index: np.ndarray | None = None
 
+    def __getitem__(self, those):
+        index = None if self.index is None else self.index[those]
+        return OnLine(
+            self.position[those], self.error[those], self.kind[those], self.complete, index
+        )
+
 
 def on_line(scene, options, along, ends, fixed):
     """The OnLine between `ends` (low, high) of the parameter `along`; `fixed`: {name: value} of all
@@ -56,16 +62,13 @@ def on_line(scene, options, along, ends, fixed):
     here = np.flatnonzero(curves.parameters[:, 1] == value)
     position, kind = curves.parameters[here, 0], np.repeat(curves.kind, curves.count)[here]
     error = np.asarray(curves.error)[here] * (ends[1] - ends[0]) + np.spacing(abs(position))
-    order = np.lexsort((position, kind))
-    position, error, kind = position[order], error[order], kind[order]
-    index = None if curves.index is None else np.repeat(curves.index, curves.count)[here][order]
-    near = np.diff(position) <= SAME * (error[1:] + error[:-1])
+    index = None if curves.index is None else np.repeat(curves.index, curves.count)[here]
+    found = OnLine(position, error, kind, curves.complete, index)[np.lexsort((position, kind))]
+    near = np.diff(found.position) <= SAME * (found.error[1:] + found.error[:-1])
     keep = np.ones(position.size, bool)
-    keep[1:] = ~(near & (np.diff(kind) == 0))
-    keep = np.flatnonzero(keep)
-    keep = keep[np.lexsort((kind[keep], position[keep]))]
-    index = None if index is None else index[keep]
-    return OnLine(position[keep], error[keep], kind[keep], curves.complete, index)
+    keep[1:] = ~(near & (np.diff(found.kind) == 0))
+    found = found[keep]
+    return found[np.lexsort((found.kind, found.position))]
 
 
 def second_axis(measure, scene, along, fixed, options):

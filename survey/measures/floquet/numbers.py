@@ -6,6 +6,8 @@ others of its class that a line across the map meets. Of Hill's equation y'' + (
 counts the edges of the class below a, this one included.
 """
 
+from functools import partial
+
 import numpy as np
 
 from survey.measures.segments import UNKNOWN
@@ -22,14 +24,21 @@ def of_curves(curves, square, index):
     the class has none.
     """
     found = np.full(len(curves.count), UNKNOWN, dtype=np.int32)
+    x, normal = np.empty((2, found.size, SOME, 2))
     ends = np.cumsum(curves.count)
     for k, (first, last) in enumerate(zip(ends - curves.count, ends, strict=True)):
-        x = square.positions(curves.parameters[first:last])
-        normal = _normals(x)
-        some = np.unique(np.linspace(0, len(x) - 1, SOME + 2).astype(int)[1:-1])
-        numbers = _numbers(x[some], normal[some], lambda x, k=k: index(curves.kind[k], x))
-        if numbers.size and (numbers == numbers[0]).all():
-            found[k] = numbers[0]
+        own = square.positions(curves.parameters[first:last])
+        some = np.linspace(0, len(own) - 1, SOME + 2).astype(int)[1:-1]
+        x[k], normal[k] = own[some], _normals(own)[some]
+    for kind in np.unique(curves.kind):
+        own = np.flatnonzero(curves.kind == kind)
+        at = (values[own].reshape(-1, 2) for values in (x, normal))
+        for k, numbers in zip(
+            own, _numbers(*at, partial(index, kind)).reshape(-1, SOME), strict=True
+        ):
+            known = np.unique(numbers[numbers != UNKNOWN])
+            if known.size == 1:
+                found[k] = known[0]
     return found
 
 
@@ -42,7 +51,7 @@ def _normals(x):
 
 
 def _numbers(x, normal, index):
-    """The numbers that are certain at points x (m, 2) of a curve."""
+    """The numbers at points x (m, 2) of curves, UNKNOWN where they are not certain."""
     found = np.full(len(x), UNKNOWN, dtype=np.int64)
     for aside in ASIDE:
         left = np.flatnonzero(found == UNKNOWN)
@@ -54,4 +63,4 @@ def _numbers(x, normal, index):
         inside = ((sides >= 0.0) & (sides <= 1.0)).all(axis=1).reshape(2, -1).all(axis=0)
         known = inside & (one != UNKNOWN) & (other != UNKNOWN) & (abs(one - other) == 1)
         found[left[known]] = np.maximum(one, other)[known]
-    return found[found != UNKNOWN]
+    return found
