@@ -2,6 +2,8 @@
 
 import gc
 
+import llvmlite.binding
+import numba
 import numpy as np
 import pytest
 
@@ -48,3 +50,26 @@ def test_a_collector_that_is_off_stays_off(usual):
     gc.set_threshold(0, 10, 10)
     compiled(seen)
     assert {one[0] for one in seen} == {0} and gc.get_threshold()[0] == 0
+
+
+def code_of(module):
+    """The machine code of a loop that is compiled for `module`."""
+
+    def doubled(x, out):
+        for i in range(len(x)):
+            out[i] = 2.0 * x[i]
+
+    doubled.__module__ = module
+    function = numba.njit(doubled)
+    function(np.zeros(3), np.zeros(3))
+    return next(iter(function.inspect_asm().values()))
+
+
+@pytest.mark.skipif(
+    llvmlite.binding.llvm_version_info[0] not in jit._KNOWN, reason="LLVM's options are not known"
+)
+def test_loops_of_kernels_are_not_unrolled_and_those_of_others_are_as_before():
+    before = code_of("somebody.else")
+    kernel = code_of("survey.kernels.some")
+    assert len(kernel.splitlines()) < 0.8 * len(before.splitlines())
+    assert len(code_of("somebody.else").splitlines()) == len(before.splitlines())
