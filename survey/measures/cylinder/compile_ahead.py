@@ -20,12 +20,12 @@ def compile_ahead(variables, options):
     """For the gyrostat's questions but those on separatrices."""
     if options.get("question") == "abel" and "separatrix" not in options:
         taylor.flow_abels_ahead()
-    _compile(coefficients(*np.zeros(rc.SIX)), options)
+    yield from _compile(coefficients(*np.zeros(rc.SIX)), options)
 
 
 def of_functions(variables, options):
     """For a user's f and g."""
-    _compile(np.zeros(COLUMNS + 1), options)
+    yield from _compile(np.zeros(COLUMNS + 1), options)
 
 
 def _compile(p, options):
@@ -36,6 +36,7 @@ def _compile(p, options):
         sizes = np.zeros(kf.SIZES, np.int64)
         fates = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
         taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *fates)
+        yield "fates"
     if question == "portrait":
         planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)
         taylor.flow_abels_by_row(p[None][:0], none, none, 0.0, 0, planes, status)

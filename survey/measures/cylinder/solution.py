@@ -7,6 +7,7 @@ that misses the requested accuracy is solved again with smaller steps, and the b
 
 import numpy as np
 
+from survey import waiting
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.accuracy import all_within
 from survey.kernels.cylinder.flow import spread, spread_programs
@@ -212,6 +213,8 @@ def _in_phi(method, rows, targets, rtol, by_row, timed):
     if not timed:
         solve = getattr(method, "flow_abels_untimed", solve)
     budget = STEPS * min(method.FLOW_WORK, 10)
+    if by_row:
+        waiting.wait()
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
