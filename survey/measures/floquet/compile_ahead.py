@@ -25,6 +25,7 @@ def compile_ahead(variables, options):
     yield "series"
     characteristic.roots(np.ones((1, N)))
     found = monodromy.Matrices.empty(1, N)
+    found.make_room()
     found.V[:] = found.W[:] = np.eye(N)
     each, first = (np.zeros((1, N, N)), np.zeros(1), np.zeros(1)), np.array([0, 1])
     steps.carried(*each, first, np.zeros(1, np.int64), N, found.V, found.W, found.extra)

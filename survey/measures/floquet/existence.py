@@ -272,6 +272,7 @@ class OrbitSteps:
             couplings(M, R, extra, values, vectors, inverses, known)
             off = 1.01 * applied(abs(inverses), df)
             share = np.where(off[:, :1] < 0.01, 1.02 * off, np.inf)
+            found.make_room()
             found.extra = (known[:, 1:, 1:] + share[:, 1:, None] * known[:, :1, 1:]) * (1 + 8 * EPS)
             found.R = np.zeros_like(judged)
             found.centre[which], found.V[which] = own, directions

@@ -181,40 +181,51 @@ def balanced(matrices):
 
 @dataclass
 class Matrices:
-    """M of N points and bounds E of its entries (N, n, n); where errors were carried in the coordinates of its
-    eigenvectors V, W = V^-1 nearly, also `extra`, bounds of |W e V|, e the error but for R, bounds of the rest.
+    """M of N points, bounds E of its entries and R of what multiplying leaves (N, n, n).
 
-    `sharp` (N): were they? V, W and `centre` (N, n), the eigenvalues, are complex.
+    `sharp` (N): where errors were carried in the coordinates of M's eigenvectors V, W = V^-1 nearly, there are also the
+    complex V, W and `centre` (N, n), the eigenvalues, and `extra`, bounds of |W e V|, e the error but for R.
     """
 
     M: np.ndarray
     E: np.ndarray
     R: np.ndarray
-    extra: np.ndarray
-    V: np.ndarray
-    W: np.ndarray
-    centre: np.ndarray
     sharp: np.ndarray
+    extra: np.ndarray | None = (
+        None  # as V, W and centre: no memory is touched for points that are not sharp
+    )
+    V: np.ndarray | None = None
+    W: np.ndarray | None = None
+    centre: np.ndarray | None = None
 
     @classmethod
     def empty(cls, N, n):
         """Room for N points, none of them sharp."""
-        real, complex_ = np.full((4, N, n, n), np.nan), np.full((2, N, n, n), np.nan, complex)
-        return cls(*real, *complex_, np.full((N, n), np.nan, complex), np.zeros(N, bool))
+        return cls(*np.full((3, N, n, n), np.nan), np.zeros(N, bool))
 
     @classmethod
     def plain(cls, M, E):
         """The Matrices of points of which only M and E are known."""
-        found = cls.empty(*M.shape[:2])
-        found.M, found.E = M, E
-        return found
+        return cls(M, E, np.full_like(E, np.nan), np.zeros(len(M), bool))
+
+    def make_room(self):
+        """Make room for what sharp points have besides, if there is none."""
+        if self.V is None:
+            N, n = self.M.shape[:2]
+            self.extra, self.centre = np.full((N, n, n), np.nan), np.full((N, n), np.nan, complex)
+            self.V, self.W = np.full((2, N, n, n), np.nan, complex)
 
     def __getitem__(self, those):
-        return Matrices(*(getattr(self, f.name)[those] for f in fields(self)))
+        return Matrices(
+            *(None if (own := getattr(self, f.name)) is None else own[those] for f in fields(self))
+        )
 
     def __setitem__(self, those, other):
+        if other.V is not None:
+            self.make_room()
         for f in fields(self):
-            getattr(self, f.name)[those] = getattr(other, f.name)
+            if (given := getattr(other, f.name)) is not None:
+                getattr(self, f.name)[those] = given
 
     @property
     def bound(self):
@@ -300,6 +311,7 @@ def _call(points, method, those, row_at, group, count, sharp):
     if callable(sharp):
         sharp(found, scale, F, error, doubt, first)
     elif sharp:
+        found.make_room()
         which = np.flatnonzero(
             np.isfinite(found.M).all(axis=(1, 2)) & np.isfinite(found.E).all(axis=(1, 2))
         )
@@ -312,8 +324,9 @@ def _call(points, method, those, row_at, group, count, sharp):
     with np.errstate(over="ignore", invalid="ignore"):
         for matrix in (found.M, found.E, found.R):
             matrix *= back
-    found.V *= scale[:, :, None]
-    found.W /= scale[:, None, :]
+    if found.V is not None:
+        found.V *= scale[:, :, None]
+        found.W /= scale[:, None, :]
     return found
 
 
