@@ -72,10 +72,12 @@ def factors(
     of_odd = np.empty(lanes)
     found = np.empty(lanes)
     per_row, needed = np.zeros(n), np.zeros((size, n), np.bool_)
+    most = 0.0
     for k in range(len(terms)):
-        per_row[terms[k, ROW]] += 1.0
+        row = terms[k, ROW]
+        per_row[row] += 1.0
+        most = max(most, per_row[row])
         needed[terms[k, BASIS], terms[k, COLUMN]] = True
-    most = per_row.max() if n else 0.0
     for start in range(0, len(point), lanes):
         for lane in range(lanes):
             task = min(start + lane, len(point) - 1)
