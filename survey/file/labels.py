@@ -215,15 +215,20 @@ class Tally:
     def add(self, arrays):
         """Count the points of a piece: {variable: array}."""
         size = np.size(arrays["status"])
-        bars = [name for name in arrays if f"{name}_error" in arrays]
-        errors = [np.asarray(arrays[f"{name}_error"]).reshape(size, -1).T for name in bars]
-        values = [np.asarray(arrays[name]).reshape(size, -1).T for name in bars]
-        chunk = max(1, CHUNK // max(1, sum(map(len, values))))
-        wide = any((error > self.rtol).any() for error in errors)  # else none is missed
-        for first in range(0, size if wide else 0, chunk):
-            own = slice(first, first + chunk)
-            some = (np.concatenate([rows[:, own] for rows in of]) for of in (values, errors))
-            self.missed += int(np.count_nonzero(_exceeds(*some, self.rtol).any(axis=0)))
+        missed = np.zeros(size, bool)
+        for name in arrays:
+            if f"{name}_error" not in arrays:
+                continue
+            value, error = (
+                np.asarray(arrays[key]).reshape(size, -1).T for key in (name, f"{name}_error")
+            )
+            if not (error > self.rtol).any():  # none is missed
+                continue
+            for first in range(0, size, CHUNK):
+                own = slice(first, first + CHUNK)
+                for one, bar in zip(value, error, strict=True):
+                    missed[own] |= _exceeds(one[own], bar[own], self.rtol)
+        self.missed += int(np.count_nonzero(missed))
         self.points += size
         for name, codes in self.codes.items():
             left = size
