@@ -25,6 +25,9 @@ from pathlib import Path
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+if hasattr(os, "sched_setaffinity"):  # one thread: two of one core take longer each
+    os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+
 import heyoka as hy  # noqa: E402
 import numpy as np  # noqa: E402
 import xarray as xr  # noqa: E402

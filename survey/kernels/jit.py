@@ -113,7 +113,8 @@ class _Compiling(event.TimingListener):
             self._usual = gc.get_threshold()
             if self._usual[0]:  # 0: the collector is off
                 gc.set_threshold(*map(max, self._usual, self.SELDOM))
-            self._ours = str(start.data["dispatcher"].py_func.__module__).startswith("survey.")
+            function = getattr((start.data or {}).get("dispatcher"), "py_func", None)
+            self._ours = str(getattr(function, "__module__", "")).startswith("survey.")
             if self._ours:
                 _set_options(_NO_UNROLLING)
         super().on_start(start)
@@ -137,9 +138,8 @@ _DEFAULT = {
     "force-vector-interleave": "0",
     "enable-epilogue-vectorization": "true",
 }
-_KNOWN = range(
-    15, 23
-)  # versions of LLVM that have these options: of an unknown one it ends the process
+# Versions of LLVM that have these options: one that it does not know would end the process.
+_KNOWN = range(15, 23)
 
 
 def _set_options(options):

@@ -9,8 +9,10 @@ from survey.errors import BadInput
 from survey.file.labels import layout, round_up
 from survey.sweep import dispatch
 from survey.sweep.compile_ahead import compiling_ahead
-from survey.sweep.cost import points_per_block
+from survey.sweep.cost import bytes_per_point, points_per_block, seconds_per_point
 from survey.wording import listed
+
+QUICK_SECONDS, QUICK_BYTES = 0.05, 2**23  # what takes no more is done before threads have begun
 
 
 def solve_block(scene, request, grid, block):
@@ -86,7 +88,9 @@ def compute(grid, scene, request, threads=None, progress=None):
         for name, values in solve_block(scene, request, grid, block).items():
             result[name][block] = values
 
-    blocks = grid.blocks(points_per_block(scene, request, grid))
+    quick = grid.points * seconds_per_point(scene, request, grid) <= QUICK_SECONDS
+    quick &= grid.points * bytes_per_point(scene, request) <= QUICK_BYTES
+    blocks = grid.blocks(grid.points if quick else points_per_block(scene, request, grid))
 
     def report(done, _=None):
         if progress:
@@ -95,6 +99,11 @@ def compute(grid, scene, request, threads=None, progress=None):
     with compiling_ahead(scene, request):
         if len(blocks) == 1:
             task(blocks[0])
+        elif (threads or dispatch.cpus()) == 1:
+            for number, block in enumerate(blocks):
+                report(number)
+                task(block)
+            report(len(blocks))
         else:
             dispatch.on_threads(
                 lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads
