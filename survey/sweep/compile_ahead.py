@@ -5,19 +5,23 @@ are needed later.
 import contextlib
 import subprocess
 import sys
+from pathlib import Path
 
+import survey
 from survey import waiting
 from survey.kernels import jit
 from survey.sweep.dispatch import cpus
 
 
-def program(ahead, request):
-    """The Python program that calls a scene's `compile_ahead` for what is asked; what that yields, it
-    prints.
-    """
+def command(ahead, request):
+    """The command that calls a scene's `compile_ahead` for what is asked; what that yields, it prints."""
     call = f"({list(request.variables)}, {dict(request.options)})"
     steps = f"for name in ahead{call} or (): print(name, flush=True)"
-    return f"import gc; gc.disable(); from {ahead.__module__} import {ahead.__name__} as ahead\n{steps}"
+    package = str(Path(survey.__file__).parents[1])
+    path = f"import gc, sys; gc.disable(); sys.path.append({package!r})"
+    program = f"{path}; from {ahead.__module__} import {ahead.__name__} as ahead\n{steps}"
+    # -P: not the modules of the user's folder, where struct.py would take the place of Python's
+    return [sys.executable, "-P", "-c", program]
 
 
 @contextlib.contextmanager
@@ -34,9 +38,8 @@ def compiling_ahead(scene, request):
     ):
         yield
         return
-    command = [sys.executable, "-c", program(ahead, request)]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        command(ahead, request), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     ) as process:
         waiting.other_compiler = process.stdout.readline  # a line, or the end
         try:
