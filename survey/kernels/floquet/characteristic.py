@@ -244,11 +244,12 @@ def answer_lanes(
                 if abs(im[i]) <= bar[i]:
                     im[i] = 0.0  # its mirror image would be in the same disc
             decided = UNDECIDED
-        _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed)
+        wide = _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed)
         if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
             _sort(re, im, bar, size, sign, floats[4 * n, p], p, floats, signs, angle, order)
             crossing[p] = _crossing(re, im, bar, size, angle, sign, verdict[p], paired, K > d)
-            missed[p] = (asked[CROSSING] and crossing[p] == UNDECIDED) or (
+            # two of one modulus, as in systems of equal damping, stay so at any accuracy
+            missed[p] = (wide and asked[CROSSING] and crossing[p] == UNDECIDED) or (
                 open_signs and (asked[KREIN] or asked[CROSSING])
             )
 
@@ -603,7 +604,7 @@ def _slope(form, d):
 @kernel
 def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed):
     """Write the spectral radius and the verdict of the point p, and whether it has missed what is
-    asked; fill `size` with the moduli.
+    asked; fill `size` with the moduli. Returns whether a multiplier is known less well than to rtol.
     """
     n, value, top, least, wide = len(re), 0.0, 0.0, 0.0, False
     for i in range(n):
@@ -623,6 +624,7 @@ def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, 
         or (wide and (asked[MULTIPLIERS] or asked[KREIN]))
         or (asked[RADIUS] and not off <= rtol * (1.0 + value))
     )
+    return wide
 
 
 @kernel

@@ -96,6 +96,26 @@ def test_a_map_agrees_with_its_points(name, solved, monkeypatch):
         assert (off <= (on_map[f"{output}_error"] + alone[f"{output}_error"]).values).all()
 
 
+def test_multipliers_of_one_modulus_do_not_ask_for_points_on_their_own(solved):
+    """With equal damping all are of the modulus exp(-c T / 2) where coupling is weak: which of them
+    leads stays open, at any accuracy.
+    """
+
+    def K(t, p, out):
+        out[0, 0], out[1, 1] = p[0] + p[1] * math.cos(2 * t), 1.2 * p[0] + p[1] * math.cos(2 * t)
+        out[0, 1] = out[1, 0] = 0.1 * math.cos(2 * t)
+
+    def C(t, p, out):
+        out[0, 0] = out[1, 1] = 0.1
+
+    scene = survey.floquet(K=K, C=C, period=math.pi, parameters=("a", "e"), states=("x", "y"))
+    ds = survey.evaluate(scene, a=np.linspace(1.3, 3.0, 80), e=np.linspace(0.0, 0.3, 70))
+    assert solved[0] < 0.2 * 80 * 70
+    off = abs(ds.spectral_radius - math.exp(-0.05 * math.pi))
+    assert (off <= ds.spectral_radius_error).mean() > 0.9
+    assert (ds.crossing == -1).mean() > 0.9 and (ds.verdict == 1).all()
+
+
 @pytest.mark.parametrize("n, rtol", [(2, 1e-10), (3, 1e-9), (4, 1e-9), (6, 1e-8)])
 def test_exact_multipliers_of_a_map(n, rtol, solved):
     rng = np.random.default_rng(n)
