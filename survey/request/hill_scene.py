@@ -167,9 +167,8 @@ class HillScene(FunctionScene):
         of_z, _ = _dependence(self, self._numbers(point, request))
         for lane, across in (free, free[::-1]):
             if of_z[lane] <= 1 and of_z[across] <= dependence.ENTIRE:
-                return user_rows.Axes(
-                    lane, (number, *ranges[lane][1:]), across, (number, *ranges[across][1:])
-                )
+                ends = ((number, *ranges[i][1:]) for i in (lane, across))
+                return user_rows.Axes(lane, next(ends), across, next(ends), of_z[across] <= 1)
         return None
 
     def _numbers(self, point, request):
@@ -256,7 +255,7 @@ class HillScene(FunctionScene):
         if not across:
             return user_rows.Axes(lane, lines[lane])
         across = max(across, key=lambda i: lines[i][0])
-        return user_rows.Axes(lane, lines[lane], across, lines[across])
+        return user_rows.Axes(lane, lines[lane], across, lines[across], of_z[across] <= 1)
 
     def equation(self, names, ends, options):
         """The equation in formulas (see `survey.scenes`); raises BadInput where z has none."""

@@ -191,9 +191,8 @@ class Matrices:
     E: np.ndarray
     R: np.ndarray
     sharp: np.ndarray
-    extra: np.ndarray | None = (
-        None  # as V, W and centre: no memory is touched for points that are not sharp
-    )
+    # None where no point is sharp: no memory is touched for them
+    extra: np.ndarray | None = None
     V: np.ndarray | None = None
     W: np.ndarray | None = None
     centre: np.ndarray | None = None

@@ -257,9 +257,8 @@ def _solve_some(system, structure, given, method, rtol, wanted, rows, answer, re
     asked = wanted | ({"multiplier_re"} if wanted & {"multiplier_im", "krein"} else set())
     asked |= {"spectral_radius"} if "exponent" in wanted else set()
     asked |= {"verdict"} if wanted & {"crossing", "verdict"} else set()
-    fine = (
-        rtol if asked <= {"verdict", "crossing"} else 0.1 * rtol
-    )  # multipliers are known less well than M
+    # multipliers are known less well than M
+    fine = rtol if asked <= {"verdict", "crossing"} else 0.1 * rtol
 
     def solved(those, rung):
         sharp = bool(rung.size and rung.min() > 0)  # all are on the first rung, or none is

@@ -3,7 +3,9 @@ on which it depends linearly (`dependence`), and series across the axis of anoth
 depends analytically.
 
 c0 and c1 follow from z at both ends of the axis of p_k, between which z is a mean of the two: so
-are bounds of its size and of its noise. All depends on the row and on the axes, never on the block.
+are bounds of its size and of its noise. Where z is linear across the rows too, it is a mean of the
+four corners of the map, and what steps need is measured there. All depends on the row and on the
+axes, never on the block.
 """
 
 from dataclasses import dataclass
@@ -17,32 +19,27 @@ from survey.measures.hill.user_equation import Steps, at, measured
 @dataclass(frozen=True)
 class Axes:
     """The parameter `lane` (its index) along the rows, and its axis `line`; `across` is the one, if
-    any, across them, and `row_line` its axis.
+    any, across them, `row_line` its axis, and `linear`: is z a linear function of it?
     """
 
     lane: int
     line: tuple[int, float, float]
     across: int | None = None
     row_line: tuple[int, float, float] | None = None
+    linear: bool = False
 
 
-def problem(z, key, axes, points, lanes, ranges, even, exact=None):
+def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
     """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), and where a row is
     `rough` (R).
 
     `ranges(points)` gives periods, edges and slack as `user_equation` takes them; what it gives,
-    and z, is named by the hashable `key`.
+    and z, is named by the hashable `key`. `known`: what `_from_corners` gave for their map.
     """
-    period, edges, slack = ranges(points)
+    _, edges, slack = ranges(points)
     ends = [_with(points, axes.lane, end) for end in axes.line[1:]]
-    both = np.concatenate(ends)
-    known = measured(
-        z, both, np.tile(edges, (2, 1)), np.tile(period, 2) if even else None, np.tile(slack, 2)
-    )
-    sizes, rate, scale, rough = (
-        values.reshape(2, len(points), *values.shape[1:]) for values in known
-    )
-    rate, scale, rough = rate.max(axis=0), scale.max(axis=0), rough.any(axis=0)
+    known = known or _from_corners(z, axes, points, ranges, even)
+    sizes, rate, scale, rough = known(points) if known else _measured(z, axes, points, ranges, even)
     steps = Steps(edges, slack, sizes.max(axis=0), rate)
 
     def sample(rows, nodes, number):
@@ -68,22 +65,61 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None):
         bound=_bound(*(steps.frequency(size) ** 2 for size in sizes), *axes.line[1:]), rate=steps.rates,
         sample=sample, walk=walk, cut=lambda rows, number: steps.of(rows, number)[1], full_period=not even,
         exact=exactly if exact else None, line=axes.line,
-        row_axis=_row_axis(z, key, axes, points, ranges, even) if axes.across is not None else None,
+        row_axis=_row_axis(z, key, axes, points, ranges, even, known) if axes.across is not None else None,
         positions=points[:, axes.across] if axes.across is not None else None,
     )  # fmt: skip
     return own, rough
 
 
-def _row_axis(z, key, axes, points, ranges, even):
+def _measured(z, axes, points, ranges, even):
+    """What steps need of z in rows of `points` (R, n): its size (2, R, P) at both ends of the rows, its
+    rate (R, P) and scale (R), and where it is `rough` (R); see `user_equation.measured`.
+    """
+    period, edges, slack = ranges(points)
+    ends = np.concatenate([_with(points, axes.lane, end) for end in axes.line[1:]])
+    edges, slack = np.tile(edges, (2, 1)), np.tile(slack, 2)
+    known = measured(z, ends, edges, np.tile(period, 2) if even else None, slack)
+    size, rate, scale, rough = (
+        values.reshape(2, len(points), *values.shape[1:]) for values in known
+    )
+    return size, rate.max(axis=0), scale.max(axis=0), rough.any(axis=0)
+
+
+def _from_corners(z, axes, points, ranges, even):
+    """The function of points (R, n) that gives what `_measured` does, bounds from the corners of their
+    map; None where z has to be measured row by row.
+    """
+    if not axes.linear:
+        return None
+    low, high = axes.row_line[1:]
+    ends = np.concatenate([_with(points[:1], axes.across, end) for end in (low, high)])
+    size, rate, scale, rough = _measured(z, axes, ends, ranges, even)
+    if rough.any() or np.isnan(scale).any():
+        return None
+
+    def at_rows(points):
+        share = (points[:, axes.across] - low) / (high - low)
+        between = np.stack([1.0 - share, share])
+        known = np.isfinite(points).all(axis=1)
+        return (
+            np.einsum("ekp,kr->erp", size, between),
+            np.repeat(rate.max(axis=0)[None], len(points), axis=0),
+            np.where(known, scale @ between, np.nan),
+            np.zeros(len(points), bool),
+        )
+
+    return at_rows
+
+
+def _row_axis(z, key, axes, points, ranges, even, known):
     """The axis across the rows; all other parameters are the same in these `points`."""
     same = points[:1]
     others = tuple(np.delete(same[0], [axes.lane, axes.across]).tolist())
 
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
-        return problem(
-            z, key, Axes(axes.lane, axes.line), own, np.zeros((positions.size, 0)), ranges, even
-        )[0]
+        lanes = np.zeros((positions.size, 0))
+        return problem(z, key, Axes(axes.lane, axes.line), own, lanes, ranges, even, None, known)[0]
 
     return monodromy.RowAxis((key, axes, others), *axes.row_line, at=rows_at)
 
@@ -93,7 +129,8 @@ def box(z, key, axes, point, ranges, even):
     of a `point`.
     """
     point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
-    row_axis = _row_axis(z, key, axes, point, ranges, even)
+    known = _from_corners(z, axes, point, ranges, even)
+    row_axis = _row_axis(z, key, axes, point, ranges, even, known)
     return monodromy.Box(row_axis, axes.line, full_period=not even)
 
 
