@@ -27,6 +27,8 @@ MAPS = [
     ("negative axis", HARMONICS, {"a": (-9.0, -1.0, 100), "q": (0.0, 6.0, 70), "r": 0.1}),
     ("square wave", WAVE, {"a": (0.0, 6.0, 90), "b": (-2.0, 3.0, 60), "duty": 0.3}),
     ("lane with changing sign", HARMONICS, {"a": 4.0, "q": (-3.0, 5.0, 300), "r": (0.0, 1.0, 40)}),
+    ("vanishing inside", survey.hill(lambda u, p: (p[0] - 4) * (p[1] - 1.5) + 1e-3 * p[1] * cos(60 * u), period=pi,
+                                     parameters=("a", "q"), even=True), {"a": (0.0, 8.0, 90), "q": (0.0, 3.0, 80)}),
     ("exponential", survey.hill(lambda u, p: p[0] + exp(p[1] * cos(u)), period=2 * pi, parameters=("a", "s"),
                                 even=True), {"a": (-1.0, 4.0, 200), "s": (-2.0, 2.0, 150)}),
 ]  # fmt: skip
