@@ -88,24 +88,24 @@ def compute(grid, scene, request, threads=None, progress=None):
         for name, values in solve_block(scene, request, grid, block).items():
             result[name][block] = values
 
-    quick = grid.points * seconds_per_point(scene, request, grid) <= QUICK_SECONDS
-    quick &= grid.points * bytes_per_point(scene, request) <= QUICK_BYTES
-    blocks = grid.blocks(grid.points if quick else points_per_block(scene, request, grid))
+    blocks = grid.blocks(points_per_block(scene, request, grid))
+    seconds = grid.points * seconds_per_point(scene, request, grid)
+    quick = (
+        seconds <= QUICK_SECONDS and grid.points * bytes_per_point(scene, request) <= QUICK_BYTES
+    )
+    workers = 1 if quick else threads or dispatch.cpus()
 
     def report(done, _=None):
         if progress:
             progress(done, len(blocks))
 
     with compiling_ahead(scene, request):
-        if len(blocks) == 1:
-            task(blocks[0])
-        elif (threads or dispatch.cpus()) == 1:
-            for number, block in enumerate(blocks):
-                report(number)
+        if len(blocks) == 1 or workers == 1:
+            for number, block in enumerate(blocks, 1):
                 task(block)
-            report(len(blocks))
+                report(number)
         else:
             dispatch.on_threads(
-                lambda number: task(blocks[number]), range(len(blocks)), report, threads=threads
+                lambda number: task(blocks[number]), range(len(blocks)), report, threads=workers
             )
     return result
