@@ -5,16 +5,18 @@ The results of a point at T/2 are the columns of `kernels.lanes`. Formulas:
 `survey.measures.hill.monodromy`.
 """
 
-from math import asinh, atan2, isfinite, pi, sqrt
+from math import isfinite, pi, sqrt
 
 import numpy as np
 
 from survey.kernels import lanes
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.inverses import arcsinh_roots, arctan_root
 from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import unroll
 
 LEAST = 2e-323  # what a few products lose where they underflow
+LEAST_ROOT = 1e-200  # less than any that is not 0
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
 # What an exact rule says of a point.
@@ -27,6 +29,10 @@ UNTRIED = -1
 # Of half the angle of a point, where more digits are known: sin^2 and cos^2.
 SINE, SINE_BAR, COSINE, COSINE_BAR = range(4)
 SQUARES = 4
+# Rows of a tile of points, after these: of an exponent or a rotation number, and the number of zeros.
+VALUE, DOUBT, ZEROS, WORK = range(SQUARES, SQUARES + 4)
+ROWS = SQUARES + 4
+TILE = 128
 
 
 @kernel
@@ -128,45 +134,56 @@ def measure(
     for `missed`, and `decides` whether an open verdict does; `full_period` as in `_squares`;
     `squares` (n, SQUARES, or empty) holds what it finds, where more digits of it are known.
     """
-    for row in range(len(results)):
-        i = first + row
-        missed[i] = False
-        verdict[i] = UNDECIDED
-        if status[i] != 0:
-            for c in range(len(floats)):
-                floats[c, i] = np.nan
-            continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[row], squares, row, full_period)
-        decided = decide(sine, sine_bar, cosine, cosine_bar, rule[i] if len(rule) > 0 else NO_RULE)
-        # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
-        by_sine = sine_bar <= cosine_bar
-        d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
-        bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
-        if decided == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
-            d, bar = 2.0 if d > 0.0 else -2.0, 0.0
-        within = isfinite(d) and bar < LARGEST
-        for c in range(4):
-            within &= results[row, lanes.Y1_BAR + c] < LARGEST
-        if not within:
-            status[i] = overflow
-            for c in range(len(floats)):
-                floats[c, i] = np.nan
-            continue
-        verdict[i] = decided
-        wide = decides and decided == UNDECIDED
-        if wanted[0]:
-            floats[DISCRIMINANT, i], floats[DISCRIMINANT + 1, i] = d, bar
-            wide |= not bar <= rtol * (1.0 + abs(d))
-        for c in range(4):
-            at, value, bar = (
-                FACTOR_ROWS[c],
-                results[row, lanes.Y1 + c],
-                results[row, lanes.Y1_BAR + c],
+    tile = np.empty((ROWS, TILE))
+    for start in range(0, len(results), TILE):
+        count = min(TILE, len(results) - start)
+        begin, end = first + start, first + start + count
+        own, decided, left_out, misses = (
+            results[start : start + count],
+            verdict[begin:end],
+            status[begin:end],
+            missed[begin:end],
+        )
+        _half_angles(own, squares, start, full_period, tile)
+        for i in range(count):
+            decided[i] = decide(
+                tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i], NO_RULE
             )
+        if len(rule) > 0:
+            for i in range(count):
+                of = rule[begin + i]
+                decided[i] = MARGINAL if of == ON_EDGE else decided[i]
+                decided[i] = (
+                    STABLE if of == NO_UNSTABLE_SIDE and decided[i] == UNDECIDED else decided[i]
+                )
+        for i in range(count):
+            # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
+            by_sine = tile[SINE_BAR, i] <= tile[COSINE_BAR, i]
+            d = 2.0 - 4.0 * tile[SINE, i] if by_sine else 4.0 * tile[COSINE, i] - 2.0
+            bar = tile[SINE_BAR, i] if by_sine else tile[COSINE_BAR, i]
+            bar = 4.0 * bar + 2.0 * EPS * (2.0 + abs(d))
+            on_edge = decided[i] == MARGINAL and abs(d) > bar  # where |D| = 2
+            tile[VALUE, i] = (2.0 if d > 0.0 else -2.0) if on_edge else d
+            tile[DOUBT, i] = 0.0 if on_edge else bar
+        for i in range(count):
+            within = abs(tile[VALUE, i]) < np.inf and tile[DOUBT, i] < LARGEST
+            for c in range(4):
+                within &= own[i, lanes.Y1_BAR + c] < LARGEST
+            left_out[i] = overflow if left_out[i] == 0 and not within else left_out[i]
+        for i in range(count):
+            decided[i] = decided[i] if left_out[i] == 0 else UNDECIDED
+            misses[i] = decides and left_out[i] == 0 and decided[i] == UNDECIDED
+        if wanted[0]:
+            _keep(tile, rtol, floats[DISCRIMINANT, begin:end], floats[DISCRIMINANT + 1, begin:end],
+                  misses, left_out)  # fmt: skip
+        for c in range(4):
+            at = FACTOR_ROWS[c]
             if wanted[at // 2]:
-                floats[at, i], floats[at + 1, i] = value, bar
-                wide |= not bar <= rtol * (1.0 + abs(value))
-        missed[i] = wide
+                for i in range(count):
+                    tile[VALUE, i], tile[DOUBT, i] = own[i, lanes.Y1 + c], own[i, lanes.Y1_BAR + c]
+                _keep(
+                    tile, rtol, floats[at, begin:end], floats[at + 1, begin:end], misses, left_out
+                )
 
 
 @kernel
@@ -176,40 +193,31 @@ def transcendental(
     """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and
     who misses.
     """
-    for row in range(len(results)):
-        i = first + row
-        if status[i] != 0:
-            continue
-        sine, sine_bar, cosine, cosine_bar = _squares(results[row], squares, row, full_period)
+    tile = np.empty((ROWS, TILE))
+    for start in range(0, len(results), TILE):
+        count = min(TILE, len(results) - start)
+        begin, end = first + start, first + start + count
+        own, decided, left_out = (
+            results[start : start + count],
+            verdict[begin:end],
+            status[begin:end],
+        )
+        _half_angles(own, squares, start, full_period, tile)
         if wanted[EXPONENT // 2]:
-            by_sine = sine < cosine
-            growth, bar = -sine if by_sine else -cosine, sine_bar if by_sine else cosine_bar
-            missed[i] |= _grows(growth, bar, rtol, floats[:, i], verdict[i])
+            for i in range(count):
+                by_sine = tile[SINE, i] < tile[COSINE, i]
+                tile[VALUE, i] = -tile[SINE, i] if by_sine else -tile[COSINE, i]
+                tile[DOUBT, i] = tile[SINE_BAR, i] if by_sine else tile[COSINE_BAR, i]
+            _growths(
+                tile, rtol, floats[EXPONENT, begin:end], floats[EXPONENT + 1, begin:end],
+                decided, missed[begin:end], left_out,
+            )  # fmt: skip
         if wanted[ROTATION // 2]:
-            zeros, doubt = results[row, lanes.Y1_ZEROS] + results[row, lanes.Y2_ZEROS], 0.0
-            # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1'
-            # y2
-            if full_period:
-                zeros, bar = results[row, lanes.Y2_ZEROS], results[row, lanes.Y2_BAR]
-                if abs(results[row, lanes.Y2]) <= bar:
-                    doubt = min(
-                        bar * (abs(results[row, lanes.DY1]) + results[row, lanes.DY1_BAR]), 1.0
-                    )
-            x, bar = _rotation(sine, sine_bar, cosine, cosine_bar, verdict[i], zeros)
-            bar += sqrt(doubt) if verdict[i] != UNSTABLE else 0.0
-            # a zero next to T/2 may be miscounted where the other product's sign leaves it open
-            if not full_period:
-                lost1 = (
-                    abs(results[row, lanes.Y1]) <= results[row, lanes.Y1_BAR]
-                    and not sine > sine_bar
-                )
-                lost2 = (
-                    abs(results[row, lanes.Y2]) <= results[row, lanes.Y2_BAR]
-                    and not cosine > cosine_bar
-                )
-                bar += 0.5 * lost1 + 0.5 * lost2
-            floats[ROTATION, i], floats[ROTATION + 1, i] = x, bar
-            missed[i] |= not bar <= rtol * (1.0 + x)
+            _lost(own, full_period, decided, tile)
+            _turns(
+                tile, rtol, floats[ROTATION, begin:end], floats[ROTATION + 1, begin:end],
+                decided, missed[begin:end], left_out,
+            )  # fmt: skip
 
 
 @kernel
@@ -217,13 +225,39 @@ def exponents(first, count, rtol, floats, verdict, missed):
     """The exponents of `count` points from each of `first` on, whose D and bar are known, and who
     misses `rtol`.
     """
-    for start in first:
-        for i in range(start, start + count):
-            # |D| - 2 = 4 sinh^2(exponent / 2)
-            growth = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
-            missed[i] |= _grows(
-                growth, 0.25 * floats[DISCRIMINANT + 1, i], rtol, floats[:, i], verdict[i]
-            )
+    tile, none = np.empty((ROWS, TILE)), np.zeros(TILE, np.int8)
+    for of in first:
+        for start in range(of, of + count, TILE):
+            end = min(start + TILE, of + count)
+            for i in range(start, end):
+                # |D| - 2 = 4 sinh^2(exponent / 2)
+                tile[VALUE, i - start] = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
+                tile[DOUBT, i - start] = 0.25 * floats[DISCRIMINANT + 1, i]
+            _growths(
+                tile, rtol, floats[EXPONENT, start:end], floats[EXPONENT + 1, start:end],
+                verdict[start:end], missed[start:end], none[: end - start],
+            )  # fmt: skip
+
+
+@splice
+def _half_angles(results, squares, first, full_period, tile):
+    """`_squares` of neighbouring points into the first rows of `tile`; `first` of them is the first
+    in `squares`.
+    """
+    if full_period or len(squares) > 0:
+        for i in range(len(results)):
+            found = _squares(results[i], squares, first + i, full_period)
+            for row in range(SQUARES):
+                tile[row, i] = found[row]
+        return
+    for i in range(len(results)):
+        own = results[i]
+        tile[SINE, i], tile[SINE_BAR, i] = _product(
+            -own[lanes.DY1], own[lanes.Y2], own[lanes.DY1_BAR], own[lanes.Y2_BAR]
+        )
+        tile[COSINE, i], tile[COSINE_BAR, i] = _product(
+            own[lanes.Y1], own[lanes.DY2], own[lanes.Y1_BAR], own[lanes.DY2_BAR]
+        )
 
 
 @splice
@@ -294,14 +328,6 @@ def _sharper(value, bar, product, product_bar, other, other_bar):
     return (quotient, found) if found < bar else (value, bar)
 
 
-@inline
-def _grows(growth, bar, rtol, floats, verdict):
-    """Keep a point's exponent and its bar; does it miss `rtol`?"""
-    x, bar = exponent(growth, bar, verdict)
-    floats[EXPONENT], floats[EXPONENT + 1] = x, bar
-    return not bar <= rtol * (1.0 + x)
-
-
 @unroll
 def _product(a, b, ea, eb):
     """a b and its error bound, the rounding of the product included."""
@@ -320,38 +346,102 @@ def decide(sine, sine_bar, cosine, cosine_bar, rule):
     return UNDECIDED
 
 
-@inline
-def exponent(growth, bar, verdict):
-    """2 asinh sqrt(growth), growth = -sin^2 or -cos^2 of half the angle, and how far the bar can move it."""
-    if verdict == STABLE or verdict == MARGINAL:
-        return 0.0, 0.0
-    middle = _asinh(growth)
-    return middle, max(
-        _asinh(growth + bar) - middle, middle - _asinh(growth - bar)
-    ) + 8.0 * EPS * middle
+@splice
+def _growths(tile, rtol, values, bars, verdict, missed, left_out):
+    """The exponents 2 asinh sqrt(growth) of neighbouring points, -sin^2 or -cos^2 of half the angle in
+    row VALUE of `tile`, its bar in row DOUBT; their bars, and who misses. Not of who is `left_out`.
+    """
+    grow = False
+    for i in range(len(values)):
+        grow |= verdict[i] < STABLE
+    if grow:
+        for i in range(len(values)):
+            tile[DOUBT, i] = _move(tile[VALUE, i], tile[DOUBT, i])
+        arcsinh_roots(tile[VALUE, : len(values)], tile[WORK])
+    for i in range(len(values)):
+        still = verdict[i] >= STABLE
+        x = 0.0 if still else 2.0 * tile[VALUE, i]
+        tile[VALUE, i], tile[DOUBT, i] = x, 0.0 if still else tile[DOUBT, i] + 8.0 * EPS * x
+    _keep(tile, rtol, values, bars, missed, left_out)
+
+
+@splice
+def _keep(tile, rtol, values, bars, missed, left_out):
+    """Keep the numbers in row VALUE of `tile` and their bars in row DOUBT, NaN of who is `left_out`;
+    and who misses.
+    """
+    for i in range(len(values)):
+        values[i] = tile[VALUE, i] if left_out[i] == 0 else np.nan
+        bars[i] = tile[DOUBT, i] if left_out[i] == 0 else np.nan
+    for i in range(len(values)):
+        wide = not tile[DOUBT, i] <= rtol * (1.0 + abs(tile[VALUE, i]))
+        missed[i] |= wide and left_out[i] == 0
 
 
 @inline
-def _asinh(growth):
-    return 2.0 * asinh(sqrt(max(growth, 0.0)))
+def _move(growth, bar):
+    """How far 2 asinh sqrt(growth) moves within the bar, at most: a difference of roots, by the slope
+    of the rest at its lower end.
+    """
+    x, low, high = max(growth, 0.0), max(growth - bar, 0.0), max(growth + bar, 0.0)
+    root = sqrt(x)
+    # where both are 0 there is no difference
+    down = (x - low) / max((root + sqrt(low)) * sqrt(1.0 + low), LEAST_ROOT)
+    up = (high - x) / max((root + sqrt(high)) * sqrt(1.0 + x), LEAST_ROOT)
+    return 2.0 * max(down, up) * (1.0 + 8.0 * EPS)
 
 
-@inline
-def _rotation(sine, sine_bar, cosine, cosine_bar, verdict, zeros):
-    """theta_total / (2 pi): `zeros` of y1, y2 in (0, T/2) give the band; n / 2 exactly in gaps."""
-    odd = zeros % 2.0 == 1.0
-    if sine < 0.0 or cosine < 0.0:
-        value = 0.5 * (zeros + (1.0 if odd != (cosine < sine) else 0.0))
-    else:
-        half = atan2(sqrt(sine), sqrt(cosine)) / pi
-        value = 0.5 * (zeros + (1.0 - 2.0 * half if odd else 2.0 * half))
-    if verdict == MARGINAL:
-        return 0.5 * np.rint(2.0 * value), 0.0
-    if verdict == UNSTABLE:
-        return value, 0.0
-    # arctan2 of both is no worse than either
-    bar = max(_spread(sine, sine_bar), _spread(cosine, cosine_bar)) / pi
-    return value, max(bar, 4.0 * EPS * (1.0 + value))
+@splice
+def _lost(results, full_period, verdict, tile):
+    """The zeros of y1, y2 of neighbouring points into row ZEROS of `tile`, what the rotation number
+    is off where they may be miscounted into row DOUBT.
+    """
+    for i in range(len(results)):
+        own = results[i]
+        zeros, doubt = own[lanes.Y1_ZEROS] + own[lanes.Y2_ZEROS], 0.0
+        lost_1 = abs(own[lanes.Y1]) <= own[lanes.Y1_BAR]
+        lost_2 = abs(own[lanes.Y2]) <= own[lanes.Y2_BAR]
+        if full_period:
+            # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1'
+            # y2
+            zeros = own[lanes.Y2_ZEROS]
+            most = own[lanes.Y2_BAR] * (abs(own[lanes.DY1]) + own[lanes.DY1_BAR])
+            doubt = sqrt(min(most, 1.0)) if lost_2 and verdict[i] != UNSTABLE else 0.0
+        else:
+            # next to T/2, where the other product's sign leaves it open
+            lost_1 &= not tile[SINE, i] > tile[SINE_BAR, i]
+            lost_2 &= not tile[COSINE, i] > tile[COSINE_BAR, i]
+            doubt = 0.5 * lost_1 + 0.5 * lost_2
+        tile[ZEROS, i], tile[DOUBT, i] = zeros, doubt
+
+
+@splice
+def _turns(tile, rtol, values, bars, verdict, missed, left_out):
+    """theta_total / (2 pi) of neighbouring points: `ZEROS` of y1, y2 in (0, T/2) give the band; n / 2
+    exactly in gaps. Their bars, and who misses. Not of who is `left_out`.
+    """
+    for i in range(len(values)):
+        tile[VALUE, i] = arctan_root(tile[SINE, i], tile[COSINE, i]) * (2.0 / pi)
+        # the arctangent of both is no worse than either
+        tile[WORK, i] = (
+            max(
+                _spread(tile[SINE, i], tile[SINE_BAR, i]),
+                _spread(tile[COSINE, i], tile[COSINE_BAR, i]),
+            )
+            / pi
+        )
+    for i in range(len(values)):
+        sine, cosine, zeros = tile[SINE, i], tile[COSINE, i], tile[ZEROS, i]
+        odd = zeros - 2.0 * np.floor(0.5 * zeros)
+        lower = 1.0 if cosine < sine else 0.0
+        further = lower if sine < 0.0 or cosine < 0.0 else tile[VALUE, i]
+        x = 0.5 * (zeros + (1.0 - further if odd == 1.0 else further))
+        bar = max(tile[WORK, i], 4.0 * EPS * (1.0 + x))
+        if verdict[i] == MARGINAL:
+            x = 0.5 * np.rint(2.0 * x)
+        bar = 0.0 if verdict[i] == MARGINAL or verdict[i] == UNSTABLE else bar
+        tile[VALUE, i], tile[DOUBT, i] = x, bar + tile[DOUBT, i]
+    _keep(tile, rtol, values, bars, missed, left_out)
 
 
 @inline

@@ -327,5 +327,5 @@ def _nearest(x, odd):
 @splice
 def _zeros(low, high, odd):
     """The number from `low` to `high`, which differ by 1 at most, that is odd or even; else NaN."""
-    value = low if (low % 2.0 == 1.0) == odd else low + 1.0
+    value = low if (low - 2.0 * np.floor(0.5 * low) == 1.0) == odd else low + 1.0
     return value if value <= high and high - low <= 1.0 else np.nan

@@ -17,8 +17,9 @@ class Asked:
     """The accuracy asked for, |error| <= rtol (1 + |value|), of the columns `wanted` of `kernels.hill.answers.FLOATS`.
 
     Points of a row that come `together` share the steps of the one that needs most, and so the
-    row's samples. With `full_period` the results are those of the period, where z is not even. An
-    open verdict misses the accuracy, unless none is asked for (`decides`).
+    row's samples. Steps are chosen for `aim`, by default rtol. With `full_period` the results are
+    those of the period, where z is not even. An open verdict misses the accuracy, unless none is
+    asked for (`decides`).
     """
 
     rtol: float
@@ -26,6 +27,7 @@ class Asked:
     together: bool = False
     full_period: bool = False
     decides: bool = True
+    aim: float | None = None
 
 
 class Answers(answers.Answers):

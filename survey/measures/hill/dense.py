@@ -53,8 +53,9 @@ DEGREES = np.array(
 POINTS_PER_NODE = 3
 ROWS_PER_NODE = 3
 # Of the requested accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
-# 4; those of a map are solved as well as can be.
-NODES_SHARE, BEST = 0.1, 1e-14
+# 4. Those of a map are solved in steps for BEST, which leave rounding alone, as a rule 1e-13 or so; and in
+# more only where they miss ENOUGH, or MAP_SHARE of what is requested.
+NODES_SHARE, MAP_SHARE, ENOUGH, BEST = 0.1, 0.01, 1e-12, 1e-14
 # Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what
 # `_enough` looks at by 10^7 or so, on every row that was measured.
 FACTORS_SHARE = 1e-6
@@ -139,7 +140,7 @@ def compile_ahead(sample, no_rows, variables):
             np.ones(1),
             False,
             np.zeros((TURNS, 1, 2)),
-            2,
+            _between(np.ones(1), 2, 2),
             False,
         )
 
@@ -296,9 +297,9 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
     # a row whose series has not converged goes on to the next degree
     while (at := int(degree.min(initial=axis.most))) < axis.most:
         rows = np.flatnonzero(degree == at)
-        share = NODES_SHARE * asked.rtol
+        share = max(BEST, NODES_SHARE * asked.rtol)
         values, series, bars, turns, nodal = _series(
-            problem, method, share, rows, int(DEGREES[at]), axis, sought
+            problem, method, (share, share), rows, int(DEGREES[at]), axis, sought
         )
         served = _served(values, bars[:, :, None], asked.rtol).mean(axis=2).min(axis=0)
         few = np.flatnonzero(served < MOST)
@@ -340,6 +341,7 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
     padded = np.zeros((*series.shape[:2], -(-series.shape[2] // TERMS) * TERMS))
     padded[:, :, : series.shape[2]] = series
     number = turns.shape[2] * (2 if axis.even else 1)
+    between = _between(abs(x) if axis.even else x, number, turns.shape[2])
     rule = None if problem.rule is None else problem.rule.reshape(-1)
     most = max(1, CALL_POINTS // x.size)
     apart = np.flatnonzero(np.diff(rows) != 1) + 1
@@ -352,7 +354,7 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
                 x,
                 axis.even,
                 turns[:, some],
-                number,
+                between,
                 asked.full_period,
             )
             answers.assess(results, rule, first=rows[some.start] * x.size)
@@ -362,11 +364,9 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
     open_points[rows] = (answers.missed | failed).reshape(problem.p.shape)[rows]
 
 
-def _factors(series, bars, x, even, turns, number, full_period):
-    """The results (R x, RESULTS) of the points x of rows; the nodes of the `turns` are the first of
-    `number`.
-    """
-    left, right, share = _between(abs(x) if even else x, number, turns.shape[2])
+def _factors(series, bars, x, even, turns, between, full_period):
+    """The results (R x, RESULTS) of the points x of rows, which lie `between` nodes of the `turns`."""
+    left, right, share = between
     results = np.empty((turns.shape[1] * x.size, RESULTS))
     series, bars, turns = (np.ascontiguousarray(values) for values in (series, bars, turns))
     factors(series, bars, x, even, turns, left, right, share, full_period, results)
@@ -536,7 +536,8 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
         n, before = int(DEGREES[at]), doubt
         spent += n
         nodes = row_axis.at(middle + radius * chebyshev.symmetric_nodes(n))
-        found = _series(nodes, method, 0.0, np.arange(n), int(DEGREES[degree]), axis, sought)
+        accuracy = max(BEST, min(ENOUGH, MAP_SHARE * rtol)), BEST
+        found = _series(nodes, method, accuracy, np.arange(n), int(DEGREES[degree]), axis, sought)
         values, series, bars, turns, nodal = found
         matrix = chebyshev.by_columns(n)
         ulps = (4 + abs(middle) + radius) / radius
@@ -589,20 +590,28 @@ def _enough(kind, rtol):
     return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
 
 
-def _series(problem, method, rtol, rows, n, axis, sought):
+def _series(problem, method, accuracy, rows, n, axis, sought):
     """What is sought at nodes (F, rows, n; n/2 if even), its coefficients, their bounds (F, rows),
     and, of factors, the `turns` (TURNS, rows, n) there, NEAR to Y2_MOST; of D the `NodalBounds`.
 
     If even, the coefficients are those of T_k(2 (p/radius)^2 - 1), and of factors those of (y1 +
-    y2') / 2, y1', y2 and, of T_{2k + 1}(p/radius), (y1 - y2') / 2. Nodes are solved to `rtol` or as
-    well as can be; an error bound is not finite where there is none.
+    y2') / 2, y1', y2 and, of T_{2k + 1}(p/radius), (y1 - y2') / 2. `accuracy` is what nodes are solved
+    to if that can be, and what their first steps are chosen for; an error bound is not finite where
+    there is none.
     """
     x = chebyshev.symmetric_nodes(n)
     x = x[: n // 2] if axis.even else x
     nodes = problem.at(
         rows, np.broadcast_to(axis.middle + axis.radius * x, (rows.size, x.size)).copy()
     )
-    finer = Asked(max(rtol, BEST), sought.wanted, together=True, full_period=problem.full_period)
+    finer = Asked(
+        accuracy[0],
+        sought.wanted,
+        together=True,
+        full_period=problem.full_period,
+        decides=False,
+        aim=accuracy[1],
+    )
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
     found = own.floats.reshape(len(own.floats), *nodes.p.shape)

@@ -93,7 +93,7 @@ def _first_steps(problem, method, asked):
     """The first rung (R, L) with as many steps as the method asks for; above the top where none
     has; UNTRIED at NaN.
     """
-    phase, distance = method.hill_density(asked.rtol)
+    phase, distance = method.hill_density(asked.rtol if asked.aim is None else asked.aim)
     phase = max(phase, 1 / LONGEST)
     if not asked.together:
         return _first_rungs(problem, phase, distance)
