@@ -422,13 +422,8 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
     """
     for i in range(len(values)):
         tile[VALUE, i] = arctan_root(tile[SINE, i], tile[COSINE, i]) * (2.0 / pi)
-        # the arctangent of both is no worse than either
-        tile[WORK, i] = (
-            max(
-                _spread(tile[SINE, i], tile[SINE_BAR, i]),
-                _spread(tile[COSINE, i], tile[COSINE_BAR, i]),
-            )
-            / pi
+        tile[WORK, i] = _spread(
+            tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i]
         )
     for i in range(len(values)):
         sine, cosine, zeros = tile[SINE, i], tile[COSINE, i], tile[ZEROS, i]
@@ -436,7 +431,7 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
         lower = 1.0 if cosine < sine else 0.0
         further = lower if sine < 0.0 or cosine < 0.0 else tile[VALUE, i]
         x = 0.5 * (zeros + (1.0 - further if odd == 1.0 else further))
-        bar = max(tile[WORK, i], 4.0 * EPS * (1.0 + x))
+        bar = tile[WORK, i] / pi + 4.0 * EPS * (1.0 + x)
         if verdict[i] == MARGINAL:
             x = 0.5 * np.rint(2.0 * x)
         bar = 0.0 if verdict[i] == MARGINAL or verdict[i] == UNSTABLE else bar
@@ -445,10 +440,15 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
 
 
 @inline
-def _spread(square, bar):
-    """How far arcsin sqrt(square) moves within the bar: by its steepest slope there, at most by
-    arcsin sqrt(bar).
+def _spread(sine, sine_bar, cosine, cosine_bar):
+    """How far atan sqrt(sine / cosine) moves within the bars: by its steepest slopes there, at most
+    by all of it, or of what it lacks to pi/2.
+
+    Next to an edge one of the two is small, and the bar of the other counts for as little.
     """
-    slope = 2.0 * sqrt(max(square - bar, 0.0) * max(1.0 - square - bar, 0.0))
-    most = 0.5 * pi * sqrt(min(bar, 1.0))
-    return min(bar / slope, most) if slope > 0.0 else most
+    low_sine, low_cosine = max(sine - sine_bar, 0.0), max(cosine - cosine_bar, 0.0)
+    ratio = sqrt(max(sine + sine_bar, 0.0) / low_cosine)
+    inverse = sqrt(max(cosine + cosine_bar, 0.0) / low_sine)
+    steep = 0.5 * (sine_bar * inverse + cosine_bar * ratio) / (low_sine + low_cosine)
+    most = min(0.5 * pi, ratio if ratio < inverse else inverse)
+    return (steep if steep < most else most) * (1.0 + 16.0 * EPS)
