@@ -146,9 +146,7 @@ def measure(
         )
         _half_angles(own, squares, start, full_period, tile)
         for i in range(count):
-            decided[i] = decide(
-                tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i], NO_RULE
-            )
+            decided[i] = decide(*_of_half(tile, i))
         if len(rule) > 0:
             for i in range(count):
                 of = rule[begin + i]
@@ -158,10 +156,10 @@ def measure(
                 )
         for i in range(count):
             # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
-            by_sine = tile[SINE_BAR, i] <= tile[COSINE_BAR, i]
-            d = 2.0 - 4.0 * tile[SINE, i] if by_sine else 4.0 * tile[COSINE, i] - 2.0
-            bar = tile[SINE_BAR, i] if by_sine else tile[COSINE_BAR, i]
-            bar = 4.0 * bar + 2.0 * EPS * (2.0 + abs(d))
+            sine, sine_bar, cosine, cosine_bar = _of_half(tile, i)
+            by_sine = sine_bar <= cosine_bar
+            d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
+            bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
             on_edge = decided[i] == MARGINAL and abs(d) > bar  # where |D| = 2
             tile[VALUE, i] = (2.0 if d > 0.0 else -2.0) if on_edge else d
             tile[DOUBT, i] = 0.0 if on_edge else bar
@@ -205,9 +203,9 @@ def transcendental(
         _half_angles(own, squares, start, full_period, tile)
         if wanted[EXPONENT // 2]:
             for i in range(count):
-                by_sine = tile[SINE, i] < tile[COSINE, i]
-                tile[VALUE, i] = -tile[SINE, i] if by_sine else -tile[COSINE, i]
-                tile[DOUBT, i] = tile[SINE_BAR, i] if by_sine else tile[COSINE_BAR, i]
+                sine, sine_bar, cosine, cosine_bar = _of_half(tile, i)
+                tile[VALUE, i] = -min(sine, cosine)
+                tile[DOUBT, i] = sine_bar if sine < cosine else cosine_bar
             _growths(
                 tile, rtol, floats[EXPONENT, begin:end], floats[EXPONENT + 1, begin:end],
                 decided, missed[begin:end], left_out,
@@ -237,6 +235,12 @@ def exponents(first, count, rtol, floats, verdict, missed):
                 tile, rtol, floats[EXPONENT, start:end], floats[EXPONENT + 1, start:end],
                 verdict[start:end], missed[start:end], none[: end - start],
             )  # fmt: skip
+
+
+@inline
+def _of_half(tile, i):
+    """The `_squares` of a point in a tile, all loaded before one is chosen: as vector code asks for."""
+    return tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i]
 
 
 @splice
@@ -335,15 +339,11 @@ def _product(a, b, ea, eb):
 
 
 @inline
-def decide(sine, sine_bar, cosine, cosine_bar, rule):
-    """The verdict: certain only when the bars exclude the other answer, or by an exact rule."""
-    if rule == ON_EDGE:
-        return MARGINAL
-    if sine < -sine_bar or cosine < -cosine_bar:
-        return UNSTABLE
-    if (sine > sine_bar and cosine > cosine_bar) or rule == NO_UNSTABLE_SIDE:
-        return STABLE
-    return UNDECIDED
+def decide(sine, sine_bar, cosine, cosine_bar):
+    """The verdict, certain only where the bars exclude the other answer."""
+    unstable = (sine < -sine_bar) | (cosine < -cosine_bar)
+    stable = (sine > sine_bar) & (cosine > cosine_bar)
+    return UNSTABLE if unstable else STABLE if stable else UNDECIDED
 
 
 @splice
@@ -359,9 +359,9 @@ def _growths(tile, rtol, values, bars, verdict, missed, left_out):
             tile[DOUBT, i] = _move(tile[VALUE, i], tile[DOUBT, i])
         arcsinh_roots(tile[VALUE, : len(values)], tile[WORK])
     for i in range(len(values)):
-        still = verdict[i] >= STABLE
-        x = 0.0 if still else 2.0 * tile[VALUE, i]
-        tile[VALUE, i], tile[DOUBT, i] = x, 0.0 if still else tile[DOUBT, i] + 8.0 * EPS * x
+        still, x, bar = verdict[i] >= STABLE, 2.0 * tile[VALUE, i], tile[DOUBT, i]
+        bar += 8.0 * EPS * x
+        tile[VALUE, i], tile[DOUBT, i] = 0.0 if still else x, 0.0 if still else bar
     _keep(tile, rtol, values, bars, missed, left_out)
 
 
@@ -371,11 +371,11 @@ def _keep(tile, rtol, values, bars, missed, left_out):
     and who misses.
     """
     for i in range(len(values)):
-        values[i] = tile[VALUE, i] if left_out[i] == 0 else np.nan
-        bars[i] = tile[DOUBT, i] if left_out[i] == 0 else np.nan
+        x, bar, known = tile[VALUE, i], tile[DOUBT, i], left_out[i] == 0
+        values[i], bars[i] = x if known else np.nan, bar if known else np.nan
     for i in range(len(values)):
         wide = not tile[DOUBT, i] <= rtol * (1.0 + abs(tile[VALUE, i]))
-        missed[i] |= wide and left_out[i] == 0
+        missed[i] |= wide & (left_out[i] == 0)
 
 
 @inline
@@ -399,8 +399,10 @@ def _lost(results, full_period, verdict, tile):
     for i in range(len(results)):
         own = results[i]
         zeros, doubt = own[lanes.Y1_ZEROS] + own[lanes.Y2_ZEROS], 0.0
-        lost_1 = abs(own[lanes.Y1]) <= own[lanes.Y1_BAR]
-        lost_2 = abs(own[lanes.Y2]) <= own[lanes.Y2_BAR]
+        lost_1, lost_2 = (
+            abs(own[lanes.Y1]) <= own[lanes.Y1_BAR],
+            abs(own[lanes.Y2]) <= own[lanes.Y2_BAR],
+        )
         if full_period:
             # where y2's last zero may lie on either side of T: sin^2 of the angle is at most -y1'
             # y2
@@ -422,20 +424,23 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
     """
     for i in range(len(values)):
         tile[VALUE, i] = arctan_root(tile[SINE, i], tile[COSINE, i]) * (2.0 / pi)
-        tile[WORK, i] = _spread(
-            tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i]
-        )
+        tile[WORK, i] = _spread(*_of_half(tile, i))
     for i in range(len(values)):
-        sine, cosine, zeros = tile[SINE, i], tile[COSINE, i], tile[ZEROS, i]
+        sine, cosine, zeros, further = (
+            tile[SINE, i],
+            tile[COSINE, i],
+            tile[ZEROS, i],
+            tile[VALUE, i],
+        )
         odd = zeros - 2.0 * np.floor(0.5 * zeros)
         lower = 1.0 if cosine < sine else 0.0
-        further = lower if sine < 0.0 or cosine < 0.0 else tile[VALUE, i]
+        further = lower if (sine < 0.0) | (cosine < 0.0) else further
         x = 0.5 * (zeros + (1.0 - further if odd == 1.0 else further))
         bar = tile[WORK, i] / pi + 4.0 * EPS * (1.0 + x)
-        if verdict[i] == MARGINAL:
-            x = 0.5 * np.rint(2.0 * x)
-        bar = 0.0 if verdict[i] == MARGINAL or verdict[i] == UNSTABLE else bar
-        tile[VALUE, i], tile[DOUBT, i] = x, bar + tile[DOUBT, i]
+        on_edge = verdict[i] == MARGINAL
+        bar = 0.0 if on_edge | (verdict[i] == UNSTABLE) else bar
+        tile[VALUE, i] = 0.5 * np.rint(2.0 * x) if on_edge else x
+        tile[DOUBT, i] = bar + tile[DOUBT, i]
     _keep(tile, rtol, values, bars, missed, left_out)
 
 

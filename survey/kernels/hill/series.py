@@ -22,6 +22,11 @@ FACTOR_COUNT = 4
 # At a node: the rotation number, the least and the largest number of zeros of y1, and of y2.
 NEAR, Y1_LEAST, Y1_MOST, Y2_LEAST, Y2_MOST = range(5)
 TURNS = 5
+# Rows of a tile of points, after the factors: see `_count`.
+TURNED, MIRRORED, BEYOND, Y1_SIZE, M_LOW, M_HIGH, D_LOW, D_HIGH = range(
+    FACTOR_COUNT, FACTOR_COUNT + 8
+)
+TILE_ROWS = FACTOR_COUNT + 8
 # Around a point of a panel: the two nodes across the rows, and the two along them.
 ACROSS, ALONG = range(2)
 LOW_ACROSS, HIGH_ACROSS, LOW_ALONG, HIGH_ALONG = range(4)
@@ -157,44 +162,48 @@ def factors(coefficients, bars, x, even, turns, left, right, share, full_period,
     way between; NaN where they do not tell.
     """
     _, rows, terms = coefficients.shape
-    table, odd, sums = (
+    table, odd, tile = (
         np.empty((terms, TILE)),
         np.empty((terms, TILE)),
-        np.empty((FACTOR_COUNT, TILE)),
+        np.empty((TILE_ROWS, TILE)),
     )
     for start in range(0, len(x), TILE):
         count = min(TILE, len(x) - start)
         _table(x[start : start + count], even, False, table)
         if even:
             _table(x[start : start + count], even, True, odd)
+        for i in range(count):
+            tile[MIRRORED, i] = 1.0 if even and x[start + i] < 0.0 else 0.0
+            tile[BEYOND, i] = 1.0 if left[start + i] == right[start + i] else 0.0
         for j in range(rows):
             for f in range(FACTOR_COUNT):
-                _sum(coefficients[f, j], odd if even and f == lanes.DY2 else table, sums[f], count)
+                _sum(coefficients[f, j], odd if even and f == lanes.DY2 else table, tile[f], count)
             y1_bar, dy2_bar = bars[lanes.Y1, j], bars[lanes.DY2, j]
             if even:
                 y1_bar = dy2_bar = y1_bar + dy2_bar
                 for i in range(count):
-                    sums[lanes.Y1, i], sums[lanes.DY2, i] = (
-                        sums[lanes.Y1, i] + sums[lanes.DY2, i],
-                        sums[lanes.Y1, i] - sums[lanes.DY2, i],
+                    tile[lanes.Y1, i], tile[lanes.DY2, i] = (
+                        tile[lanes.Y1, i] + tile[lanes.DY2, i],
+                        tile[lanes.Y1, i] - tile[lanes.DY2, i],
                     )
             for i in range(count):
-                own = results[j * len(x) + start + i]
-                for f in range(FACTOR_COUNT):
-                    own[lanes.Y1 + f] = sums[f, i]
-                own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[lanes.DY1, j]
-                own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[lanes.Y2, j], dy2_bar
                 one, other = left[start + i], right[start + i]
                 near = turns[NEAR, j, one] + share[start + i] * (
                     turns[NEAR, j, other] - turns[NEAR, j, one]
                 )
-                _count(
-                    own, even and x[start + i] < 0.0, full_period, near, one == other,
-                    min(turns[Y1_LEAST, j, one], turns[Y1_LEAST, j, other]),
-                    max(turns[Y1_MOST, j, one], turns[Y1_MOST, j, other]),
-                    min(turns[Y2_LEAST, j, one], turns[Y2_LEAST, j, other]),
-                    max(turns[Y2_MOST, j, one], turns[Y2_MOST, j, other]),
-                )  # fmt: skip
+                tile[TURNED, i], tile[Y1_SIZE, i] = near, y1_bar
+                tile[M_LOW, i] = min(turns[Y1_LEAST, j, one], turns[Y1_LEAST, j, other])
+                tile[M_HIGH, i] = max(turns[Y1_MOST, j, one], turns[Y1_MOST, j, other])
+                tile[D_LOW, i] = min(turns[Y2_LEAST, j, one], turns[Y2_LEAST, j, other])
+                tile[D_HIGH, i] = max(turns[Y2_MOST, j, one], turns[Y2_MOST, j, other])
+            _count(tile, full_period, count)
+            own = results[j * len(x) + start : j * len(x) + start + count]
+            for i in range(count):
+                for f in range(FACTOR_COUNT):
+                    own[i, lanes.Y1 + f] = tile[f, i]
+                own[i, lanes.Y1_BAR], own[i, lanes.DY1_BAR] = y1_bar, bars[lanes.DY1, j]
+                own[i, lanes.Y2_BAR], own[i, lanes.DY2_BAR] = bars[lanes.Y2, j], dy2_bar
+                own[i, lanes.Y1_ZEROS], own[i, lanes.Y2_ZEROS] = tile[M_LOW, i], tile[D_LOW, i]
 
 
 @kernel
@@ -209,7 +218,7 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
     """
     _, terms, across = coefficients.shape
     table, odd, rows = np.empty((terms, TILE)), np.empty((terms, TILE)), np.empty((across, TILE))
-    sums, part = np.empty((FACTOR_COUNT, TILE)), np.empty(TILE)
+    tile, part = np.empty((TILE_ROWS, TILE)), np.empty(TILE)
     for start in range(0, x.shape[1], TILE):
         count = min(TILE, x.shape[1] - start)
         _table(x[ACROSS, start : start + count], False, False, rows)
@@ -218,33 +227,23 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
             _table(x[ALONG, start : start + count], even, True, odd)
         for f in range(FACTOR_COUNT):
             for i in range(count):
-                sums[f, i] = 0.0
+                tile[f, i] = 0.0
             for k in range(terms):
                 if number[f, k] == 0:
                     continue
                 _sum(coefficients[f, k, : number[f, k]], rows, part, count)
                 along = odd[k] if even and f == lanes.DY2 else table[k]
                 for i in range(count):
-                    sums[f, i] += along[i] * part[i]
+                    tile[f, i] += along[i] * part[i]
         for i in range(count):
-            own, at = results[start + i], start + i
-            y1, dy2, y1_bar, dy2_bar = (
-                sums[lanes.Y1, i],
-                sums[lanes.DY2, i],
-                bars[lanes.Y1],
-                bars[lanes.DY2],
-            )
+            at, bar = start + i, bars[lanes.Y1]
             if even:
-                dy2_bar = y1_bar = y1_bar + dy2_bar * scale[at]
-                y1, dy2 = y1 + dy2 * scale[at], y1 - dy2 * scale[at]
-            own[lanes.Y1], own[lanes.DY1], own[lanes.Y2], own[lanes.DY2] = (
-                y1,
-                sums[lanes.DY1, i],
-                sums[lanes.Y2, i],
-                dy2,
-            )
-            own[lanes.Y1_BAR], own[lanes.DY1_BAR] = y1_bar, bars[lanes.DY1]
-            own[lanes.Y2_BAR], own[lanes.DY2_BAR] = bars[lanes.Y2], dy2_bar
+                odd_part = tile[lanes.DY2, i] * scale[at]
+                tile[lanes.Y1, i], tile[lanes.DY2, i] = (
+                    tile[lanes.Y1, i] + odd_part,
+                    tile[lanes.Y1, i] - odd_part,
+                )
+                bar += bars[lanes.DY2] * scale[at]
             a, b, c, d = (
                 nodes[LOW_ACROSS, at],
                 nodes[HIGH_ACROSS, at],
@@ -253,15 +252,32 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
             )
             low = turns[NEAR, a, c] + share[ACROSS, at] * (turns[NEAR, b, c] - turns[NEAR, a, c])
             high = turns[NEAR, a, d] + share[ACROSS, at] * (turns[NEAR, b, d] - turns[NEAR, a, d])
+            tile[TURNED, i], tile[Y1_SIZE, i] = low + share[ALONG, at] * (high - low), bar
+            tile[MIRRORED, i] = 1.0 if even and x[ALONG, at] < 0.0 else 0.0
+            tile[BEYOND, i] = 1.0 if c == d else 0.0
             y1_least, y1_most = turns[Y1_LEAST], turns[Y1_MOST]
             y2_least, y2_most = turns[Y2_LEAST], turns[Y2_MOST]
-            _count(
-                own, even and x[ALONG, at] < 0.0, full_period, low + share[ALONG, at] * (high - low), c == d,
-                min(min(y1_least[a, c], y1_least[b, c]), min(y1_least[a, d], y1_least[b, d])),
-                max(max(y1_most[a, c], y1_most[b, c]), max(y1_most[a, d], y1_most[b, d])),
-                min(min(y2_least[a, c], y2_least[b, c]), min(y2_least[a, d], y2_least[b, d])),
-                max(max(y2_most[a, c], y2_most[b, c]), max(y2_most[a, d], y2_most[b, d])),
-            )  # fmt: skip
+            tile[M_LOW, i] = min(
+                min(y1_least[a, c], y1_least[b, c]), min(y1_least[a, d], y1_least[b, d])
+            )
+            tile[M_HIGH, i] = max(
+                max(y1_most[a, c], y1_most[b, c]), max(y1_most[a, d], y1_most[b, d])
+            )
+            tile[D_LOW, i] = min(
+                min(y2_least[a, c], y2_least[b, c]), min(y2_least[a, d], y2_least[b, d])
+            )
+            tile[D_HIGH, i] = max(
+                max(y2_most[a, c], y2_most[b, c]), max(y2_most[a, d], y2_most[b, d])
+            )
+        _count(tile, full_period, count)
+        own = results[start : start + count]
+        for i in range(count):
+            for f in range(FACTOR_COUNT):
+                own[i, lanes.Y1 + f] = tile[f, i]
+            own[i, lanes.Y1_BAR], own[i, lanes.DY1_BAR] = tile[Y1_SIZE, i], bars[lanes.DY1]
+            own[i, lanes.Y2_BAR] = bars[lanes.Y2]
+            own[i, lanes.DY2_BAR] = tile[Y1_SIZE, i] if even else bars[lanes.DY2]
+            own[i, lanes.Y1_ZEROS], own[i, lanes.Y2_ZEROS] = tile[M_LOW, i], tile[D_LOW, i]
 
 
 @kernel
@@ -298,23 +314,31 @@ def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, ve
 
 
 @splice
-def _count(own, mirrored, full_period, near, beyond, m_low, m_high, d_low, d_high):
-    """Numbers of zeros, NaN where they are not known: between these of y1, and of y2, at nodes
-    around the point, or `beyond` the last. `near` is the rotation number between those of nodes.
+def _count(tile, full_period, count):
+    """Numbers of zeros of neighbouring points into rows M_LOW and D_LOW, NaN where they are not known:
+    at nodes around a point there are M_LOW to M_HIGH of y1, D_LOW to D_HIGH of y2, or it lies
+    BEYOND the last. `TURNED` is the rotation number between those of nodes.
 
-    A point -p, `mirrored`, has the rotation number of p, whose y1 is the y2' of -p.
+    A point -p, `MIRRORED`, has the rotation number of p, whose y1 is the y2' of -p.
     """
-    y1, m = own[lanes.DY2] if mirrored else own[lanes.Y1], 0.0
-    if not full_period:
-        m = _zeros(m_low, m_high, y1 < 0.0)
-    d = _zeros(d_low, d_high, own[lanes.Y2] < 0.0)
-    if beyond and not full_period:  # one of the two may have changed
-        if m != m:
-            m = _nearest(2.0 * near - 0.5 - d, y1 < 0.0)
-        elif d != d:
-            d = _nearest(2.0 * near - 0.5 - m, own[lanes.Y2] < 0.0)
-    known = abs(m + d + 0.5 - 2.0 * near) <= 1.0 and not (mirrored and abs(y1) <= own[lanes.Y1_BAR])
-    own[lanes.Y1_ZEROS], own[lanes.Y2_ZEROS] = (m, d) if known else (np.nan, np.nan)
+    for i in range(count):
+        mirrored, near = tile[MIRRORED, i] > 0.0, tile[TURNED, i]
+        y1, y2, dy2 = tile[lanes.Y1, i], tile[lanes.Y2, i], tile[lanes.DY2, i]
+        y1 = dy2 if mirrored else y1  # loaded before: vector code has no branches
+        m = 0.0 if full_period else _zeros(tile[M_LOW, i], tile[M_HIGH, i], y1 < 0.0)
+        d = _zeros(tile[D_LOW, i], tile[D_HIGH, i], y2 < 0.0)
+        # one of the two may have changed
+        loose = (tile[BEYOND, i] > 0.0) & (not full_period)
+        lost_m, lost_d = loose & (m != m), loose & (m == m) & (d != d)
+        other_m, other_d = (
+            _nearest(2.0 * near - 0.5 - d, y1 < 0.0),
+            _nearest(2.0 * near - 0.5 - m, y2 < 0.0),
+        )
+        m, d = other_m if lost_m else m, other_d if lost_d else d
+        known = (abs(m + d + 0.5 - 2.0 * near) <= 1.0) & (
+            (not mirrored) | (abs(y1) > tile[Y1_SIZE, i])
+        )
+        tile[M_LOW, i], tile[D_LOW, i] = m if known else np.nan, d if known else np.nan
 
 
 @splice
@@ -327,5 +351,6 @@ def _nearest(x, odd):
 @splice
 def _zeros(low, high, odd):
     """The number from `low` to `high`, which differ by 1 at most, that is odd or even; else NaN."""
-    value = low if (low - 2.0 * np.floor(0.5 * low) == 1.0) == odd else low + 1.0
-    return value if value <= high and high - low <= 1.0 else np.nan
+    is_odd = low - 2.0 * np.floor(0.5 * low) == 1.0
+    value = low if is_odd == odd else low + 1.0
+    return value if (value <= high) & (high - low <= 1.0) else np.nan

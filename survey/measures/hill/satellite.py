@@ -136,14 +136,20 @@ class Motion:
 
     def lyapunov_integral(self, rho, period):
         """T times the integral of z over T, and a bound of its rounding."""
-        k, period, rotates = self.k[:, None], period[:, None], self.rotates[:, None]
-        first, second = (values[:, None] for values in self.integrals)
-        squares = np.where(rotates, 2 * k * second, 4 * (second - self.kc[:, None] ** 2 * first))
-        # integral of w over T, times rho: am advances by pi
-        drift = np.where(rotates, pi * rho, 0.0)
-        c = -k * k if self.oblate else (1 - k) * (1 + k)
-        size = period * (2 * squares + 2 * abs(drift) + (rho * rho + k * k + 1) * period)
-        return period * (2 * squares + 2 * drift + (rho * rho + c) * period), 100 * EPS * size
+        first, second = self.integrals
+        k, c = self.k, -(self.k**2) if self.oblate else (1 - self.k) * (1 + self.k)
+        squares = np.where(self.rotates, 2 * k * second, 4 * (second - self.kc**2 * first))
+        # a row's part, its rounding, and what rho^2 is multiplied by
+        still, sizes = (
+            period * (2 * squares + c * period),
+            period * (2 * squares + (k**2 + 1) * period),
+        )
+        grows = (period**2)[:, None] * (rho * rho)
+        total, size = still[:, None] + grows, sizes[:, None] + grows
+        if self.rotates.any():  # integral of w over T, times rho: am advances by pi
+            drift = np.where(self.rotates, 2 * pi * period, 0.0)[:, None] * rho
+            total, size = total + drift, size + abs(drift)
+        return total, 100 * EPS * size
 
     def range_of_z(self, rho):
         """The least and the greatest z along the motion, and a bound of their rounding."""
