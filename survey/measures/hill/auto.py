@@ -47,8 +47,10 @@ def solve(problem, asked, answers):
         results = closed_form(z[np.isfinite(z)], problem.span[points // problem.p.shape[1]])
         own.assess(results, None if problem.rule is None else problem.rule.reshape(-1)[points])
         answers.replace(points, own)
-    ours = (answers.status == status.OK) & (True if free is None else ~free)
-    left = ours & (answers.verdict == UNDECIDED) & asked.decides
+    ours = answers.status == status.OK
+    if free is not None:
+        ours &= ~free
+    left = ours & (answers.verdict == UNDECIDED) if asked.decides else np.zeros_like(ours)
     if problem.exact is not None:
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
         if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:

@@ -287,6 +287,8 @@ def _axis(line, symmetric):
 
 def _rows(problem, method, asked, answers, chosen, axis, open_points):
     """Answer the points of the `chosen` rows, each by a series of its own."""
+    if not chosen.size:
+        return
     sought = _sought(asked)
     degree = np.full(problem.span.size, DEGREES.size)
     degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]

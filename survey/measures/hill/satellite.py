@@ -132,7 +132,8 @@ class Motion:
         rounding aside?
         """
         total, bar = self.lyapunov_integral(rho, period)
-        return (total <= 4 - bar) & (self._nonnegative(rho) if self.oblate else True)
+        certain = total <= 4 - bar
+        return certain & self._nonnegative(rho) if self.oblate else certain
 
     def lyapunov_integral(self, rho, period):
         """T times the integral of z over T, and a bound of its rounding."""
