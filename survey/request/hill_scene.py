@@ -142,7 +142,8 @@ class HillScene(FunctionScene):
         out = self._called(
             monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables
         )
-        return self._labelled(out, rough, np.full(len(points), self._ranges(points[:1])[0][0]))
+        period = np.full(len(points), self._ranges(points[:1])[0][0])
+        return self._labelled(out, rough, period, request.variables)
 
     def _box_axes(self, point, request):
         """The parameters on the axes of a box that holds points on their own, two of which alone
@@ -189,7 +190,8 @@ class HillScene(FunctionScene):
         for i, name in enumerate(names):
             points[:, i] = axes.line[1] if i == axes.lane else block.per_row(point[name])
         out = {}
-        for rows in self._families(points, axes):
+        families = self._families(points, axes)
+        for rows in families:
             problem, rough = self._called(
                 user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
                 self._more_digits,
@@ -201,6 +203,9 @@ class HillScene(FunctionScene):
                 alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)
                 for name, values in self._solve_points(alone, request).items():
                     found[name][bad] = values.reshape(bad.size, -1)
+            if len(families) == 1:  # all rows, as a rule
+                out = found
+                break
             for name, values in found.items():
                 out.setdefault(name, np.empty(lanes.shape, values.dtype))[rows] = values
         return {name: block.back(values) for name, values in out.items()}
@@ -219,15 +224,14 @@ class HillScene(FunctionScene):
         out = self._called(
             monodromy.solve, problem, request.method, request.rtol, request.variables
         )
-        return self._labelled(out, rough, period)
+        return self._labelled(out, rough, period, request.variables)
 
-    def _labelled(self, out, rough, period):
-        """The outputs with the period, and the status of points whose z is rough."""
-        out["status"] = np.where(rough[:, None], status.NO_CONVERGENCE, out["status"]).astype(
-            np.int8
-        )
-        out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
-        out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
+    def _labelled(self, out, rough, period, wanted):
+        """The outputs with the period, if it is wanted, and the status of points whose z is rough."""
+        out["status"][rough] = status.NO_CONVERGENCE
+        if "period" in wanted:
+            out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
+            out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
         return out
 
     def _axes(self, point, request):

@@ -55,7 +55,7 @@ ROWS_PER_NODE = 3
 # Of the requested accuracy, for D at the nodes of a row, whose bars the Lebesgue constant multiplies by
 # 4. Those of a map are solved in steps for BEST, which leave rounding alone, as a rule 1e-13 or so; and in
 # more only where they miss ENOUGH, or MAP_SHARE of what is requested.
-NODES_SHARE, MAP_SHARE, ENOUGH, BEST = 0.1, 0.01, 1e-12, 1e-14
+NODES_SHARE, MAP_SHARE, ENOUGH, BEST = 0.1, 0.05, 5e-12, 1e-14
 # Of it, for the degree of factors where z is quadratic in p: their coefficients exceed what
 # `_enough` looks at by 10^7 or so, on every row that was measured.
 FACTORS_SHARE = 1e-6
