@@ -112,6 +112,23 @@ def test_verdict_is_undecided_where_the_bar_holds_both_answers():
     assert list(answers.verdict) == [monodromy.UNDECIDED, monodromy.STABLE] and answers.missed.all()
 
 
+def test_rotation_numbers_beside_a_closed_gap():
+    """q = 0: the rotation number is sqrt(a) / 2; where a = n^2, y1' and y2 vanish together, so that
+    the bar of the larger product, cos^2, must not be divided by the small sine.
+    """
+    off = 10.0 ** -np.arange(3, 9)
+    a = (5 + np.concatenate([-off, off])) ** 2
+    out = solve([a], [0.0], rtol=1e-13)
+    with mp.workdps(30):
+        error = [
+            float(abs(mpf(float(x)) - mp.sqrt(mpf(float(b))) / 2))
+            for x, b in zip(out["rotation_number"][0], a, strict=True)
+        ]
+    assert list(out["verdict"][0]) == [monodromy.STABLE] * a.size
+    assert (error <= out["rotation_number_error"][0]).all()
+    assert out["rotation_number_error"].max() < 1e-13
+
+
 def test_failures_are_values():
     out = solve([[2.0, np.nan, -1e7, 1e13]], [1.0])
     assert list(out["status"][0]) == [
