@@ -419,7 +419,7 @@ def abel(harness):
                        p[4] * ca - p[5] * sa, p[4] * sa + p[5] * ca])  # fmt: skip
     states = np.stack([start[0] - turn, start[1]])
     order = np.argsort(abs(turned).sum(0) + abs(start[1]))
-    fast, exact = Batch(equations, 5, 1e-12), Batch(equations, 5, 1e-17)
+    fast, exact = Batch(equations, 5, 3e-13), Batch(equations, 5, 1e-17)
     given = {
         name: xr.DataArray(values, dims="p")
         for name, values in zip((*NAMES, "phi0", "w0"), (*p, *start), strict=True)

@@ -1,6 +1,7 @@
 """Solving one block of a grid: the variables that are stored, in their types."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 
@@ -17,12 +18,24 @@ QUICK_SECONDS, QUICK_BYTES = 0.05, 2**23  # what takes no more is done before th
 
 def solve_block(scene, request, grid, block):
     """The variables of `layout` in one block of the grid."""
+    _keep_freed_memory()
     return solve_point(
         scene,
         replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges),
         grid.point(block),
         _shape(grid, block),
     )
+
+
+@cache
+def _keep_freed_memory():
+    """Have glibc keep what a call frees for the next one: it raises its thresholds to the size of the
+    largest array that was ever freed.
+
+    Measured: beside another library a third of the time of 60,000 points of Brun's problem went into fetching
+    10 MB from the system again and again.
+    """
+    np.empty(31 << 20, np.uint8)
 
 
 def _shape(grid, block):
