@@ -75,7 +75,8 @@ def find(solve, rows, low, high, panels=4):
     complete = np.zeros(rows, np.bool_)
     for attempt in range(HALVINGS):
         edges = _close_in(solve, *_candidates(solve, left, low, high, panels << attempt), low, high)
-        sound = _complete(solve, left, edges, low, high)
+        sound, index = _complete(solve, left, edges, low, high)
+        edges = *edges, index
         last = attempt == HALVINGS - 1
         done = left if last else left[sound]
         complete[left[sound]] = True
@@ -175,7 +176,9 @@ def _zeros(series):
 
 
 def _close_in(solve, row, kind, x, radius, low, high):
-    """(row, position, error, kind, index) of the zeros that change sign and lie on the axis, each once."""
+    """(row, position, error, kind) of the zeros that change sign and lie on the axis, each once, by
+    row and position.
+    """
 
     def function(which, x):
         return of_kind(on_rows(solve, row[which], x, FACTORS), kind[which])
@@ -191,9 +194,8 @@ def _close_in(solve, row, kind, x, radius, low, high):
     same = (np.diff(row) == 0) & (np.diff(kind) == 0) & (np.diff(x) <= width[1:] + width[:-1])
     keep = np.concatenate([[True], ~same]) if x.size else np.zeros(0, bool)
     row, kind, x, width = (values[keep] for values in (row, kind, x, width))
-    sides = x[:, None] + ASIDE * width[:, None] * np.array([-1.0, 1.0])
-    index = tongue(on_rows(solve, row, sides, COUNTS), kind) if x.size else np.zeros(0, int)
-    return row, x, width, kind, index
+    order = np.lexsort((x, row))
+    return tuple(values[order] for values in (row, x, width, kind))
 
 
 def on_rows(solve, row, x, wanted):
@@ -264,10 +266,9 @@ def close_in(function, x, width, grain, widest=np.inf):
 
 def _complete(solve, rows, edges, low, high):
     """Which rows are complete: the factors' signs and the rotation number are as listed, at the
-    ends and between.
+    ends and between. And the numbers of the tongues of the edges, from the bands beside them.
     """
-    order = np.lexsort((edges[1], edges[0]))
-    row, x, width, kind, index = (values[order] for values in edges)
+    row, x, width, kind = edges
     row_at = np.searchsorted(rows, row)
     number = np.bincount(row_at, minlength=rows.size)
     own = np.arange(row.size) - np.searchsorted(row, row)
@@ -298,15 +299,28 @@ def _complete(solve, rows, edges, low, high):
     sound &= ((straight >= 0).all(axis=2) | (straight <= 0).all(axis=2)).all(axis=0)
     # every edge lies between its tongue n and a band beside it, at the ends of the row too
     band = np.where(known, _band(out), np.nan)
-    before, after = (abs(band[row_at, own + side] - index) for side in (1, 2))
-    wrong = (before > 0.5) | (after > 0.5) | (before == after)
+    before, after = (band[row_at, own + side] for side in (1, 2))
+    of_before, of_after = _beside(before, kind), _beside(after, kind)
+    index = np.where(np.isnan(before), of_after, of_before)
+    unknown = np.flatnonzero(np.isnan(before) & np.isnan(after))
+    if unknown.size:
+        sides = x[unknown, None] + ASIDE * width[unknown, None] * np.array([-1.0, 1.0])
+        index[unknown] = tongue(on_rows(solve, row[unknown], sides, COUNTS), kind[unknown])
+    wrong = (before == after) | np.isnan(index) | (abs(of_before - of_after) > 0)
     sound[row_at[wrong]] = False
     each = np.arange(rows.size)
-    return (
-        sound
-        & ~(abs(band[:, 0] - band[:, 1]) > 0)
-        & ~(abs(band[each, last] - band[each, last - 1]) > 0)
-    )
+    sound &= ~(abs(band[:, 0] - band[:, 1]) > 0)
+    sound &= ~(abs(band[each, last] - band[each, last - 1]) > 0)
+    return sound, np.nan_to_num(index).astype(int)
+
+
+def _beside(band, kind):
+    """The number of the tongue, odd where antiperiodic, that an edge of a band or gap bounds (see
+    `_band`); NaN where there is none, or the band is not known.
+    """
+    low, odd = np.floor(band), (kind < 2).astype(float)
+    fits = low % 2 == odd
+    return np.where(band == low, np.where(fits, low, np.nan), np.where(fits, low, low + 1))
 
 
 def _band(out):

@@ -102,11 +102,16 @@ def test_the_rotation_number_counts_the_edges_of_random_rows(
 def test_a_list_that_lacks_an_edge_is_not_complete():
     solve = solver(satellite, "k", [0.5], "rho", body="oblate")
     edges = hill_edges.find(solve, 1, 0.3, 3.2)
-    whole = [edges.row, edges.position, edges.error, edges.kind, edges.index]
-    assert hill_edges._complete(solve, np.array([0]), whole, 0.3, 3.2).all()
+    whole = [edges.row, edges.position, edges.error, edges.kind]
+
+    def complete(edges):
+        return hill_edges._complete(solve, np.array([0]), edges, 0.3, 3.2)
+
+    sound, index = complete(whole)
+    assert sound.all()
+    np.testing.assert_array_equal(index, edges.index)
     n = edges.index == 2
     for left_out in (np.flatnonzero(n)[:1], np.flatnonzero(n)):  # one edge, a whole tongue
-        fewer = [np.delete(values, left_out) for values in whole]
-        assert not hill_edges._complete(solve, np.array([0]), fewer, 0.3, 3.2).any()
-    wrong = [*whole[:4], whole[4] + 2 * n]
-    assert not hill_edges._complete(solve, np.array([0]), wrong, 0.3, 3.2).any()
+        assert not complete([np.delete(values, left_out) for values in whole])[0].any()
+    wrong = np.where(n, (edges.kind + 2) % 4, edges.kind)  # odd and even tongues
+    assert not complete([*whole[:3], wrong])[0].any()
