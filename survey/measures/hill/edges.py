@@ -100,12 +100,14 @@ def joined(parts):
 
 
 def _candidates(solve, rows, low, high, panels):
-    """(row, kind, position) of the zeros of the factors' series, and the radius of their panels."""
+    """(row, kind, position) of the zeros of the factors' series, the radius of their panels, and the
+    slopes there, NaN where none is known.
+    """
     ends = np.linspace(low, high, panels + 1)
     row = np.repeat(rows, panels)
     left, right = np.tile(ends[:-1], rows.size), np.tile(ends[1:], rows.size)
     x, matrix = nodes(NODES), to_coefficients(cosines(NODES))
-    found = [(np.zeros(0, int), np.zeros(0, int), np.zeros(0), np.zeros(0))]
+    found = [(np.zeros(0, int), np.zeros(0, int), *np.zeros((3, 0)))]
     for depth in range(DEEPEST):
         middle, radius = 0.5 * (left + right), 0.5 * (right - left)
         out = solve(row, middle[:, None] + radius[:, None] * x, FACTORS)
@@ -117,9 +119,10 @@ def _candidates(solve, rows, low, high, panels):
             rough &= np.bincount(row[rough], minlength=row.max() + 1)[row] <= FEW
         known = np.isfinite(size).all(axis=0) & ~rough
         kind, panel = np.nonzero((size > noise) & known)
-        which, zeros = _all_zeros(series[kind, panel])
+        which, zeros, slope = _all_zeros(series[kind, panel])
         kind, panel = kind[which], panel[which]
-        found.append((row[panel], kind, middle[panel] + radius[panel] * zeros, radius[panel]))
+        own = radius[panel]
+        found.append((row[panel], kind, middle[panel] + own * zeros, own, slope / own))
         row = np.repeat(row[rough], 2)
         left, right = _halves(left[rough], middle[rough]), _halves(middle[rough], right[rough])
         if not row.size:
@@ -132,7 +135,7 @@ def _halves(one, other):
 
 
 def _all_zeros(series, cells=CELLS):
-    """(which series, zero) of all real zeros in [-1, 1] of the series (n, NODES).
+    """(which series, zero, slope there) of all real zeros in [-1, 1] of the series (n, NODES).
 
     In theta = arccos x a series is seen to have no zero in a cell, or to be monotonic there, from
     its value and slope in the middle and a bound of its second derivative; where that leaves a cell
@@ -155,15 +158,14 @@ def _all_zeros(series, cells=CELLS):
         x = np.cos(theta)
         value, slope = (chebyshev.chebval(x, of, tensor=False) for of in (own, derivative))
         theta = np.clip(theta + value / (slope * np.sin(theta)), edges[cell], edges[cell + 1])
-    found, left = [(which, np.cos(theta))], np.flatnonzero(~clear)
+    found, left = [(which, np.cos(theta), slope)], np.flatnonzero(~clear)
     if finer:
-        own, zeros = _all_zeros(series[left], finer)
-        found.append((left[own], zeros))
+        own, *others = _all_zeros(series[left], finer)
+        found.append((left[own], *others))
     for i in left if not finer else ():
         zeros = _zeros(series[i])
-        found.append((np.full(zeros.size, i), zeros))
-    which, zeros = (np.concatenate(values) for values in zip(*found, strict=True))
-    return which, zeros
+        found.append((np.full(zeros.size, i), zeros, np.full(zeros.size, np.nan)))
+    return tuple(np.concatenate(values) for values in zip(*found, strict=True))
 
 
 def _zeros(series):
@@ -175,7 +177,7 @@ def _zeros(series):
     return zeros.real[(abs(zeros.imag) < 1e-6) & (abs(zeros.real) <= 1 + 1e-9)]
 
 
-def _close_in(solve, row, kind, x, radius, low, high):
+def _close_in(solve, row, kind, x, radius, slope, low, high):
     """(row, position, error, kind) of the zeros that change sign and lie on the axis, each once, by
     row and position.
     """
@@ -183,9 +185,16 @@ def _close_in(solve, row, kind, x, radius, low, high):
     def function(which, x):
         return of_kind(on_rows(solve, row[which], x, FACTORS), kind[which])
 
-    scale = max(abs(low), abs(high))
+    if not x.size:
+        return row, x, radius, kind
+    grain = 4 * np.spacing(abs(x))
+    width = np.minimum(1e-9 * max(abs(low), abs(high)), 1e-4 * radius)
+    f, bar = (values[:, 0] for values in function(np.arange(x.size), x[:, None]))
+    with np.errstate(all="ignore"):  # Newton's step by the series' slope
+        step, sharp = -f / slope, 3 * bar / abs(slope) + 2 * grain
+    near = (abs(step) < width) & (sharp < width)
     x, width, sure = close_in(
-        function, x, np.minimum(1e-9 * scale, 1e-4 * radius), 4 * np.spacing(abs(x))
+        function, np.where(near, x + step, x), np.where(near, sharp, width), grain
     )
     inside = sure & (x >= low) & (x <= high)
     row, kind, x, width = (values[inside] for values in (row, kind, x, width))
