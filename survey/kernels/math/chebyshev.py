@@ -132,9 +132,18 @@ def combined(values, matrix):
     the others.
     """
     out = np.zeros((len(values), matrix.shape[1]))
-    for i, weights in enumerate(matrix):
-        out += values[:, i, None] * weights
+    _combine(np.ascontiguousarray(values), np.ascontiguousarray(matrix), out)
     return out
+
+
+@kernel
+def _combine(values, matrix, out):
+    for r in range(len(values)):
+        row = out[r]
+        for i in range(len(matrix)):
+            weight, terms = values[r, i], matrix[i]
+            for k in range(len(row)):
+                row[k] += weight * terms[k]
 
 
 def expand(values, matrix, ulps):
@@ -149,9 +158,7 @@ def transform(rows, matrix, ulps):
     """Coefficients (n, m) along the first axis of `rows`, values at nodes, by `matrix` (n, n;
     [from, to]), and the `_doubt` (a number) of their sums over the columns.
     """
-    series = np.zeros_like(rows)
-    for row, weights in zip(rows, matrix, strict=True):
-        series += weights[:, None] * row
+    series = combined(matrix.T, rows)
     return series, float(_doubt(np.abs(series).sum(axis=1)[None], ulps)[0])
 
 

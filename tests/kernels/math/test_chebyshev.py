@@ -37,3 +37,15 @@ def test_the_tail_holds_what_a_series_leaves_out():
         sizes = rate ** np.arange(200.0)
         for n in (8, 16, 32):
             assert chebyshev.tail(sizes[:n]) >= sizes[n:].sum()
+
+
+@pytest.mark.parametrize("rows", [1, 7])
+def test_sums_of_rows_are_in_the_order_of_their_terms(rows):
+    """The bits of a row depend on no other row, nor on how many there are."""
+    rng = np.random.default_rng(5)
+    values, matrix = rng.normal(size=(rows, 13)), rng.normal(size=(13, 10)).T.copy().T
+    wanted = np.zeros((rows, 10))
+    for i in range(13):
+        wanted += values[:, i, None] * matrix[i]
+    np.testing.assert_array_equal(chebyshev.combined(values, matrix), wanted)
+    np.testing.assert_array_equal(chebyshev.combined(values[:1], matrix), wanted[:1])
