@@ -536,7 +536,7 @@ def test_a_proof_is_carried_and_another_maps_is_refused(tmp_path):
         [*program, "model", "m.toml", "-o", "m.model", "--proof", "p.nc"], cwd=tmp_path, check=True
     )
     model = survey.Model(tmp_path / "m.model")
-    assert "Stable: |D| < 2" in model.about["proof"]["statement"]
+    assert "Stable: all solutions are bounded" in model.about["proof"]["statement"]
     assert model(a=1.0, q=0.1).attrs["proof"] == model.about["proof"]["statement"]
     low, high = model.about["proof"]["areas"]["stable"]
     assert 0 < low < high < 4
