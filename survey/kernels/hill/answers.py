@@ -239,14 +239,14 @@ def exponents(first, count, rtol, floats, verdict, missed):
 
 @inline
 def _of_half(tile, i):
-    """The `_squares` of a point in a tile, all loaded before one is chosen: as vector code asks for."""
+    """The `_squares` of a point in a tile, all of them: a loop that loads what it has chosen is no vector code."""
     return tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i]
 
 
 @splice
 def _half_angles(results, squares, first, full_period, tile):
-    """`_squares` of neighbouring points into the first rows of `tile`; `first` of them is the first
-    in `squares`.
+    """`_squares` of neighbouring points into the first rows of `tile`; those in `squares` begin at
+    row `first`.
     """
     if full_period or len(squares) > 0:
         for i in range(len(results)):
@@ -380,8 +380,8 @@ def _keep(tile, rtol, values, bars, missed, left_out):
 
 @inline
 def _move(growth, bar):
-    """How far 2 asinh sqrt(growth) moves within the bar, at most: a difference of roots, by the slope
-    of the rest at its lower end.
+    """How far 2 asinh sqrt(growth) moves within the bar, at most: its slope is 1 / sqrt(growth (1 + growth)),
+    of which the second factor counts as it is at the lower end.
     """
     x, low, high = max(growth, 0.0), max(growth - bar, 0.0), max(growth + bar, 0.0)
     root = sqrt(x)
@@ -447,7 +447,7 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
 @inline
 def _spread(sine, sine_bar, cosine, cosine_bar):
     """How far atan sqrt(sine / cosine) moves within the bars: by its steepest slopes there, at most
-    by all of it, or of what it lacks to pi/2.
+    by all of it, or by all that it lacks to pi/2.
 
     Next to an edge one of the two is small, and the bar of the other counts for as little.
     """
