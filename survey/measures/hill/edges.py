@@ -310,17 +310,18 @@ def _complete(solve, rows, edges, low, high):
     band = np.where(known, _band(out), np.nan)
     before, after = (band[row_at, own + side] for side in (1, 2))
     of_before, of_after = _beside(before, kind), _beside(after, kind)
-    index = np.where(np.isnan(before), of_after, of_before)
-    unknown = np.flatnonzero(np.isnan(before) & np.isnan(after))
+    wrong = (before == after) | (abs(of_before - of_after) > 0)
+    wrong |= (np.isnan(of_before) != np.isnan(before)) | (np.isnan(of_after) != np.isnan(after))
+    index = np.where(np.isnan(of_before), of_after, of_before)
+    unknown = np.flatnonzero(np.isnan(index))
     if unknown.size:
         sides = x[unknown, None] + ASIDE * width[unknown, None] * np.array([-1.0, 1.0])
         index[unknown] = tongue(on_rows(solve, row[unknown], sides, COUNTS), kind[unknown])
-    wrong = (before == after) | np.isnan(index) | (abs(of_before - of_after) > 0)
     sound[row_at[wrong]] = False
     each = np.arange(rows.size)
     sound &= ~(abs(band[:, 0] - band[:, 1]) > 0)
     sound &= ~(abs(band[each, last] - band[each, last - 1]) > 0)
-    return sound, np.nan_to_num(index).astype(int)
+    return sound, index.astype(int)
 
 
 def _beside(band, kind):
