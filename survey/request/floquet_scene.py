@@ -113,7 +113,7 @@ class FloquetScene(TracedScene):
         """Seconds that the curves of a map take, roughly: a lattice, and points of curves, most of
         them in narrow tongues, which damped systems do not have; measured on the examples in
         `workflows`."""
-        return 1e4 * self._alone + 0.03 * len(self.states) ** 3 * (
+        return 2.5e4 * self._alone + 0.03 * len(self.states) ** 3 * (
             1.0 if self.structure == "none" else 7.0
         )
 
@@ -123,10 +123,10 @@ class FloquetScene(TracedScene):
         n = len(self.states)
         further = max(self._known.get("series", 2.0) - 2.0, 0.0)  # besides 1 and a function of time
         return (
-            2e-5
-            + further * (6e-6 + 9e-7 * self._known.get("steps", 6.0))
-            + 1e-6 * n**2
-            + 1e-7 * n**3
+            6e-6
+            + further * (3.6e-6 + 5.4e-7 * self._known.get("steps", 6.0))
+            + 4e-7 * n**2
+            + 6e-8 * n**3
         )
 
     def solve(self, point, request):
