@@ -146,31 +146,26 @@ def measure(
         )
         _half_angles(own, squares, start, full_period, tile)
         for i in range(count):
-            decided[i] = decide(*_of_half(tile, i))
-        if len(rule) > 0:
-            for i in range(count):
-                of = rule[begin + i]
-                decided[i] = MARGINAL if of == ON_EDGE else decided[i]
-                decided[i] = (
-                    STABLE if of == NO_UNSTABLE_SIDE and decided[i] == UNDECIDED else decided[i]
-                )
-        for i in range(count):
-            # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
             sine, sine_bar, cosine, cosine_bar = _of_half(tile, i)
+            says = decide(sine, sine_bar, cosine, cosine_bar)
+            if len(rule) > 0:
+                of = rule[begin + i]
+                says = STABLE if of == NO_UNSTABLE_SIDE and says == UNDECIDED else says
+                says = MARGINAL if of == ON_EDGE else says
+            # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
             by_sine = sine_bar <= cosine_bar
             d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
             bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
-            on_edge = decided[i] == MARGINAL and abs(d) > bar  # where |D| = 2
-            tile[VALUE, i] = (2.0 if d > 0.0 else -2.0) if on_edge else d
-            tile[DOUBT, i] = 0.0 if on_edge else bar
-        for i in range(count):
-            within = abs(tile[VALUE, i]) < np.inf and tile[DOUBT, i] < LARGEST
+            if says == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
+                d, bar = 2.0 if d > 0.0 else -2.0, 0.0
+            tile[VALUE, i], tile[DOUBT, i] = d, bar
+            within = abs(d) < np.inf and bar < LARGEST
             for c in range(4):
                 within &= own[i, lanes.Y1_BAR + c] < LARGEST
-            left_out[i] = overflow if left_out[i] == 0 and not within else left_out[i]
-        for i in range(count):
-            decided[i] = decided[i] if left_out[i] == 0 else UNDECIDED
-            misses[i] = decides and left_out[i] == 0 and decided[i] == UNDECIDED
+            if left_out[i] == 0 and not within:
+                left_out[i] = overflow
+            decided[i] = says if left_out[i] == 0 else UNDECIDED
+            misses[i] = decides and left_out[i] == 0 and says == UNDECIDED
         if wanted[0]:
             _keep(tile, rtol, floats[DISCRIMINANT, begin:end], floats[DISCRIMINANT + 1, begin:end],
                   misses, left_out)  # fmt: skip
@@ -243,7 +238,7 @@ def _of_half(tile, i):
     return tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i]
 
 
-@splice
+@kernel
 def _half_angles(results, squares, first, full_period, tile):
     """`_squares` of neighbouring points into the first rows of `tile`; those in `squares` begin at
     row `first`.
@@ -346,7 +341,7 @@ def decide(sine, sine_bar, cosine, cosine_bar):
     return UNSTABLE if unstable else STABLE if stable else UNDECIDED
 
 
-@splice
+@kernel
 def _growths(tile, rtol, values, bars, verdict, missed, left_out):
     """The exponents 2 asinh sqrt(growth) of neighbouring points, -sin^2 or -cos^2 of half the angle in
     row VALUE of `tile`, its bar in row DOUBT; their bars, and who misses. Not of who is `left_out`.
@@ -365,7 +360,7 @@ def _growths(tile, rtol, values, bars, verdict, missed, left_out):
     _keep(tile, rtol, values, bars, missed, left_out)
 
 
-@splice
+@kernel
 def _keep(tile, rtol, values, bars, missed, left_out):
     """Keep the numbers in row VALUE of `tile` and their bars in row DOUBT, NaN of who is `left_out`;
     and who misses.
