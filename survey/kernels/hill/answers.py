@@ -250,13 +250,21 @@ def _half_angles(results, squares, first, full_period, tile):
                 tile[row, i] = found[row]
         return
     for i in range(len(results)):
-        own = results[i]
-        tile[SINE, i], tile[SINE_BAR, i] = _product(
-            -own[lanes.DY1], own[lanes.Y2], own[lanes.DY1_BAR], own[lanes.Y2_BAR]
-        )
-        tile[COSINE, i], tile[COSINE_BAR, i] = _product(
-            own[lanes.Y1], own[lanes.DY2], own[lanes.Y1_BAR], own[lanes.DY2_BAR]
-        )
+        found = _of_factors(results[i])
+        for row in range(SQUARES):
+            tile[row, i] = found[row]
+
+
+@inline
+def _of_factors(result):
+    """-y1' y2 and y1 y2', each with its bar."""
+    sine = _product(
+        -result[lanes.DY1], result[lanes.Y2], result[lanes.DY1_BAR], result[lanes.Y2_BAR]
+    )
+    cosine = _product(
+        result[lanes.Y1], result[lanes.DY2], result[lanes.Y1_BAR], result[lanes.DY2_BAR]
+    )
+    return sine[0], sine[1], cosine[0], cosine[1]
 
 
 @splice
@@ -268,13 +276,11 @@ def _squares(result, squares, i, full_period):
     the smaller one from their product, and the zeros of y2 in (0, T) give the band (that solution's
     angle advances from 0 to between d pi and (d + 1) pi).
     """
-    y1, dy1, y2, dy2 = result[lanes.Y1], result[lanes.DY1], result[lanes.Y2], result[lanes.DY2]
-    y1_bar, dy2_bar = result[lanes.Y1_BAR], result[lanes.DY2_BAR]
-    sine, sine_bar = _product(-dy1, y2, result[lanes.DY1_BAR], result[lanes.Y2_BAR])
-    cosine, cosine_bar = _product(y1, dy2, y1_bar, dy2_bar)
+    sine, sine_bar, cosine, cosine_bar = _of_factors(result)
     if full_period:
+        y1, dy2 = result[lanes.Y1], result[lanes.DY2]
         trace, size = y1 + dy2, abs(y1) + abs(dy2) + 2.0
-        bar = 0.25 * (y1_bar + dy2_bar + 2.0 * EPS * size)
+        bar = 0.25 * (result[lanes.Y1_BAR] + result[lanes.DY2_BAR] + 2.0 * EPS * size)
         sine, cosine, sine_bar, cosine_bar = 0.25 * (2.0 - trace), 0.25 * (2.0 + trace), bar, bar
     if len(squares) > 0:
         sine, sine_bar = squares[i, SINE], squares[i, SINE_BAR]
@@ -393,7 +399,7 @@ def _lost(results, full_period, verdict, tile):
     """
     for i in range(len(results)):
         own = results[i]
-        zeros, doubt = own[lanes.Y1_ZEROS] + own[lanes.Y2_ZEROS], 0.0
+        zeros = own[lanes.Y1_ZEROS] + own[lanes.Y2_ZEROS]
         lost_1, lost_2 = (
             abs(own[lanes.Y1]) <= own[lanes.Y1_BAR],
             abs(own[lanes.Y2]) <= own[lanes.Y2_BAR],

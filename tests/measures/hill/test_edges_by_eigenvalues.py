@@ -115,3 +115,11 @@ def test_a_list_that_lacks_an_edge_is_not_complete():
         assert not complete([np.delete(values, left_out) for values in whole])[0].any()
     wrong = np.where(n, (edges.kind + 2) % 4, edges.kind)  # odd and even tongues
     assert not complete([*whole[:3], wrong])[0].any()
+
+
+def test_a_band_of_the_wrong_parity_has_no_tongue_with_such_an_edge():
+    """Antiperiodic edges bound odd tongues: those of the gap 3, or beside the bands 2.5 and 3.5."""
+    band = np.array([2.0, 2.5, 3.0, 3.5, np.nan])
+    odd, even = (hill_edges._beside(band, np.full(5, kind)) for kind in (0, 2))
+    np.testing.assert_array_equal(odd, [np.nan, 3, 3, 3, np.nan])
+    np.testing.assert_array_equal(even, [2, 2, np.nan, 4, np.nan])
