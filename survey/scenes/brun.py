@@ -213,7 +213,7 @@ def compile_ahead(variables, options):
     """Compile some of the kernels that periods need (see `survey.scenes`)."""
     if "motion" not in options:
         brun_lanes.compile_others()
-        yield
+        yield "lanes"
     if "sign" in options:
         nutation.of_integrals(np.empty((0, rc.INTEGRALS)), 1)
     else:

@@ -22,6 +22,7 @@ from survey.measures.cylinder import destinations, ends, solution
 from survey.measures.cylinder.fate import (
     EXACT,
     I0,
+    KINDS,
     MOST_OF_PROGRAM,
     NO_ENDS,
     G,
@@ -99,6 +100,8 @@ def solve(method, systems, rtol, beside=None):
             result["verdict"][i], result["status"][i] = DEGENERATE, UNKNOWN_CYCLES
             continue
         s = remembered(method, six)
+        for kind in KINDS:  # branches end in them; at a first use fates are compiled meanwhile
+            s.cycles(kind)
         end, limit = destinations.table(method, s, rtol)
         result["branch_end"][i, : len(end)], result["branch_limit"][i, : len(end)] = end, limit
         neutral = _changes(s.p, beside(i)) if own else s.K == 0.0 and not _is_exact(s.p)

@@ -55,7 +55,7 @@ def in_lanes(kernel, points, actions):
     out, wells, done = np.empty((OUTPUTS, n)), np.empty(n), np.empty(n)
     if waiting.other_compiler:
         brun_lanes.compile_some(kernel)
-        waiting.wait()
+        waiting.wait("lanes")
     kernel(points, actions, out, wells, done)
     return out, wells, done == brun_lanes.DONE
 
