@@ -22,7 +22,7 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import platformdirs
-from numba.core import event, imputils
+from numba.core import event, imputils, types
 from numba.extending import intrinsic, overload
 
 COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
@@ -177,22 +177,38 @@ def kernel(function):
     float64 arrays.
     """
     if _DIRECTORY is None:
-        return numba.njit(**_FLAGS)(function)
+        return _compiled(function)
     previous, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(_DIRECTORY)
     try:
-        return numba.njit(cache=True, **_FLAGS)(function)
+        return _compiled(function, cache=True)
     finally:
         numba.config.CACHE_DIR = previous
 
 
 def fresh(function):
     """Compile `function`, which calls a user's, again in each process: kept on disk it could go stale."""
-    return numba.njit(**_FLAGS)(function)
+    return _compiled(function)
 
 
 def inline(function):
     """Compile `function` as part of the kernels that call it (always inlined by LLVM, never cached alone)."""
-    return numba.njit(forceinline=True, **_FLAGS)(function)
+    return _compiled(function, forceinline=True)
+
+
+def _compiled(function, **flags):
+    """numba.njit, but for kernels that call it with different constants compiled once, not for each of
+    them: that took up to a sixth of the compiler's time.
+    """
+    dispatcher = numba.njit(**flags, **_FLAGS)(function)
+    if not numba.config.DISABLE_JIT:
+        resolve = dispatcher.get_call_template
+
+        def get_call_template(args, kws):
+            args, kws = map(types.unliteral, args), kws.items()
+            return resolve(tuple(args), {key: types.unliteral(kind) for key, kind in kws})
+
+        dispatcher.get_call_template = get_call_template
+    return dispatcher
 
 
 def splice(function):
