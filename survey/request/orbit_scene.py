@@ -10,7 +10,7 @@ import numpy as np
 
 from survey.errors import BadInput
 from survey.measures.floquet import curves, family, orbit, orbit_curves, orbit_motion
-from survey.measures.floquet.compile_ahead import compile_ahead
+from survey.measures.floquet.compile_ahead import of_orbits
 from survey.measures.floquet.continuation import Range
 from survey.measures.floquet.equation import Equation
 from survey.measures.floquet.symmetry import Symmetry
@@ -48,7 +48,7 @@ class OrbitScene(TracedScene):
     FAMILY = "orbit"
     AUDIT = ("dop853",)
     OPTIONS = ()
-    compile_ahead = staticmethod(compile_ahead)
+    compile_ahead = staticmethod(of_orbits)
 
     @property
     def STATUS(self):
