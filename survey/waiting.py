@@ -8,26 +8,22 @@ import time
 
 from survey.kernels import jit
 
-# at a first use, waits for the next of what is compiled elsewhere, and names it
+# at a first use, waits for the next of what is compiled elsewhere, and names it; empty at the end
 other_compiler = None
 _done = set()  # names; what is compiled stays so
 _waited = 0.0
 
 
-def wait(name=None):
-    """Wait for the next of what is compiled elsewhere, or for what has this name: it is done sooner than
+def wait(name):
+    """Wait for what has this name, or else for all that is compiled elsewhere: it is done sooner than
     if this process began now.
     """
     global _waited
     function = other_compiler
     if function is not None and name not in _done:
         began = time.perf_counter()
-        while line := function():  # empty at the end
-            if name is None:
-                break
+        while name not in _done and (line := function()):
             _done.add(line.strip())
-            if name in _done:
-                break
         _waited = max(_waited, time.perf_counter() - began)  # threads wait side by side
 
 

@@ -140,7 +140,7 @@ def _abels(P, starts, targets, tolerance, limit, planes, status, timed):
         _abels_in_time(
             P[:0], starts[:0], targets[:0], tolerance, limit, ahead[:0], planes[:, :0], status[:0]
         )
-        waiting.wait()
+        waiting.wait("in angle")
     _abels_in_angle(P, starts, far, tolerance, limit, ahead, planes, status, timed)
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, planes, status)
 

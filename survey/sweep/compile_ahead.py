@@ -16,9 +16,10 @@ from survey.sweep.dispatch import cpus
 def command(ahead, request):
     """The command that calls a scene's `compile_ahead` for what is asked; what that yields, it prints."""
     call = f"({list(request.variables)}, {dict(request.options)})"
-    steps = f"for name in ahead{call} or (): print(name, flush=True)"
+    # at once: a wait to the end would last 0.7 s longer, in which Python tidies up
+    steps = f"for name in ahead{call} or (): print(name, flush=True)\nos._exit(0)"
     package = str(Path(survey.__file__).parents[1])
-    path = f"import gc, sys; gc.disable(); sys.path.append({package!r})"
+    path = f"import gc, os, sys; gc.disable(); sys.path.append({package!r})"
     program = f"{path}; from {ahead.__module__} import {ahead.__name__} as ahead\n{steps}"
     # -P: not the modules of the user's folder, where struct.py would take the place of Python's
     return [sys.executable, "-P", "-c", program]

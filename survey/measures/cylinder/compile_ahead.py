@@ -31,12 +31,12 @@ def of_functions(variables, options):
 def _compile(p, options):
     question = options.get("question")
     none = np.empty((0, rc.EXACT_START))
+    if question == "portrait":
+        planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)
+        taylor.flow_abels_by_row(p[None][:0], none, none, 0.0, 0, planes, status)
     if question in ("fate", "portrait") and "separatrix" not in options:
         tables = np.empty((0, EQUILIBRIUM_SIZE)), *[np.empty((0, CYCLE_SIZE)) for _ in range(3)]
         sizes = np.zeros(kf.SIZES, np.int64)
         fates = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
         taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *fates)
         yield "fates"
-    if question == "portrait":
-        planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)
-        taylor.flow_abels_by_row(p[None][:0], none, none, 0.0, 0, planes, status)

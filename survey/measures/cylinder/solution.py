@@ -214,7 +214,7 @@ def _in_phi(method, rows, targets, rtol, by_row, timed):
         solve = getattr(method, "flow_abels_untimed", solve)
     budget = STEPS * min(method.FLOW_WORK, 10)
     if by_row:
-        waiting.wait()
+        waiting.wait("abels")
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from survey.kernels.floquet import characteristic, discs, steps
-from survey.kernels.floquet.flow import spread
+from survey.kernels.floquet import characteristic, steps
+from survey.kernels.floquet.program import OPERATION, TERM
 from survey.measures.floquet import dense, monodromy, stability
 from survey.measures.floquet.answers import Answers
 
@@ -23,18 +23,21 @@ def compile_ahead(variables, options):
     _compile_series()
     yield "series"
     characteristic.roots(np.ones((1, N)))
-    _compile_carried(*_one_step())
+    _compile_carried()
 
 
 def of_orbits(variables, options):
-    """For periodic orbits: what answers from monodromy matrices, then what is made of steps."""
+    """For periodic orbits, whose flow takes as long to compile: steps, and what bounds multipliers by them."""
+    operations, inside, terms = (np.zeros((0, size), np.int64) for size in (OPERATION, 2, TERM))
+    points, none, numbers = np.zeros(0, np.int64), np.zeros(0), np.zeros((1, 0))
+    steps.factors(
+        operations, none, inside, points, points, terms, numbers, np.ones((1, N)), np.zeros(1), N,
+        points, none, none, np.zeros((0, N, N)), none, none,
+    )  # fmt: skip
+    yield "factors"
+    _compile_carried()
+    yield "carried"
     yield from _compile_answers()
-    found, each, first = _one_step()
-    F, bars = each[0], np.zeros((1, N))
-    spread(F, bars, first, bars, bars)
-    steps.products(*each, first, N, found.M, found.E, found.R)
-    _compile_carried(found, each, first)
-    discs.couplings(found.M, found.E, found.extra, found.centre, found.V, found.W, found.R)
 
 
 def _compile_answers():
@@ -44,16 +47,12 @@ def _compile_answers():
     yield "matrices"
 
 
-def _one_step():
-    """Matrices of a point, its only step (F, its bounds), and where its steps begin and end."""
+def _compile_carried():
+    """Compile what carries errors sharply."""
     found = monodromy.Matrices.empty(1, N)
     found.make_room()
     found.V[:] = found.W[:] = np.eye(N)
-    return found, (np.zeros((1, N, N)), np.zeros(1), np.zeros(1)), np.array([0, 1])
-
-
-def _compile_carried(found, each, first):
-    """Compile what carries errors sharply."""
+    each, first = (np.zeros((1, N, N)), np.zeros(1), np.zeros(1)), np.array([0, 1])
     steps.carried(*each, first, np.zeros(1, np.int64), N, found.V, found.W, found.extra)
 
 

@@ -23,6 +23,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from survey import waiting
 from survey.kernels.floquet.discs import couplings
 from survey.kernels.floquet.flow import ORDER, spread
 from survey.kernels.floquet.steps import carried, products
@@ -75,6 +76,16 @@ def certified(programs, numbers, x, T, guess, plane, counts, method, reach):
             if not shown.good.all():
                 shown.improve(path.certify(x, T, plane, factor))
         return shown
+
+
+def _compile_some():
+    """Compile what is needed after the propagators, by calls on nothing, while another process compiles these."""
+    if waiting.other_compiler:
+        F, rows, bars, first = np.zeros((0, 2, 2)), np.zeros((0, 2)), np.zeros(0), np.zeros(1, int)
+        spread(F, rows, first, rows, rows)
+        products(F, bars, bars, first, 2, F, F, F)
+        couplings(F, F, F, rows + 0j, F + 0j, F + 0j, F)
+        waiting.wait("factors")
 
 
 class OrbitSteps:
@@ -133,6 +144,7 @@ class OrbitSteps:
         values = self.numbers[0].copy()
         values[:, self.programs.states_at] = self.X[:, :, MIDDLE]
         self.F, self.error, self.doubt = np.empty((tasks, n, n)), np.empty(tasks), np.empty(tasks)
+        _compile_some()
         method.floquet_factors(
             A.operations, A.signs, A.inside, A.order, A.used, A.terms, values, self.scale[self.point], self.noise, n,
             np.arange(tasks), self.begin + 0.5 * self.h, 0.5 * self.h, self.F, self.error, self.doubt,
@@ -251,6 +263,7 @@ class OrbitSteps:
         inverses = np.full_like(vectors, np.nan)
         inverses[which] = monodromy.inverse(vectors[which])
         extra = np.full((N, n, n), np.nan)
+        waiting.wait("carried")
         carried(self.F, error, doubt, self.first, which, n, vectors, inverses, extra)
         tall = product(abs(M) + E, abs(vectors))
         extra += (

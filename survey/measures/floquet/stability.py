@@ -71,7 +71,8 @@ def assess(matrices, structure, rtol, asked, period=None, growth=None):
     """
     n = matrices.M.shape[1]
     few = 2 <= n <= FEW and (structure == "none" or n % 2 == 0)
-    if not few or asked == {"monodromy"} or matrices.sharp.any():
+    unknown = not np.isfinite(matrices.bound).any()
+    if not few or unknown or asked == {"monodromy"} or matrices.sharp.any():
         return by_discs(matrices, structure, rtol, asked, period, growth)
     found = by_coefficients(matrices, structure, rtol, asked, period, growth)
     left = np.flatnonzero(found.missed)

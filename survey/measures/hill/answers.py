@@ -64,7 +64,7 @@ class Answers(answers.Answers):
             *own,
         )
         if asked.wanted[kernels.EXPONENT // 2 :].any():
-            waiting.wait()
+            waiting.wait("answers")
             kernels.transcendental(
                 first, results, squares, asked.wanted, asked.rtol, asked.full_period, *own
             )

@@ -115,7 +115,6 @@ def compile_ahead(sample, no_rows, variables):
 
     `sample` and its empty `no_rows` are the scene's. While this is done, the map's own process
     compiles the method's kernel: what it needs at once comes first, and what it waits for last.
-    Yields where the nodes can be assessed.
     """
     sample(no_rows, np.ones(1), np.empty((0, 1, 2, 1)))
     grows = not {"exponent", "exponent_per_orbit"}.isdisjoint(variables)
@@ -133,7 +132,7 @@ def compile_ahead(sample, no_rows, variables):
         answers.assess(np.ones((1, RESULTS)), None)
     else:
         Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
-        yield  # a few points need no more
+        yield "answers"  # a few points need no more
         _factors(
             np.ones((4, 1, TERMS)),
             np.ones((4, 1)),
@@ -319,10 +318,10 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
 
 
 def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, open_points):
-    waiting.wait()
+    waiting.wait("answers")
     x = (problem.p[rows[0]] - axis.middle) / axis.radius  # all rows have the same points
     if len(series) > 1:
-        waiting.wait()  # once more, to the end: see `compile_ahead`
+        waiting.wait("factors")
         _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points)
         return
     x, wide = 2 * x * x - 1 if axis.even else x, ~(bars[0] <= asked.rtol)

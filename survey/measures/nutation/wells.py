@@ -69,7 +69,7 @@ def compile_periods(method):
     """Compile what `periods` calls, while another process compiles what finds the wells."""
     if waiting.other_compiler:
         periods(method, np.empty((0, nu.SIZE)), np.empty(0, np.int64), 1e-6)
-        waiting.wait()
+        waiting.wait("wells")
 
 
 def periods(method, rows, kinds, rtol):
