@@ -1,11 +1,11 @@
 """What users call from Python: run, evaluate, open, scenes."""
 
-import functools
 import inspect
 import os
 import warnings
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,7 @@ from survey.request.function_scene import FunctionScene
 from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
+from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.progress import Progress, watched
 from survey.wording import counted, html_table, short, shown, summary
 
@@ -191,16 +192,12 @@ def evaluate(
         user_scene.check(module)
         return _lazy(module, scene, request, given)
     grid = _grid(used, given)
-    user_scene.check(module, grid)
     try:
-        with watched(
-            scene,
-            module,
-            grid.points,
-            lambda: _seconds(module, request, grid),
-            request=request,
-        ) as progress:
-            found = solve.compute(grid, module, request, progress=progress)
+        with compiling_ahead(module, request):
+            user_scene.check(module, grid)
+            seconds = partial(_seconds, module, request, grid)
+            with watched(scene, module, grid.points, seconds, request=request) as progress:
+                found = solve.compute(grid, module, request, progress=progress)
         ds = count(labelled(grid, module, scene, request, found), found)
         ds.attrs["complete"] = 1  # also when it is saved
     except MemoryError:
@@ -242,7 +239,7 @@ def _as_list(variables: Any) -> list[Any]:
         return [variables]
 
 
-@functools.cache
+@cache
 def _a_number() -> xr.DataArray:
     """A DataArray of one number: to copy it takes less time than to make another."""
     # not where this module is loaded: xarray imports dask.array here, 0.3 s

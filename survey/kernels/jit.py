@@ -149,14 +149,16 @@ def _set_options(options):
 
 
 _DIRECTORY = _cache_directory()
+_BEGUN = set()  # works that this process has asked about
 _COMPILING = _Compiling()
 event.register("numba:compile", _COMPILING)
 
 
 def is_first(work):
     """Is this machine's kernel cache asked about `work` (a file's name) for the first time?"""
-    if _DIRECTORY is None or numba.config.DISABLE_JIT:
+    if _DIRECTORY is None or numba.config.DISABLE_JIT or work in _BEGUN:
         return False
+    _BEGUN.add(work)
     try:
         (_DIRECTORY / f"{work}.begun").touch(exist_ok=False)
     except OSError:

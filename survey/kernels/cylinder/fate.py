@@ -56,7 +56,7 @@ from survey.kernels.cylinder.steps import (
     time_of_turning,
     wrapped,
 )
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 UNDECIDED, EQUILIBRIUM, SADDLE, ROTATION_PLUS, ROTATION_MINUS, LIBRATION = -1, 0, 1, 2, 3, 4
@@ -397,7 +397,7 @@ def fate(
     out[rc.STATUS] = STEP_LIMIT if held < 0 else OK
 
 
-@inline
+@splice
 def fates(
     setting,
     begin,

@@ -45,7 +45,7 @@ from survey.kernels.cylinder.steps import (
     finite,
     start_sign,
 )
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import unroll
 
@@ -488,7 +488,7 @@ def busy(row):
     return False
 
 
-@inline
+@splice
 def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its
     first infinity.

@@ -90,7 +90,7 @@ from survey.kernels.cylinder.steps import (
     unturned,
     values,
 )
-from survey.kernels.jit import constant, inline, kernel
+from survey.kernels.jit import constant, inline, kernel, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.unroll import unroll
 
@@ -396,7 +396,7 @@ def _calm(state, fixed, goal, doubt, started, calm):
         started[i] = started[i] | calm[i]
 
 
-@inline
+@splice
 def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
     """w and t at the ascending targets >= phi0 of each row, which end at its first infinity; as
     `steps.abels`.

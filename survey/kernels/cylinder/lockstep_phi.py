@@ -44,7 +44,7 @@ from survey.kernels.cylinder.lockstep import (
     sine_cosine,
 )
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, finite, row_of, unturned
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import (
     consecutive,
@@ -442,7 +442,7 @@ def _refill(P, starts, targets, planes, status, timed, waiting, state, fixed, ro
     return waiting
 
 
-@inline
+@splice
 def abels(P, starts, targets, tolerance, limit, ahead, planes, status, timed):
     """Follow each row as far as phi is the variable; arguments as in `lockstep_abel.abels`, but
     that the rows of `targets` end with BLOCK infinities, and results go to planes (STATE, rows, n), those of

@@ -519,7 +519,8 @@ def complete(rows, angles):
         if good:
             known[0] = True
             _unchanged(p, last, known)
-            last[:] = p
+            for k in range(len(p)):
+                last[k] = p[k]
             note(p, numbers, 0, LANES)
             for k in range(batches):
                 phi = at[k * LANES : k * LANES + lanes[k]]

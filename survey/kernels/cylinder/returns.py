@@ -194,7 +194,7 @@ def between(eqs, count, low, high):
     return inside
 
 
-@inline
+@splice
 def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
     """The map of `kind` at x: anchor is the section (rotations) or the right end of the interval
     (librations).

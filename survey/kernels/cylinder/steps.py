@@ -39,7 +39,7 @@ from survey.kernels.cylinder.flow import (
     variation,
 )
 from survey.kernels.cylinder.program import RADIUS
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -182,7 +182,7 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
     return OK
 
 
-@inline
+@splice
 def trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats, turnings, status):
     """`trajectory` for each row of P; a row of times ends at its first infinity."""
     for i in range(len(P)):
@@ -192,7 +192,7 @@ def trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats,
                                tolerance, limit, floats[i], turnings[i])  # fmt: skip
 
 
-@inline
+@splice
 def abels(setting, begin, at, P, starts, targets, tolerance, limit, planes, status):
     """`abel` for each row of P; a row of targets ends at its first infinity, and one may serve all;
     planes (STATE, rows, n) are filled.
