@@ -133,6 +133,7 @@ def _abels(P, starts, targets, tolerance, limit, planes, status, timed):
         leads, rest = lockstep_program.grouped(P), (tolerance, limit, ahead, planes, status)
         for lead in np.unique(leads):
             lockstep_program.abels(P, leads, lead, starts, far, *rest, timed)
+            waiting.wait("near")
             lockstep_program.abels_near(P, leads, lead, starts, targets, *rest)
         return
     # compile the longer one, by a call on nothing, while that process compiles the other
@@ -145,12 +146,16 @@ def _abels(P, starts, targets, tolerance, limit, planes, status, timed):
     _abels_in_time(P, starts, targets, tolerance, limit, ahead, planes, status)
 
 
-def flow_abels_ahead():
-    """Compile what `flow_abels` waits for."""
-    P, none = np.empty((0, COLUMNS)), np.empty((0, EXACT_START))
-    P.flags.writeable = False
+def flow_abels_ahead(own):
+    """Compile what `flow_abels` waits for: of `own` functions, or of the gyrostat."""
+    P, none = np.empty((0, COLUMNS + own)), np.empty((0, EXACT_START))
+    P.flags.writeable = own
     planes, status = np.empty((STATE, 0, 2)), np.empty((0, 2), np.int8)
     ahead = np.empty((0, lockstep_phi.STATE))
+    if own:
+        lead = np.zeros(1, np.int64)
+        lockstep_program.abels_near(P, lead, lead[0], none, none, 0.0, 0, ahead, planes, status)
+        return
     _abels_in_angle(P, none, none, 0.0, 0, ahead, planes, status, True)
 
 

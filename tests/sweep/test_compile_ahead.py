@@ -86,7 +86,7 @@ FLOWS = "survey.methods.taylor:"
 OWN = """scene = survey.abel(
     lambda phi, p: -p[0], lambda phi, p: p[1] - np.sin(phi), period=2 * np.pi, parameters=("a", "I")
 )
-survey.evaluate(scene, question="portrait", a=0.3, I=0.5)"""
+survey.evaluate(scene, {more}, a=0.3, I=0.5)"""
 STATE = 'survey.evaluate("brun", A=1.0, C=0.5, epsilon=0.3, theta0=1.0, p_theta0=0.1, p_psi=0.3, p_phi=0.2{more})'
 BRUN = [
     "lanes:wells",
@@ -120,7 +120,11 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
             [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
         ),
         (
-            OWN,
+            OWN.format(more='question="abel", phi0=0.0, w0=1.0, phi=1.0'),
+            ["survey.kernels.cylinder.lockstep_program:abels_near"],
+        ),
+        (
+            OWN.format(more='question="portrait"'),
             [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
         ),
         (STATE.format(more=""), [f"survey.kernels.nutation.{name}" for name in BRUN]),

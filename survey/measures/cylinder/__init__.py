@@ -44,7 +44,9 @@ METHODS = {
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
         "flow_abels_ahead": Function(
-            "compile some of what `flow_abels` calls, while another process compiles the rest"
+            "compile some of what `flow_abels` calls, for `own` functions or for the gyrostat, while another process "
+            "compiles the rest",
+            ("own",),
         ),
         "flow_image": Function(
             "fill `node` with the image of x under one return map, see `kernels.cylinder.returns.image`",

@@ -18,18 +18,18 @@ from survey.methods import taylor
 
 def compile_ahead(variables, options):
     """For the gyrostat's questions but those on separatrices."""
-    if options.get("question") == "abel" and "separatrix" not in options:
-        taylor.flow_abels_ahead()
-    yield from _compile(coefficients(*np.zeros(rc.SIX)), options)
+    yield from _compile(coefficients(*np.zeros(rc.SIX)), options, own=False)
 
 
 def of_functions(variables, options):
     """For a user's f and g."""
-    yield from _compile(np.zeros(COLUMNS + 1), options)
+    yield from _compile(np.zeros(COLUMNS + 1), options, own=True)
 
 
-def _compile(p, options):
+def _compile(p, options, own):
     question = options.get("question")
+    if question == "abel" and "separatrix" not in options:
+        taylor.flow_abels_ahead(own)
     none = np.empty((0, rc.EXACT_START))
     if question == "portrait":
         planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)
