@@ -54,6 +54,7 @@ from survey.measures.body import limits, motion, transversal
 from survey.measures.body import rests as of_rest
 from survey.measures.body.system import CONDITIONS, NAMES, OFF, nearest, read
 from survey.measures.cylinder import portrait as reduced_portrait
+from survey.measures.cylinder.compile_ahead import compile_ahead as compile_ahead
 from survey.measures.rows import Rows
 from survey.modules import load
 from survey.scene import Option, Output, Parameter, Request, Trajectory, named

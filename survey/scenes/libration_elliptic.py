@@ -92,7 +92,7 @@ _NAMES = (
 _FAMILY = tuple(replace(o, on_request=True) for o in stability.OUTPUTS if o.name in _NAMES)
 OUTPUTS = (*danby.OUTPUTS, *_FAMILY)
 SECONDS = dict.fromkeys(_NAMES, 1e-6)  # on maps, by series
-COMPILING = dict.fromkeys(_NAMES, 25)  # measured, 2 cores
+COMPILING = dict.fromkeys(_NAMES, 11)  # measured, 2 cores
 DIMENSIONS = {name: np.arange(1, 5) for name in ("multiplier", "row", "column")}
 states = ("x", "q", "p", "m")
 structure = "symplectic"

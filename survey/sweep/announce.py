@@ -12,15 +12,15 @@ import time
 PATIENCE = 0.5  # seconds of compiling that pass without a word
 # measured, 2 cores, by family; of scenes of which less is compiled, on one, and what cells need besides
 SECONDS = {
-    "hill": 8,
+    "hill": 7,
     "cylinder": 10,
     "abel": 18,
-    "nutation": 15,
-    "danby": 8,
-    "normal_form": 7,
-    "floquet": 18,
+    "nutation": 9,
+    "danby": 7,
+    "normal_form": 4,
+    "floquet": 11,
 }
-OF_SCENES = {"mathieu": (6, 7), "libration_elliptic": (4, 8)}
+OF_SCENES = {"mathieu": (6, 7), "libration_elliptic": (6, 8)}
 OF_QUESTIONS = {("cylinder", "trajectory"): 6}  # of which nothing is compiled beside
 USUAL = 10
 
