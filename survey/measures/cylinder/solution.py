@@ -100,7 +100,7 @@ def trajectories(method, rows, times, rtol):
 def _nothing(shape):
     """floats, turnings and status before anything is known."""
     return (
-        np.full((*shape, rc.STATE), np.nan),
+        np.full((rc.STATE, *shape), np.nan).transpose(1, 2, 0),  # planes, as each is read by itself
         np.full(shape, UNDETERMINED, dtype=np.int64),
         np.zeros(shape, dtype=np.int64),
     )
