@@ -73,3 +73,14 @@ def test_loops_of_kernels_are_not_unrolled_and_those_of_others_are_as_before():
     kernel = code_of("survey.kernels.some")
     assert len(kernel.splitlines()) < 0.8 * len(before.splitlines())
     assert len(code_of("somebody.else").splitlines()) == len(before.splitlines())
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("decorator", [jit.fresh, jit.inline])
+def test_what_kernels_call_is_compiled_once_for_all_constants(decorator):
+    power = decorator(lambda x, n, doubled: (2.0 if doubled else 1.0) * x**n)
+    caller = jit.fresh(
+        lambda x: power(x, 2, True) + power(x, n=3, doubled=False) + power(x, 4, True)
+    )
+    assert caller(3.0) == 2 * 3.0**2 + 3.0**3 + 2 * 3.0**4
+    assert len(power.signatures) == 1

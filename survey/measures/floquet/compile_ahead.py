@@ -34,7 +34,7 @@ def of_orbits(variables, options):
         operations, none, inside, points, points, terms, numbers, np.ones((1, N)), np.zeros(1), N,
         points, none, none, np.zeros((0, N, N)), none, none,
     )  # fmt: skip
-    yield "factors"
+    yield "steps"
     _compile_carried()
     yield "carried"
     yield from _compile_answers()

@@ -85,7 +85,7 @@ def _compile_some():
         spread(F, rows, first, rows, rows)
         products(F, bars, bars, first, 2, F, F, F)
         couplings(F, F, F, rows + 0j, F + 0j, F + 0j, F)
-        waiting.wait("factors")
+        waiting.wait("steps")
 
 
 class OrbitSteps:
