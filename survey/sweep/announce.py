@@ -17,7 +17,7 @@ SECONDS = {
     "abel": 18,
     "nutation": 9,
     "danby": 7,
-    "normal_form": 4,
+    "normal_form": 7,
     "floquet": 11,
 }
 OF_SCENES = {"mathieu": (6, 7), "libration_elliptic": (6, 8)}
