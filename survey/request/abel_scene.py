@@ -158,8 +158,11 @@ class AbelScene(FunctionScene):
 
     def _finite(self, point):
         """Have f and g values at these parameters?"""
-        with np.errstate(all="ignore"):
-            return all(np.isfinite(float(h(phi, point))) for h in self._plain for phi in TRIED)
+        try:
+            with np.errstate(all="ignore"):
+                return all(np.isfinite(float(h(phi, point))) for h in self._plain for phi in TRIED)
+        except (ArithmeticError, ValueError):  # as in `_try`
+            return False
 
     @property
     def _plain(self):

@@ -170,6 +170,10 @@ def test_wrong_scenes_are_one_line(given, words):
         ({"g": lambda phi, p: abs(phi)}, r"g\(phi, p\): it applies abs.*must be analytic"),
         ({"f": lambda phi, p: 1.0 if phi > 0 else -1.0}, r"f\(phi, p\): it compares phi"),
         ({"f": lambda phi, p: math.log(-p[0])}, "is undefined at mu = 1"),
+        (
+            {"g": lambda phi, p: 1.0 / (p[0] - p[0]), "period": 2 * math.pi},
+            "is undefined at mu = 1",
+        ),
         ({"period": 2 * math.pi}, "does not have the period 2 pi at mu = 1, or has a pole"),
     ],
 )
