@@ -3,8 +3,12 @@ of other steps.
 
 A step's Taylor series sees a pole from afar, but not exp(-x^2) from x = 10 on, nor cos^200 at its
 zeros. So basis functions that may hide such a spike are sampled densely; products of a few sines
-and cosines of lines cannot.
+and cosines of lines cannot. Chebyshev coefficients tell how fast a function varies, but of a spike
+at an end of the interval too little, as the square root of their number resolves it there: next to
+the ends differences tell.
 """
+
+import math
 
 import numpy as np
 
@@ -20,6 +24,10 @@ SIMPLE = 4
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
 AT_ONCE = 64  # points that are sampled together: their arrays stay in the cache
 HARMLESS = 1e-16  # what an entry of A, in balanced units, may change by over a piece
+ENDS = 1 / 8  # of the interval: so far from its ends differences count
+ORDER = 4  # of differences
+# (max |f''''| / 24 max |f|)^(1/4) times this is the rate: half of what the coefficients of a Gaussian show
+OF_DIFFERENCES = 0.6
 SEEN = 2.0  # a rate this many times that of fewer samples takes its place
 
 
@@ -61,27 +69,51 @@ def rates(program, numbers, low, high, scale, number=NUMBER):
 
 def _rates(program, nodes, numbers, low, high, scale, number):
     """`rates` of some points."""
+    beside = np.linspace(0.0, ENDS, number // 4)  # closer than the Chebyshev points in the middle
     if (low == low[0]).all() and (high == high[0]).all():  # what depends on t alone is sampled once
         low, high = low[:1], high[:1]
-    t = low + (high - low) * chebyshev.shares(number)
+    t = low + (high - low) * np.concatenate([chebyshev.shares(number), beside, 1.0 - beside])
     found = np.zeros((len(nodes), len(scale)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, nodes)):
-        c = (
-            abs(np.fft.rfft(np.concatenate([values, values[:, ::-1]], axis=1), axis=1)[:, :number])
-            / number
-        )
         terms = program.terms[program.terms[:, pg.BASIS] == nodes[k]]
         with np.errstate(all="ignore"):
-            share = c / c.max(axis=1, keepdims=True)
             ratio = scale[:, terms[:, pg.COLUMN]] / scale[:, terms[:, pg.ROW]]
             entries = abs(numbers[0][:, terms[:, pg.NUMBER]] * ratio)
-            counts = (share > RESOLVED) & (c > bars.max(axis=1, keepdims=True))
-            counts &= c * entries.max(axis=1, keepdims=True) * (high - low) > HARMLESS
-            rate = 2.0 * np.where(counts, np.arange(number) / (1.0 - np.log(share)), 0.0).max(
-                axis=1
-            )
-        found[k] = np.where(np.isfinite(c).all(axis=1), rate, np.nan)
+            given = bars.max(axis=1), entries.max(axis=1) * (high - low)[:, 0]
+            by_coefficients = _rate_by_coefficients(values[:, :number], *given)
+            by_differences = _rate_by_differences(values, number, beside[1], *given)
+        found[k] = np.maximum(by_coefficients, by_differences)
     return found
+
+
+def _rate_by_coefficients(values, bar, change):
+    """The rate (N) of functions from their values (N, m) at Chebyshev points, which have an error
+    bound and `change` A over the interval by so much times themselves (N).
+    """
+    number = values.shape[1]
+    mirrored = np.concatenate([values, values[:, ::-1]], axis=1)
+    c = abs(np.fft.rfft(mirrored, axis=1)[:, :number]) / number
+    share = c / c.max(axis=1, keepdims=True)
+    counts = _counts(c, share, bar[:, None], change[:, None])
+    rate = 2.0 * np.where(counts, np.arange(number) / (1.0 - np.log(share)), 0.0).max(axis=1)
+    return np.where(np.isfinite(c).all(axis=1), rate, np.nan)
+
+
+def _rate_by_differences(values, number, spacing, bar, change):
+    """The rate (N) next to both ends, from the values there, behind the first `number`."""
+    beside = values[:, number:].reshape(len(values), 2, -1)
+    steep = abs(np.diff(beside, ORDER)).max(axis=(1, 2)) / 2**ORDER  # at most the largest value
+    share = steep / abs(values).max(axis=1)
+    rate = OF_DIFFERENCES / spacing * (share * (2**ORDER / math.factorial(ORDER))) ** (1 / ORDER)
+    rate = np.where(_counts(steep, share, bar, change), rate, 0.0)
+    return np.where(np.isfinite(steep), rate, np.nan)
+
+
+def _counts(size, share, bar, change):
+    """Which parts of a function, by their size and their share of the largest, are no rounding and
+    matter.
+    """
+    return (share > RESOLVED) & (size > bar) & (size * change > HARMLESS)
 
 
 def combined(few, *given):
