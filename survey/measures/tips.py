@@ -53,7 +53,8 @@ def followed(function, pieces, grain, first=0):
     the map; those before the `first` are left out, and no other is followed along them.
 
     Those that meet end to end are one. All pieces are positive on one side, as those of marching
-    squares are, so that none is followed along another one.
+    squares are, so that none is followed along another one; where one is not, as two points that
+    have moved past each other, it is turned.
     """
     if not pieces:
         return []
@@ -65,6 +66,7 @@ def followed(function, pieces, grain, first=0):
     for end in sorted((end for end in ends if end.going), key=lambda end: -end.own)[ENDS:]:
         end.going = False
     _sides(function, [end for end in ends if end.going])
+    pieces = _turned(pieces, ends)
     for _ in range(MOST):
         going = [
             end
@@ -117,6 +119,20 @@ def _merged(pieces):
             joined = [parts[0], *((x[1:], error[1:]) for x, error in parts[1:])]
             done.append(tuple(np.concatenate(one) for one in zip(*joined, strict=True)))
     return done
+
+
+def _turned(pieces, ends):
+    """The pieces, those turned that are positive on the other side than most; their ends with them."""
+    sides = np.array([end.side * end.sense for end in ends])
+    most = np.sign(sides @ [end.own for end in ends])
+    turned = []
+    for i, piece in enumerate(pieces):
+        if most != 0.0 and (sides[2 * i : 2 * i + 2] == -most).all():
+            piece = tuple(one[::-1] for one in piece)
+            ends[2 * i : 2 * i + 2] = ends[2 * i + 1], ends[2 * i]
+            ends[2 * i].sense, ends[2 * i + 1].sense = -1, 1
+        turned.append(piece)
+    return turned
 
 
 def _sides(function, ends):
@@ -181,7 +197,7 @@ def _steps(function, going, ends, chords, grain):
     off = abs(t - goals[rows, axis])
     known = [chords]
     for k, end in enumerate(going):
-        if not end.going:  # another one has met it
+        if not end.going or (met[k] is None and end in met):  # another one has met it, or is to
             continue
         point = goals[k].copy()
         point[axis[k]] = t[k]

@@ -32,6 +32,14 @@ def test_pieces_that_meet_are_one_and_reach_the_border():
     assert (abs(x[:, 1] - height(x[:, 0])) <= error + 1e-15).all() and (error < 1e-6).all()
 
 
+def test_a_piece_in_the_other_sense_is_turned_and_is_the_same_curve():
+    x, error = piece(0.4, 0.4003)
+    ((x, error),) = tips.followed(
+        parabola, [piece(0.6, 0.9), (x[[-1, 0]], error[[-1, 0]]), piece(0.1, 0.3)], 1e-16
+    )
+    assert np.allclose(x[[0, -1]], [[0.0, 0.2], [1.0, 0.8]]) and (np.diff(x[:, 0]) > 0.0).all()
+
+
 def test_a_hole_on_the_curve_ends_it():
     def holed(x):
         value, bar = parabola(x)
