@@ -69,7 +69,9 @@ def rates(program, numbers, low, high, scale, number=NUMBER):
 
 def _rates(program, nodes, numbers, low, high, scale, number):
     """`rates` of some points."""
-    beside = np.linspace(0.0, ENDS, number // 4)  # closer than the Chebyshev points in the middle
+    # not at an end itself, where A may be infinite; closer than the Chebyshev points in the middle
+    spacing = 4 * ENDS / number
+    beside = (np.arange(number // 4) + 0.5) * spacing
     if (low == low[0]).all() and (high == high[0]).all():  # what depends on t alone is sampled once
         low, high = low[:1], high[:1]
     t = low + (high - low) * np.concatenate([chebyshev.shares(number), beside, 1.0 - beside])
@@ -81,7 +83,7 @@ def _rates(program, nodes, numbers, low, high, scale, number):
             entries = abs(numbers[0][:, terms[:, pg.NUMBER]] * ratio)
             given = bars.max(axis=1), entries.max(axis=1) * (high - low)[:, 0]
             by_coefficients = _rate_by_coefficients(values[:, :number], *given)
-            by_differences = _rate_by_differences(values, number, beside[1], *given)
+            by_differences = _rate_by_differences(values, number, spacing, *given)
         found[k] = np.maximum(by_coefficients, by_differences)
     return found
 
