@@ -91,10 +91,14 @@ def mathieu(a, q, half_periods=1):
         ON_EDGE,
         NO_RULE,
     )
+    sizes = monodromy.RowSizes(
+        span=np.full(len(a), half),
+        bound=np.column_stack([2 * abs(q), np.ones(len(a)), np.zeros(len(a))]),
+        rate=np.full(len(a), 2.0),
+    )
     return monodromy.Problem(
-        p=a.copy(), span=np.full(len(a), half), rate=np.full(len(a), 2.0), c2=0.0, sample=sample,
-        bound=np.column_stack([2 * abs(q), np.ones(len(a)), np.zeros(len(a))]), rule=rule.astype(np.int8),
-    )  # fmt: skip
+        p=a.copy(), sizes=lambda: sizes, c2=0.0, sample=sample, rule=rule.astype(np.int8)
+    )
 
 
 def mp_factors(family, k, rho, digits=30):

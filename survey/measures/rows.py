@@ -51,9 +51,10 @@ class Rows:
         """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels
         would compile again.
         """
-        return np.array(self._broadcast(array), order="C")
+        return np.array(self.view(array), order="C")
 
-    def _broadcast(self, array):
+    def view(self, array):
+        """All values (rows, lanes), to read alone."""
         return self._full(array).reshape(self.rows, self.lanes)
 
     def _full(self, array):

@@ -192,12 +192,12 @@ class HillScene(FunctionScene):
         out = {}
         families = self._families(points, axes)
         for rows in families:
-            problem, rough = self._called(
+            problem, rough, bad = self._called(
                 user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
                 self._more_digits,
             )  # fmt: skip
             found = self._answers(problem, rough, self._ranges(points[rows])[0], request)
-            bad = np.flatnonzero(np.isnan(problem.span))
+            bad = np.flatnonzero(bad)
             if bad.size:  # z may be smooth, or finite, at some of its points
                 alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
                 alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)

@@ -59,7 +59,7 @@ def solve(point, request):
     if box is None:
         problem = _problem(
             block.per_row(point["q"]),
-            block.per_point(point["a"]),
+            block.view(point["a"]),
             request.line("a"),
             request.line("q"),
         )
@@ -100,17 +100,23 @@ def _problem(q, a, line=None, ends=None):
     rule, constant = _rules(q, a)
     return monodromy.Problem(
         p=a,
-        span=np.where(np.isfinite(q), _HALF_PERIOD, np.nan),
-        bound=np.column_stack([2 * abs(q), np.ones(q.size), np.zeros(q.size)]),
-        rate=np.full(q.size, 2.0),
+        sizes=lambda: _sizes(q),
         c2=0.0,
-        **monodromy.of_rows(q, _sample, _walk_points, _solve_points),
+        **monodromy.of_rows(lambda: q, _sample, _walk_points, _solve_points),
         rule=rule,
         constant=constant,
         line=line,
-        span_low=np.full(q.size, dd.HALF_PI[1]),
         row_axis=_row_axis(*ends) if ends else None,
         positions=q,
+    )
+
+
+def _sizes(q):
+    return monodromy.RowSizes(
+        span=np.where(np.isfinite(q), _HALF_PERIOD, np.nan),
+        bound=np.column_stack([2 * abs(q), np.ones(q.size), np.zeros(q.size)]),
+        rate=np.full(q.size, 2.0),
+        span_low=np.full(q.size, dd.HALF_PI[1]),
     )
 
 

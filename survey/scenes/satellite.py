@@ -230,10 +230,11 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     block = Rows(shared, rho)
     row = Motion(*(block.per_row(values) for values in shared), bool(oblate))
     problem = _problem(
-        row, block.per_point(rho), None if low is None else block.per_point(low), line, ends
+        row, block.view(rho), None if low is None else block.per_point(low), line, ends
     )
     out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
-    return _derived(out, row, problem.p, block, request, row.period)
+    period = None if _wanted(request).isdisjoint(_OF_PERIOD) else row.period
+    return _derived(out, row, problem.p, block, request, period)
 
 
 def _passages(point, request):
@@ -397,21 +398,13 @@ def _row_axis(oblate, rotates, ends):
 
 
 def _problem(row, rho, low=None, line=None, ends=None):
-    half, half_low = row.half
-    rows = np.empty((row.k.size, motion.ROW))
-    rows[:, motion.MODULUS], rows[:, motion.COMPLEMENT], rows[:, motion.HALF] = row.k, row.kc, half
-    rows[:, motion.OBLATE], rows[:, motion.GIVEN] = row.oblate, row.given
-    rows[:, motion.WHICH] = row.which
     rule, constant = _rules(row, rho, low)
     return monodromy.Problem(
         p=rho,
         p_low=low,
-        span=half,
-        span_low=half_low,
-        bound=np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)]),  # (|rho| + k)^2 + 1
-        rate=row.rate,
+        sizes=lambda: _sizes(row),
         c2=1.0,
-        **monodromy.of_rows(rows, sample, _walk_points, _solve_points),
+        **monodromy.of_rows(lambda: row.columns, sample, _walk_points, _solve_points),
         rule=rule,
         constant=constant,
         line=line,
@@ -419,6 +412,12 @@ def _problem(row, rho, low=None, line=None, ends=None):
         row_axis=_row_axis(row.oblate, bool(row.rotates.any()), ends) if ends else None,
         positions=-2 * np.log(row.kc) if ends else None,
     )
+
+
+def _sizes(row):
+    half, half_low = row.half
+    bound = np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)])  # (|rho| + k)^2 + 1
+    return monodromy.RowSizes(half, bound, row.rate, half_low)
 
 
 def _rules(row, rho, low=None):

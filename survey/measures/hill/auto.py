@@ -82,7 +82,7 @@ def _exactly(problem, answers, points, asked, most):
     if not points.size:
         return
     phase, distance = taylor_double.hill_density()
-    rows, p = points // problem.p.shape[1], problem.p.reshape(-1)[points]
+    rows, p = points // problem.p.shape[1], problem.points(points)
     low = np.zeros(p.size) if problem.p_low is None else problem.p_low.reshape(-1)[points]
     frequency = np.sqrt((problem.bound[rows] * np.stack([p**0, abs(p), p**2], axis=1)).sum(axis=1))
     length = 0.5 * problem.span[rows] * np.maximum(phase * frequency, distance * problem.rate[rows])

@@ -147,7 +147,7 @@ def compile_ahead(sample, no_rows, variables):
 def solve(problem, method, asked, answers):
     """Answer the points of the rows that a proxy serves; returns the points (N, bool) still to be solved."""
     open_points = np.ones(problem.p.shape, np.bool_)
-    even = np.zeros(problem.span.size, np.bool_) if problem.even is None else problem.even
+    even = np.zeros(len(problem.p), np.bool_) if problem.even is None else problem.even
     for symmetric in np.unique(even):
         rows = np.flatnonzero(even == symmetric)
         axis = _axis(problem.line, bool(symmetric))
@@ -289,7 +289,7 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
     if not chosen.size:
         return
     sought = _sought(asked)
-    degree = np.full(problem.span.size, DEGREES.size)
+    degree = np.full(len(problem.p), DEGREES.size)
     degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
     if problem.c2 and not sought.factors:  # not beyond what pays, where less may do
         enough = _degrees(problem, axis, ROWS_SHARE * asked.rtol, sought)

@@ -14,6 +14,7 @@ Source: W. Magnus, S. Winkler, Hill's Equation (1966), 1.3 and 2.1; symmetric z:
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -85,6 +86,24 @@ def boxed(points):
 
 
 @dataclass(frozen=True)
+class RowSizes:
+    """What the steps of R rows are chosen by: half periods `span`, with `span_low` what float64 took
+    from them (None where nothing is known of it, or where it is 0); |z| <= bound[r, 0] + |p| bound[r, 1]
+    + p^2 bound[r, 2]; `rate` is 1 / distance to z's nearest singularity.
+    """
+
+    span: np.ndarray
+    bound: np.ndarray
+    rate: np.ndarray
+    span_low: np.ndarray | None = None
+
+    def at(self, rows):
+        """Those of some rows."""
+        span_low = None if self.span_low is None else self.span_low[rows]
+        return RowSizes(self.span[rows], self.bound[rows], self.rate[rows], span_low)
+
+
+@dataclass(frozen=True)
 class Problem:
     """R rows of L points: y'' + (c0(t) + p c1(t) + p^2 c2) y = 0 on half a period, p varying along
     the row.
@@ -92,21 +111,19 @@ class Problem:
     `sample(rows, nodes, steps)` gives c0, c1 of the rows at `nodes` (fractions) of each step as an array
     (rows, steps, 2, nodes); `walk(rows, p, tolerance)`, for adaptive methods, gives the results of a chain for
     points p of those rows, and which of them reached the end; `exact(rows, p, low, steps)` gives them in double-double,
-    for p + low, each in its even number of steps. |z| <= bound[r, 0] + |p| bound[r, 1] + p^2 bound[r, 2];
-    `rate` is 1 / distance to z's nearest singularity. `rule` (R, L) holds what exact rules say (`answers`), and
+    for p + low, each in its even number of steps. `sizes()` gives the RowSizes, which rows that a series across them
+    answers do not need. p (R, L) may be a read-only view. `rule` (R, L) holds what exact rules say (`answers`), and
     `constant` the rows where z does not depend on t, with z there (rows, L); None where there are none.
     `line` is the full axis of p, when every row has the same points: (number, least, greatest). `even` (R) says
     where p -> -p exchanges y1 and y2' at T/2, and leaves y2 and y1'. `row_axis` is the axis of the rows, if
     there is one, and `positions` (R) where they lie on it, known to 4 + |position| ulp.
     `cut(rows, steps)` gives the lengths of the steps (rows, steps) where they differ. With `full_period`, where z is
-    not even, the period stands for the half. `span_low` and `p_low` are what float64 took from the half period and
-    from p: None where nothing is known of it, or where it is 0.
+    not even, the period stands for the half. `p_low` is what float64 took from p: None where nothing is known of it,
+    or where it is 0.
     """
 
     p: np.ndarray
-    span: np.ndarray
-    bound: np.ndarray
-    rate: np.ndarray
+    sizes: Callable[[], RowSizes]
     c2: float
     sample: Callable
     walk: Callable | None = None
@@ -119,8 +136,28 @@ class Problem:
     positions: np.ndarray | None = None
     cut: Callable | None = None
     full_period: bool = False
-    span_low: np.ndarray | None = None
     p_low: np.ndarray | None = None
+
+    @cached_property
+    def row_sizes(self):
+        """The RowSizes."""
+        return self.sizes()
+
+    @property
+    def span(self):
+        return self.row_sizes.span
+
+    @property
+    def bound(self):
+        return self.row_sizes.bound
+
+    @property
+    def rate(self):
+        return self.row_sizes.rate
+
+    def points(self, those):
+        """p of some of the R L points."""
+        return self.p[those // self.p.shape[1], those % self.p.shape[1]]
 
     def lengths(self, rows, steps):
         """Lengths of the steps (rows, steps), some an ulp longer or shorter, evenly spread, to fill
@@ -131,8 +168,8 @@ class Problem:
         span = self.span[rows]
         h = span / steps
         left = (span - steps * h) - split_error(float(steps), h, steps * h)
-        if self.span_low is not None:
-            left += self.span_low[rows]
+        if self.row_sizes.span_low is not None:
+            left += self.row_sizes.span_low[rows]
         ulp = np.spacing(h)
         lengths = np.empty((rows.size, steps))
         spread(h, ulp, np.rint(left / ulp), lengths)
@@ -142,10 +179,9 @@ class Problem:
         """Points `p` (one row for each of `rows`) on their own, no axis, with what exact rules say
         of them.
         """
-        span_low = None if self.span_low is None else self.span_low[rows]
         return replace(
-            self, p=p, span=self.span[rows], bound=self.bound[rows], rate=self.rate[rows], rule=rule, constant=None,
-            span_low=span_low, p_low=None, line=None, row_axis=None, exact=None,
+            self, p=p, sizes=lambda: self.row_sizes.at(rows), rule=rule, constant=None,
+            p_low=None, line=None, row_axis=None, exact=None,
             sample=lambda used, nodes, steps: self.sample(rows[used], nodes, steps),
             walk=self.walk and (lambda used, p, tolerance: self.walk(rows[used], p, tolerance)),
             cut=self.cut and (lambda used, steps: self.cut(rows[used], steps)),
@@ -153,8 +189,8 @@ class Problem:
 
 
 def of_rows(rows, sample, walk, exact=None):
-    """The functions of a Problem from a scene's kernels, which take some of its `rows` (R, ...) and
-    fill `out`.
+    """The functions of a Problem from a scene's kernels, which take some of what `rows()` gives (R,
+    ...) and fill `out`.
 
     `sample(rows, nodes, out)`; `walk(rows, p, tolerance, out, reached)`; `exact(rows, p, low,
     steps, out)` or None.
@@ -162,18 +198,18 @@ def of_rows(rows, sample, walk, exact=None):
 
     def samples(used, nodes, steps):
         out = np.empty((used.size, steps, 2, nodes.size))
-        sample(rows[used], nodes, out)
+        sample(rows()[used], nodes, out)
         return out
 
     def walked(used, p, tolerance):
         out = np.full((used.size, RESULTS), np.nan)
         reached = np.zeros(used.size, np.bool_)
-        walk(rows[used], p, tolerance, out, reached)
+        walk(rows()[used], p, tolerance, out, reached)
         return out, reached
 
     def solved(used, p, low, steps):
         out = np.empty((used.size, RESULTS))
-        exact(rows[used], p, low, steps, out)
+        exact(rows()[used], p, low, steps, out)
         return out
 
     return {"sample": samples, "walk": walked, "exact": solved if exact else None}

@@ -42,7 +42,7 @@ def solve(problem, method, asked, answers, where=None):
     # the points of each row, side by side
     chosen = np.arange(count.max(initial=1)) < count[:, None]
     p, points = np.full(chosen.shape, np.nan), np.flatnonzero(where)
-    p[chosen] = problem.p.reshape(-1)[points]
+    p[chosen] = problem.points(points)
     rule = None
     if problem.rule is not None:
         rule = np.zeros(chosen.shape, problem.rule.dtype)
@@ -124,7 +124,7 @@ def _first_tolerance(problem, rtol):
 def _first_rungs(problem, phase, distance):
     rung = np.empty(problem.p.shape, np.int64)
     first_rungs(
-        problem.p,
+        np.array(problem.p),  # kernels would be compiled again for a view
         problem.bound,
         problem.span,
         problem.rate,
@@ -142,7 +142,7 @@ def _walk(problem, method, rung, out):
     """
     points = np.flatnonzero(rung >= 0)
     rows, tolerance = points // rung.shape[1], TOLERANCES.rungs[rung.reshape(-1)[points]]
-    results, reached = problem.walk(rows, problem.p.reshape(-1)[points], tolerance)
+    results, reached = problem.walk(rows, problem.points(points), tolerance)
     out[points] = np.where(reached[:, None], results, np.nan)
 
 
@@ -151,7 +151,7 @@ def _chain(problem, method, rung, out):
     bounded work.
     """
     order, rows, on_rung, starts, ends = _segments(rung)
-    nodes, p = np.array(method.NODES), problem.p.reshape(-1)
+    nodes, p = np.array(method.NODES), np.array(problem.p).reshape(-1)
     scattered = rung.shape[1] < LANES_PER_ROW
 
     def compose(samples, h, first, last):

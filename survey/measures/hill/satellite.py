@@ -113,6 +113,15 @@ class Motion:
         return self.k > 1
 
     @cached_property
+    def columns(self):
+        """The rows as `kernels.hill.satellite` takes them."""
+        columns = np.empty((self.k.size, motion.ROW))
+        columns[:, motion.MODULUS], columns[:, motion.COMPLEMENT] = self.k, self.kc
+        columns[:, motion.HALF], columns[:, motion.OBLATE] = self.half[0], self.oblate
+        columns[:, motion.GIVEN], columns[:, motion.WHICH] = self.given, self.which
+        return columns
+
+    @cached_property
     def half(self):
         """The half period, rounded, and what float64 took from it."""
         return half_periods(self.k, self.kc)

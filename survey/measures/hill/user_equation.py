@@ -213,9 +213,13 @@ def problem(z, points, edges, period, slack, even, exact=None):
         return solved_exactly(z, points[rows], rows, steps, scale, even, exact, number)
 
     frequency = steps.frequency(size)
+    sizes = monodromy.RowSizes(
+        span=np.where(rough | np.isnan(scale), np.nan, steps.end),
+        bound=np.column_stack([frequency**2, 0 * frequency, 0 * frequency]),
+        rate=steps.rates,
+    )
     own = monodromy.Problem(
-        p=np.ones((len(points), 1)), span=np.where(rough | np.isnan(scale), np.nan, steps.end), c2=0.0,
-        bound=np.column_stack([frequency**2, 0 * frequency, 0 * frequency]), rate=steps.rates,
+        p=np.ones((len(points), 1)), sizes=lambda: sizes, c2=0.0,
         sample=sample, walk=walk, cut=lambda rows, number: steps.of(rows, number)[1], full_period=not even,
         exact=exactly if exact else None,
     )  # fmt: skip

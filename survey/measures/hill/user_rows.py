@@ -9,6 +9,7 @@ axes, never on the block.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -30,8 +31,8 @@ class Axes:
 
 
 def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
-    """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), and where a row is
-    `rough` (R).
+    """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), where a row is `rough` (R),
+    and where its span is NaN, as z is rough or not finite (R).
 
     `ranges(points)` gives periods, edges and slack as `user_equation` takes them; what it gives,
     and z, is named by the hashable `key`. `known`: what `_from_corners` gave for their map.
@@ -40,10 +41,20 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
     ends = [_with(points, axes.lane, end) for end in axes.line[1:]]
     known = known or _from_corners(z, axes, points, ranges, even)
     sizes, rate, scale, rough = known(points) if known else _measured(z, axes, points, ranges, even)
-    steps = Steps(edges, slack, sizes.max(axis=0), rate)
+    bad = rough | np.isnan(scale)
+
+    @cache
+    def steps():
+        return Steps(edges, slack, sizes.max(axis=0), rate)
+
+    def sizes_of_rows():
+        own = steps()
+        low, high = (own.frequency(size) ** 2 for size in sizes)
+        bound = _bound(low, high, *axes.line[1:])
+        return monodromy.RowSizes(np.where(bad, np.nan, own.end), bound, own.rates)
 
     def sample(rows, nodes, number):
-        u = steps.at_nodes(rows, nodes, number)
+        u = steps().at_nodes(rows, nodes, number)
         low, high = (at(z, end[rows], u.reshape(rows.size, -1)).reshape(u.shape) for end in ends)
         out = np.zeros((rows.size, number, 2, nodes.size + 1))
         out[:, :, 1, :-1] = (high - low) / (axes.line[2] - axes.line[1])
@@ -53,22 +64,21 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
 
     def walk(rows, p, tolerance):
         return user_equation.walked(
-            z, _with(points[rows], axes.lane, p), rows, steps, scale, tolerance
+            z, _with(points[rows], axes.lane, p), rows, steps(), scale, tolerance
         )
 
     def exactly(rows, p, low, number):
         own = _with(points[rows], axes.lane, p)
-        return user_equation.solved_exactly(z, own, rows, steps, scale, even, exact, number)
+        return user_equation.solved_exactly(z, own, rows, steps(), scale, even, exact, number)
 
     own = monodromy.Problem(
-        p=lanes, span=np.where(rough | np.isnan(scale), np.nan, steps.end), c2=0.0,
-        bound=_bound(*(steps.frequency(size) ** 2 for size in sizes), *axes.line[1:]), rate=steps.rates,
-        sample=sample, walk=walk, cut=lambda rows, number: steps.of(rows, number)[1], full_period=not even,
+        p=lanes, sizes=sizes_of_rows, c2=0.0,
+        sample=sample, walk=walk, cut=lambda rows, number: steps().of(rows, number)[1], full_period=not even,
         exact=exactly if exact else None, line=axes.line,
         row_axis=_row_axis(z, key, axes, points, ranges, even, known) if axes.across is not None else None,
         positions=points[:, axes.across] if axes.across is not None else None,
     )  # fmt: skip
-    return own, rough
+    return own, rough, bad
 
 
 def _measured(z, axes, points, ranges, even):
