@@ -222,12 +222,12 @@ class Tally:
             value, error = (
                 np.asarray(arrays[key]).reshape(size, -1).T for key in (name, f"{name}_error")
             )
-            if not (error > self.rtol).any():  # none is missed
+            if not error.size or error.max() <= self.rtol:  # none is missed
                 continue
             for first in range(0, size, CHUNK):
-                own = slice(first, first + CHUNK)
                 for one, bar in zip(value, error, strict=True):
-                    missed[own] |= _exceeds(one[own], bar[own], self.rtol)
+                    some = first + np.flatnonzero(bar[first : first + CHUNK] > self.rtol)
+                    missed[some] |= _exceeds(one[some], bar[some], self.rtol)
         self.missed += int(np.count_nonzero(missed))
         self.points += size
         for name, codes in self.codes.items():
@@ -236,10 +236,9 @@ class Tally:
                 number = int(np.count_nonzero(arrays[name] == code)) if left else 0
                 self.counts[name][key] += number
                 left -= number
-        if "verdict" in self.codes:
-            why = arrays["status"][
-                (arrays["verdict"] == UNDECIDED) & (arrays["status"] != status.OK)
-            ]
+        other = arrays["status"] != status.OK
+        if "verdict" in self.codes and other.any():
+            why = arrays["status"][(arrays["verdict"] == UNDECIDED) & other]
             for key in self.unanswered if why.size else ():
                 self.unanswered[key] += int(np.count_nonzero(why == self.codes["status"][key]))
 
