@@ -64,10 +64,10 @@ STATE = 13
 # ... and of what it does not: the coefficients, their bounds, the next requested time, a.
 (P12, P31, PD, P2, P3, PF, PG, PDG, NEXT, TURN) = range(10)
 FIXED = 10
-# Rows of what is found at a time in the step: is there one, when, and there psi, w and the squares of
-# their errors.
-(DUE, AFTER, PSI_AT, V_AT, SAA_AT, SBB_AT) = range(6)
-FOUND = 6
+# Rows of what is found at a time in the step: is there one, when, and there phi, w, their bars,
+# whether these are narrow enough, and the turnings before.
+(DUE, AFTER, PHI_AT, V_AT, WIDE_AT, HIGH_AT, NARROW, TURNINGS_AT) = range(8)
+FOUND = 8
 ROWS = TABLE + 2 * STATE + FIXED + FOUND + 1
 
 # what a step has made of a lane, or the sum of both: it has passed its next time
@@ -398,8 +398,8 @@ def _due(times, state, before, found, fate, row, column, first):
 
 
 @inline
-def _evaluate(T, before, fixed, found, first):
-    """Find psi, w and the squares of their errors AFTER the start of the step in BLOCK lanes."""
+def _evaluate(T, state, before, fixed, found, first):
+    """Find what there is AFTER the start of the step in BLOCK lanes."""
     for j in range(BLOCK):
         i = np.uint64(first + j)  # no index that may count from the end: else no vector code
         dt = found[AFTER, i]
@@ -409,30 +409,33 @@ def _evaluate(T, before, fixed, found, first):
         saa, _sab, sbb = ellipse(
             carried, jacobian, dt, v, last_terms(T, i), fixed[PF, i], fixed[PG, i]
         )
-        found[PSI_AT, i], found[V_AT, i] = before[PSI, i] + x, v
-        found[SAA_AT, i], found[SBB_AT, i] = saa, sbb
+        n, turns, angle = state[STEPS, i], state[TURNS, i], fixed[TURN, i]
+        count, sign, unsure = before[COUNT, i], before[SIGN, i], before[UNSURE, i]
+        wide, high = bar(n, saa), bar(n, sbb)
+        # then w is 0 at the start and nowhere else
+        from_rest = (before[STEPS, i] == 0.0) & (before[V, i] == 0.0)
+        sure = (unsure < 3.0) & (count >= 0.0) & ((abs(v) > high) | from_rest)
+        passed = (sign * v < 0.0) & (not from_rest)
+        narrow = (wide < TRUST) & (high < TRUST * (1.0 + abs(v)))
+        found[PHI_AT, i], found[V_AT, i] = ((before[PSI, i] + x) + angle) + turns * TWO_PI, v
+        found[WIDE_AT, i] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle))
+        found[HIGH_AT, i], found[NARROW, i] = high, 1.0 if narrow else 0.0
+        found[TURNINGS_AT, i] = count + (1.0 if passed else 0.0) if sure else float(UNDETERMINED)
 
 
 @kernel
-def _note(state, before, fixed, found, fate, row, column, first, floats, turnings):
+def _note(found, fate, row, column, first, floats, turnings):
     """Note what BLOCK lanes have found for their next times; those whose bars are too wide are lost."""
     for i in range(first, first + BLOCK):
         if found[DUE, i] == 0.0:
             continue
-        n, turns, angle, v = state[STEPS, i], state[TURNS, i], fixed[TURN, i], found[V_AT, i]
-        wide, high = bar(n, found[SAA_AT, i]), bar(n, found[SBB_AT, i])
-        if not (wide < TRUST and high < TRUST * (1.0 + abs(v))):
+        if found[NARROW, i] == 0.0:
             fate[i] = _LOST
             continue
-        # then w is 0 at the start and nowhere else
-        from_rest = before[STEPS, i] == 0.0 and before[V, i] == 0.0
-        known = before[UNSURE, i] < 3.0 and before[COUNT, i] >= 0.0
-        sure = known and (abs(v) > high or from_rest)
-        passed = before[SIGN, i] * v < 0.0 and not from_rest
         own = floats[row[i], column[i]]
-        own[rc.PHI], own[rc.W] = (found[PSI_AT, i] + angle) + turns * TWO_PI, v
-        own[rc.PHI_BAR], own[rc.W_BAR] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle)), high
-        turnings[row[i], column[i]] = int(before[COUNT, i]) + passed if sure else UNDETERMINED
+        own[rc.PHI], own[rc.PHI_BAR] = found[PHI_AT, i], found[WIDE_AT, i]
+        own[rc.W], own[rc.W_BAR] = found[V_AT, i], found[HIGH_AT, i]
+        turnings[row[i], column[i]] = int(found[TURNINGS_AT, i])
         column[i] += 1
 
 
@@ -507,8 +510,8 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
         steps += LANES
         for first in range(0, LANES, BLOCK):
             while _due(times, state, before, found, fate, row, column, first):
-                _evaluate(T, before, fixed, found, first)
-                _note(state, before, fixed, found, fate, row, column, first, floats, turnings)
+                _evaluate(T, state, before, fixed, found, first)
+                _note(found, fate, row, column, first, floats, turnings)
         if _free(times, limit, state, fixed, fate, row, column, status):
             waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
     return steps

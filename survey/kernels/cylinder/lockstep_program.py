@@ -473,10 +473,8 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
         lockstep._turnings(state)
         for first in range(0, LANES, lockstep.BLOCK):
             while lockstep._due(times, state, before, found, fate, row, column, first):
-                lockstep._evaluate(T, before, fixed, found, first)
-                lockstep._note(
-                    state, before, fixed, found, fate, row, column, first, floats, turnings
-                )
+                lockstep._evaluate(T, state, before, fixed, found, first)
+                lockstep._note(found, fate, row, column, first, floats, turnings)
         free = lockstep._free(times, limit, state, fixed, fate, row, column, status)
 
 
