@@ -86,24 +86,40 @@ def trace(solve, square, seeds, each=in_turn):
     """
     expand = expander(solve, square)
     of_seed = np.full(seeds.kind.size, -1)
-    towards = np.zeros(seeds.x.shape)
+    towards = np.full(seeds.x.shape, np.nan)
+    row = np.unique(seeds.x[:, 0], return_inverse=True)[1].ravel()
 
-    def task(own):
-        at = seeds.x[own], seeds.kind[own], np.full(own.size, LONGEST)
-        towards[own] = tangents(solve, square, *at, seeds.low[own], seeds.high[own])
+    def doubtful(of):
+        """Which of the seeds beside a path may lie on another curve, which crosses it: a row that the
+        path crosses has its own seed there, and others are listed too.
+        """
+        in_row, beside = np.bincount(row), np.bincount(row[of], minlength=row.max() + 1)
+        return of[((beside > 1) | (in_row == 1))[row[of]]]
 
-    _in_chunks(each, task, of_seed.size, "parts of the curves' seeds")
+    def know_directions(of):
+        of = of[np.isnan(towards[of, 0])]
+
+        def task(some):
+            own = of[some]
+            at = seeds.x[own], seeds.kind[own], np.full(own.size, LONGEST)
+            towards[own] = tangents(solve, square, *at, seeds.low[own], seeds.high[own])
+
+        _in_chunks(each, task, of.size, "parts of the curves' seeds")
+
     paths, starts = [], []
     while (of_seed < 0).any():
         start = _starts(seeds, np.flatnonzero(of_seed < 0))
-        for path, seed in zip(_follow(expand, seeds, start), start, strict=True):
-            on_it = (
-                (of_seed < 0)
-                & (seeds.kind == seeds.kind[seed])
-                & (seeds.index == seeds.index[seed])
-            )
-            near = np.flatnonzero(on_it)
-            of_seed[near[_on(path, seeds.x[near], towards[near])]] = len(paths)
+        new = _follow(expand, seeds, start)
+        beside = []
+        for path, seed in zip(new, start, strict=True):
+            alike = (seeds.kind == seeds.kind[seed]) & (seeds.index == seeds.index[seed])
+            near = np.flatnonzero((of_seed < 0) & alike)
+            beside.append(near[_on(path, seeds.x[near], towards[near])])
+        know_directions(np.concatenate([doubtful(near) for near in beside]))
+        for path, seed, near in zip(new, start, beside, strict=True):
+            some = doubtful(near)
+            other = some[~_on(path, seeds.x[some], towards[some])]
+            of_seed[np.setdiff1d(near, other)] = len(paths)
             of_seed[seed] = len(paths)
             paths.append(path)
             starts.append(seed)
@@ -270,8 +286,8 @@ def _joined(trail, ended, closed):
 
 
 def _on(path, x, towards):
-    """Which of the positions x (n, 2), with tangents `towards`, lie on the path (its cubic Hermite
-    pieces)?
+    """Which of the positions x (n, 2), with tangents `towards` (NaN where any will do), lie on the
+    path (its cubic Hermite pieces)?
     """
     found = np.zeros(len(x), bool)
     length = np.hypot(*np.diff(path.x, axis=0).T)
@@ -285,8 +301,8 @@ def _on(path, x, towards):
             s = np.clip(((x[i] - a) * (b - a)).sum(axis=1) / chord**2, 0, 1)[:, None]
         curve = (1 + 2 * s) * (1 - s) ** 2 * a + s**2 * (3 - 2 * s) * b
         curve += chord[:, None] * (s * (1 - s) ** 2 * ta - s**2 * (1 - s) * tb)
-        same = (((1 - s) * ta + s * tb) * towards[i]).sum(axis=1) > TURN
-        found[i[same & (np.hypot(*(curve - x[i]).T) <= NEAR * chord)]] = True
+        other = (((1 - s) * ta + s * tb) * towards[i]).sum(axis=1) <= TURN
+        found[i[~other & (np.hypot(*(curve - x[i]).T) <= NEAR * chord)]] = True
     return found
 
 
