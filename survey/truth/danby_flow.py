@@ -101,8 +101,9 @@ def points(mu, e, tolerance, out):
         # columns x[k] of Phi; with J = (0 1; -1 0) in (x, q | p, m): Phi^-1 = (T', -S'; -Q', P')
         o = out[i]
         _invariants(x, o)
-        o[A_DOUBT] = 1e-29 * steps * largest * largest
-        o[B_DOUBT] = 1e-29 * steps * largest**4
+        # ten ulp of a step; off by a thousandth of it or less, against mpmath
+        o[A_DOUBT] = 1e-31 * steps * largest * largest
+        o[B_DOUBT] = 1e-31 * steps * largest**4
         o[STEPS] = float(steps)
         if steps >= MOST:
             o[:] = np.nan
