@@ -101,7 +101,7 @@ def points(mu, e, tolerance, out):
         # columns x[k] of Phi; with J = (0 1; -1 0) in (x, q | p, m): Phi^-1 = (T', -S'; -Q', P')
         o = out[i]
         _invariants(x, o)
-        # ten ulp of a step; off by a thousandth of it or less, against mpmath
+        # ten ulp of a step: errors are a tenth of it at most, against mpmath (tests/truth)
         o[A_DOUBT] = 1e-31 * steps * largest * largest
         o[B_DOUBT] = 1e-31 * steps * largest**4
         o[STEPS] = float(steps)
