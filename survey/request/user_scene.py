@@ -66,7 +66,8 @@ analytic between BREAKS. A spike is seen if it is T/128 wide at half its height
 (`A_resolved_width`); a narrower one may go unseen, unless its position is one of BREAKS.
 
 f(t, x, p, out) is recorded likewise, and its derivatives by x are those of the record; it must be
-analytic in t and x: branches may depend on parameters alone.
+analytic in t and x: branches may depend on parameters alone. A pulse in t narrower than T/128 at
+half its height may go unseen, as may a feature of f in x that an orbit passes in less than T/1000.
 
 f and g are run as Python, once for each path that they take at the parameters, to record their
 operations on phi; the record gives their Taylor series, bounds of them and of their rounding. So
@@ -343,7 +344,8 @@ def orbit(
     ----------
     f : function of t, x, p and out, plain Python or numba's: fills out, n numbers, with x'; x are the n states, p the
         float64 array of the parameters, in order. It must be analytic in t and x: no abs, maximum
-        or if on these.
+        or if on these. A pulse narrower than T/128 at half its height may go unseen, as may a feature
+        in x that an orbit passes in less than T/1000.
     states : names of the n states.
     period : T, a number or a function of p; None: f does not depend on t, and T is found.
     parameters : their names, or `survey.scene.Parameter`s.

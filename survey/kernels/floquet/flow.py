@@ -2,8 +2,8 @@
 series about the beginnings of steps; many points at once, each with steps of its own.
 
 A step goes as far as the last two coefficients allow for `tolerance`, relative to the states (Jorba & Zou), and no
-farther than `reach` / |A|, A = df/dx. No bounds are made here: `measures.floquet.existence` has them of the defect of
-the series.
+farther than `reach` / |A|, A = df/dx, or than is given. No bounds are made here: `measures.floquet.existence` has
+them of the defect of the series.
 
 Source: A. Jorba, M. Zou, Experimental Mathematics 14 (2005) 99.
 """
@@ -19,19 +19,21 @@ from survey.kernels.jit import kernel
 ORDER = 20
 DIGITS = 2.0**48  # of the ends of steps, so that sums and differences of them are exact
 WIDEST = 16.0  # a step, relative to that for which its series was made
+LEAST = 1e-250  # of a coefficient: a smaller one, as of a force that has nearly underflowed, is 0
 # where a series is not finite; of the span: steps as short end at a singularity
 SHORTER, SHORTEST = 0.1, 1e-9
 
 
 @kernel
 def flow(
-    operations, signs, inside, order, used, terms, numbers, states_at, x0, span, reach, tolerance, most, first, X, M,
-    size, steps, begin, length, series,
+    operations, signs, inside, order, used, terms, numbers, states_at, x0, span, reach, longest, tolerance, most, first,
+    X, M, size, steps, begin, length, series,
 ):  # fmt: skip
     """Fill X (N, n), the states at t = span (N) from x0 (N, n) at 0, and the numbers of `steps`
     (N); NaN: it fails.
 
-    numbers (N, count), states_at (n): where the states stand among them; `most` steps at most. M (N, n, n), if
+    numbers (N, count), states_at (n): where the states stand among them; no step is longer than
+    `longest` (N), and there are `most` at most. M (N, n, n), if
     N > 0: dX/dx0, and size (N, n): the largest moduli of the states at the ends of steps. If first
     (N + 1) is not empty, step k of point i is recorded at first[i] + k: `begin`, `length`, `series`
     (n, ORDER + 1) in units of the step.
@@ -99,6 +101,7 @@ def flow(
                     shares[lane] = 0.0
                     continue
                 h = min(share * s[lane], reach / a[lane]) if a[lane] > 0.0 else share * s[lane]
+                h = min(h, longest[i])
                 rest = span[i] - t[lane]
                 if h >= rest:
                     end = span[i]
@@ -157,7 +160,7 @@ def _share(S, held, lane, tolerance):
             last = abs(S[own, m, lane])
             if not math.isfinite(last):
                 return math.nan
-            if last > 0.0:
+            if last > LEAST:
                 share = min(share, (tolerance * size / last) ** (1.0 / m))
     return share
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from survey.kernels.floquet.flow import ORDER, flow
 from survey.kernels.math.roundoff import ROUNDOFF
-from survey.measures.floquet import trace
+from survey.measures.floquet import probing, trace
 from survey.measures.floquet.symmetry import SHARE, Symmetry
 from survey.measures.floquet.system import KEPT, TRIED, Raised, is_undefined
 from survey.measures.floquet.trace import Graph, Unsupported
@@ -266,7 +266,8 @@ class Programs:
         A = self.A
         flow(
             A.operations, A.signs, A.inside, A.order, A.used, A.terms, np.ascontiguousarray(numbers[0]), self.states_at,
-            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach, tolerance, most,
+            np.ascontiguousarray(x0), np.ascontiguousarray(span), reach,
+            probing.longest_steps(self.f, numbers, span, reach), tolerance, most,
             np.zeros(0, int) if first is None else first, X, M, size, steps, *recorded,
         )  # fmt: skip
         return (X, M, size, steps) if first is None else (X, *recorded)

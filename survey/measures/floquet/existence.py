@@ -28,12 +28,13 @@ from survey.kernels.floquet.discs import couplings
 from survey.kernels.floquet.flow import ORDER, spread
 from survey.kernels.floquet.steps import carried, products
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
-from survey.measures.floquet import monodromy
+from survey.measures.floquet import monodromy, probing
 from survey.measures.floquet.newton import applied, bordered, chosen, inverse
 
 # of a step; sums with the ends of steps are exact
 NODES = np.array([0.0, 0.25, 0.5, 0.75, 0.875, 1.0])
 MIDDLE = 2  # of NODES
+BETWEEN = (np.arange(64) + 0.5) / 64  # where f may have spikes
 MEAN = np.array([7.0, 32.0, 12.0, 32.0, 0.0, 7.0]) / 90.0  # over a step, by NODES (Boole)
 SAMPLED = 1.25  # samples within a step, whose length is a small part of the radius of convergence
 WIDER = 1.1  # the tube than the linear equation says, and bounds to first order in its width
@@ -110,7 +111,10 @@ class OrbitSteps:
         dX = _sum((series * k)[:, :, 1:]) / self.h[:, None, None]
         noise = ROUNDOFF_UP * _sum((moduli * k * (2 * k + 2))[:, :, 1:]) / self.h[:, None, None]
         f, df = (one[..., 0].swapaxes(1, 2) for one in self.along(programs.f, self.noise_X))
-        self.defect = SAMPLED * self.h[:, None] * (abs(dX - f) + df + noise).max(axis=2)
+        defect = (abs(dX - f) + df + noise).max(axis=2)
+        if probing.suspects(programs.f):  # a step may have passed a spike
+            defect = np.fmax(defect, self._between(series))
+        self.defect = SAMPLED * self.h[:, None] * defect
         # a series begins where the one before it ends, as it is summed
         end, begins = self.X[:-1, :, -1], series[1:, :, 0]
         self.defect[:-1] += np.where(
@@ -129,6 +133,15 @@ class OrbitSteps:
         self.end = X
         squares = (self.X * self.X).sum(axis=1) @ MEAN
         self.square = np.add.reduceat(squares * self.h, self.first[:-1]) / T
+
+    def _between(self, series):
+        """The defect (tasks, n) of the series X' - f(t, X) at BETWEEN; infinite where there is none."""
+        k = np.arange(ORDER + 1.0)
+        X, dX = _sum(series, BETWEEN), _sum((series * k)[:, :, 1:], BETWEEN)
+        t = self.begin[:, None] + self.h[:, None] * BETWEEN
+        f, _ = self.programs.along(self.programs.f, self.numbers, t, X, 0.0 * X)
+        off = abs(dX / self.h[:, None, None] - f[..., 0].swapaxes(1, 2)).max(axis=2)
+        return np.where(np.isnan(off), np.inf, off)
 
     def along(self, program, width):
         """A program's values at the nodes, and bounds, if the states are known to within `width`."""
@@ -294,11 +307,11 @@ class OrbitSteps:
         return found
 
 
-def _sum(series):
-    """The series (N, n, K) at NODES (N, n, m), by Horner's rule."""
-    total = np.zeros((*series.shape[:2], NODES.size))
+def _sum(series, nodes=NODES):
+    """The series (N, n, K) at nodes (N, n, m), by Horner's rule."""
+    total = np.zeros((*series.shape[:2], nodes.size))
     for k in range(series.shape[2] - 1, -1, -1):
-        total = total * NODES + series[:, :, k, None]
+        total = total * nodes + series[:, :, k, None]
     return total
 
 

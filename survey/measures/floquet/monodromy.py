@@ -25,7 +25,6 @@ TIMES = chebyshev.shares(12)
 WEIGHTS = np.cos(1.0 + 7.0 * np.arange(64)) + 1.5
 TRANSFORM = chebyshev.cosines(12) / 6
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
-BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 DIGITS = 48  # bits of the ends of steps
 GROWTH = 1.5  # steps, from rung to rung
 CALL_WORK = 4_000_000  # keeps a kernel call below about a second: steps n^2
@@ -153,7 +152,7 @@ class SystemPoints:
         """Numbers of steps (K, P) of some points, `factor` (K) times what norm and rate ask for."""
         length = np.diff(self.edges[those], axis=1)
         with np.errstate(invalid="ignore"):
-            least = 0.5 * length / reach * (self.size[those] + BY_RATE * self.rate[those])
+            least = 0.5 * length / reach * (self.size[those] + probing.BY_RATE * self.rate[those])
             count = np.ceil(factor[:, None] * np.maximum(np.ceil(least), 1.0))  # more on every rung
         return np.where(
             length > 0, np.clip(np.nan_to_num(count, nan=1.0), 1, MOST_STEPS), 0

@@ -3,12 +3,13 @@ of other steps.
 
 A step's Taylor series sees a pole from afar, but not exp(-x^2) from x = 10 on, nor cos^200 at its
 zeros. So basis functions that may hide such a spike are sampled densely; products of a few sines
-and cosines of lines cannot. Chebyshev coefficients tell how fast a function varies, but of a spike
+and cosines of lines, and of states, cannot. Chebyshev coefficients tell how fast a function varies, but of a spike
 at an end of the interval too little, as the square root of their number resolves it there: next to
 the ends differences tell.
 """
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from survey.kernels.math import chebyshev
 # The width at half height, as a share of the period, from which a spike is seen; Chebyshev points
 # of each piece, which lie closer than that; and those when a scene is checked.
 WIDTH, NUMBER, CHECKED = 1 / 128, 256, 16384
-WAVES = tuple(pg.CODES[name] + pg.OF_LINE for name in ("sin", "cos"))
+WAVES_OF_ANY = tuple(pg.CODES[name] for name in ("sin", "cos"))
+WAVES = tuple(code + pg.OF_LINE for code in WAVES_OF_ANY)
 # sines and cosines of lines, multiplied with each other: their series of order 16 show them
 SIMPLE = 4
 RESOLVED = 1e-12  # relative to the largest Chebyshev coefficient: smaller ones do not count
@@ -28,28 +30,66 @@ ENDS = 1 / 8  # of the interval: so far from its ends differences count
 ORDER = 4  # of differences
 # (max |f''''| / 24 max |f|)^(1/4) times this is the rate: half of what the coefficients of a Gaussian show
 OF_DIFFERENCES = 0.6
+BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 SEEN = 2.0  # a rate this many times that of fewer samples takes its place
 
 
 def suspects(program):
     """The basis functions of the entries that may hide a spike."""
-    degree = {}
+    known = _degrees(program, program.used)
+    return [int(node) for node in program.used if known[int(node)][0] > SIMPLE]
 
-    def visit(node):
-        if node not in degree:
-            code, a, b, first, last = program.operations[node]
-            if code == pg.COMBINATION:
-                degree[node] = max(
-                    (visit(int(k)) for k in program.inside[first:last, pg.ADDED]), default=0
-                )
-            elif code == pg.PRODUCT:
-                degree[node] = visit(int(a)) + visit(int(b))
-            else:
-                simple = code in (pg.ONE, pg.TIME, *WAVES)
-                degree[node] = int(code != pg.ONE) if simple else np.inf
-        return degree[node]
 
-    return [int(node) for node in program.used if visit(int(node)) > SIMPLE]
+def _degrees(program, nodes):
+    """{node: (of how many waves or states it is a product, does it depend on a state?)} of these basis
+    functions and of those that they are made of.
+    """
+    known = {}
+    for node in program.needed(nodes):
+        code, a, b, first, last = program.operations[node]
+        if code == pg.COMBINATION:
+            inside = [known[int(k)] for k in program.inside[first:last, pg.ADDED]]
+            degree = max((one for one, _ in inside), default=0)
+        elif code == pg.PRODUCT:
+            inside = [known[int(a)], known[int(b)]]
+            degree = sum(one for one, _ in inside)
+        elif code in (pg.ONE, pg.TIME, pg.STATE, *WAVES):
+            inside, degree = [], int(code != pg.ONE)
+        else:
+            inside = [known[int(k)] for k in ((a, b) if code == pg.QUOTIENT else (a,))]
+            wave = code in WAVES_OF_ANY and inside[0][0] <= 1
+            degree = 1 if wave else np.inf
+        known[node] = degree, code == pg.STATE or any(of_state for _, of_state in inside)
+    return known
+
+
+@lru_cache(maxsize=64)
+def _of_time(program):
+    """The basis functions of t alone that may hide a spike, wherever they stand in a program."""
+    known = _degrees(program, program.used)
+    return [k for k, (degree, of_state) in known.items() if degree > SIMPLE and not of_state]
+
+
+def longest_steps(program, numbers, span, reach):
+    """The longest steps (N) that see every spike, between 0 and `span` (N), of what depends on t
+    alone in the f of x' = f(t, x); infinite where nothing may hide one.
+    """
+    nodes, found = _of_time(program), np.full(len(span), np.inf)
+    if not nodes:
+        return found
+    for first in range(0, len(span), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
+        own, end = [values[some] for values in numbers], span[some, None]
+        t, spacing = _times(0.0 * end, end, NUMBER)
+        all_of_it = np.full(len(end), np.inf)
+        rates = [
+            _rate(values, NUMBER, spacing, bars.max(axis=1), all_of_it)
+            for values, bars in _values(program, own, t, nodes)
+        ]
+        fastest = np.nan_to_num(np.max(rates, axis=0), nan=0.0)
+        with np.errstate(divide="ignore"):
+            found[some] = reach * span[some] / (BY_RATE * fastest)
+    return found
 
 
 def rates(program, numbers, low, high, scale, number=NUMBER):
@@ -69,29 +109,43 @@ def rates(program, numbers, low, high, scale, number=NUMBER):
 
 def _rates(program, nodes, numbers, low, high, scale, number):
     """`rates` of some points."""
-    # not at an end itself, where A may be infinite; closer than the Chebyshev points in the middle
-    spacing = 4 * ENDS / number
-    beside = (np.arange(number // 4) + 0.5) * spacing
     if (low == low[0]).all() and (high == high[0]).all():  # what depends on t alone is sampled once
         low, high = low[:1], high[:1]
-    t = low + (high - low) * np.concatenate([chebyshev.shares(number), beside, 1.0 - beside])
+    t, spacing = _times(low, high, number)
     found = np.zeros((len(nodes), len(scale)))
     for k, (values, bars) in enumerate(_values(program, numbers, t, nodes)):
         terms = program.terms[program.terms[:, pg.BASIS] == nodes[k]]
         with np.errstate(all="ignore"):
             ratio = scale[:, terms[:, pg.COLUMN]] / scale[:, terms[:, pg.ROW]]
             entries = abs(numbers[0][:, terms[:, pg.NUMBER]] * ratio)
-            given = bars.max(axis=1), entries.max(axis=1) * (high - low)[:, 0]
-            by_coefficients = _rate_by_coefficients(values[:, :number], *given)
-            by_differences = _rate_by_differences(values, number, spacing, *given)
-        found[k] = np.maximum(by_coefficients, by_differences)
+        change = entries.max(axis=1) * (high - low)[:, 0]
+        found[k] = _rate(values, number, spacing, bars.max(axis=1), change)
     return found
 
 
-def _rate_by_coefficients(values, bar, change):
-    """The rate (N) of functions from their values (N, m) at Chebyshev points, which have an error
-    bound and `change` A over the interval by so much times themselves (N).
+def _times(low, high, number):
+    """Times (N, m) between `low` and `high` (N, 1): `number` Chebyshev points, then evenly spaced ones
+    next to each end, not at an end itself, where A may be infinite; and their spacing as a share.
     """
+    spacing = 4 * ENDS / number  # closer than the Chebyshev points in the middle
+    beside = (np.arange(number // 4) + 0.5) * spacing
+    shares = np.concatenate([chebyshev.shares(number), beside, 1.0 - beside])
+    return low + (high - low) * shares, spacing
+
+
+def _rate(values, number, spacing, bar, change):
+    """The rate (N) of functions from their values at `_times`, which have an error bound and `change`
+    A over the interval by so much times themselves (N).
+    """
+    with np.errstate(all="ignore"):
+        return np.maximum(
+            _rate_by_coefficients(values[:, :number], bar, change),
+            _rate_by_differences(values, number, spacing, bar, change),
+        )
+
+
+def _rate_by_coefficients(values, bar, change):
+    """The rate (N), from the values at Chebyshev points."""
     number = values.shape[1]
     mirrored = np.concatenate([values, values[:, ::-1]], axis=1)
     c = abs(np.fft.rfft(mirrored, axis=1)[:, :number]) / number

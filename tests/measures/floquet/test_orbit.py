@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import survey
+from survey import status as status_codes
 from survey.measures.floquet.equation import Equation
 
 
@@ -680,3 +681,48 @@ def test_a_start_at_rest_without_acceleration_is_one_like_others(start):
     ds = survey.evaluate(scene, c=[0.02, 0.1, 0.5])
     exact = np.stack([0.0 * ds.c, 1.0 / ds.c], axis=1)
     assert (ds.status == 0).all() and (abs(ds.x0 - exact) <= ds.x0_error + 4e-16 * exact).all()
+
+
+def pulsed(width, at):
+    """x'' + 0.3 x' + 2 x is a pulse, which is 0.53 width wide at half its height of 5."""
+
+    def f(t, x, p, out):
+        s = math.sin(math.pi * (t - at)) / width
+        out[0], out[1] = x[1], -2 * x[0] - 0.3 * x[1] + 5 * math.exp(-s * s)
+
+    return survey.orbit(f, states=("x", "v"), period=1.0, parameters=("a",), start=(0.0, 0.0))
+
+
+@pytest.mark.parametrize("at", [0.5, 0.3, 0.001])
+@pytest.mark.parametrize("width", [0.3, 0.05, 0.0372, 0.015, 0.006])
+def test_pulses_between_the_steps_of_a_motion_at_rest_are_seen(width, at):
+    """x0 = 0 had been shown for width 0.01, with bars of 1e-22; others had no orbit."""
+    ds = survey.evaluate(pulsed(width, at), a=1.0)
+    assert status(ds) == [0]
+    slope = np.array([[0.0, 1.0], [-2.0, -0.3]])
+    values, vectors = np.linalg.eig(slope)
+    share = np.linalg.solve(vectors, [0.0, 1.0])
+    t = np.arange(20_000) / 20_000.0  # a sum over a period, but for what decays along it
+    pulse = 5 * np.exp(-((np.sin(np.pi * (t - at)) / width) ** 2))
+    # modes as Fourier series: (mode i)(0) is the sum of c_k share / (2 pi i k - value)
+    c, k = np.fft.fft(pulse) / t.size, np.fft.fftfreq(t.size, 1 / t.size)
+    modes = [
+        (c * part / (2j * np.pi * k - value)).sum()
+        for value, part in zip(values, share, strict=True)
+    ]
+    assert contained(ds.x0, (vectors @ modes).real, ds.x0_error, 1e-13)
+
+
+@pytest.mark.parametrize("width", [0.03, 0.001])
+def test_a_feature_that_a_step_passes_is_no_orbit(width):
+    """A push where x is near 0.3; an orbit that did not meet it had been shown where width is 0.001."""
+
+    def f(t, x, p, out):
+        s = (x[0] - 0.3) / width
+        push = 0.5 * math.exp(-s * s)
+        out[0], out[1] = x[1], -2 * x[0] - 0.3 * x[1] + math.cos(t) + push
+
+    scene = survey.orbit(
+        f, states=("x", "v"), period=2 * math.pi, parameters=("a",), start=(0.5, 0.0)
+    )
+    assert status(survey.evaluate(scene, a=1.0)) == [status_codes.FIRST_OF_SCENE]
