@@ -274,4 +274,5 @@ def longest_step(p, w):
     w/2, so by Sturm zeros of w are pi / sqrt(max Q) apart at least. Here a third of that.
     """
     step = _longest_step_of_gyrostat(p, w)
-    return step if on_circle(p) else min(step, program.longest_step(p, w))
+    limited = len(p) > COLUMNS and p[program.RADIUS] < program.UNLIMITED
+    return min(step, program.longest_step(p, w)) if limited else step

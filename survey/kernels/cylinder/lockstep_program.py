@@ -72,6 +72,7 @@ from survey.kernels.cylinder.program import (
     SLOTS,
     SUBTRACT,
     TIMES,
+    UNLIMITED,
     VECTOR,
     WIDTH,
     function,
@@ -407,6 +408,17 @@ def _stay(state, fixed, found, radius):
 
 
 @splice
+def _limit(P, row, bounds, radius):
+    """As `_bound`, on a circle: the bounds that hold all round it, and the rows' own radii."""
+    for i in range(LANES):
+        if row[i] >= 0:
+            own = P[row[i]]
+            radius[i] = own[RADIUS]
+            for k in range(len(bounds)):
+                bounds[k, i] = own[BOUND_F + k]
+
+
+@splice
 def _enter(
     P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, row, column, status
 ):
@@ -443,7 +455,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
     work = np.zeros((lockstep.ROWS, LANES))
     T, state, before, fixed, found, fate = lockstep.split(work)
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
-    circle = p[ON_CIRCLE] > 0.0
+    circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
@@ -460,6 +472,9 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
         _begin(circle, state, fixed, phi)
         if not circle:
             _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
+        elif limited:
+            _limit(P, row, bounds, radius)
+        if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
@@ -557,7 +572,7 @@ _expand = far.expansion(far.given)
 def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, status, timed):
     """As `lockstep_phi.abels`, of the rows of P that have the program `lead`."""
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
-    circle = p[ON_CIRCLE] > 0.0
+    circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     work = np.zeros((far.ROWS, LANES))
     T, state, before = (
         work[: far.AFTER],
@@ -595,6 +610,9 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                 state[far.T_BOUND, i] += slip / state[far.W, i]
         else:
             _bound(p, N, state[far.AT], radius, row, points, over, known, out, bounds, width)
+        if circle and limited:
+            _limit(P, row, bounds, radius)
+        if limited:
             for i in range(LANES):
                 # a step no longer than the radius: see `lockstep_phi._advance`
                 fixed[BOUND_F, i] = max(bounds[0, i], 0.5 * state[far.W, i] / radius[i])
@@ -863,7 +881,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
     work, block = np.zeros((lockstep.ROWS, LANES)), np.zeros(8 * near.BLOCK)
     T, state, before, fixed, _found, fate = lockstep.split(work)
     p, tolerance = P[lead].copy(), min(tolerance, lockstep.COARSEST)
-    circle = p[ON_CIRCLE] > 0.0
+    circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
@@ -886,6 +904,9 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
         _begin(circle, state, fixed, phi)
         if not circle:
             _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
+        elif limited:
+            _limit(P, row, bounds, radius)
+        if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):

@@ -56,6 +56,7 @@ CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
     POWER,
 ) = range(9, 26)
 LEAST_RADIUS = 1e-9
+UNLIMITED = 1e300  # RADIUS on a circle where f and g cannot have spikes
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
 LANES = 32  # of them at once
 VECTOR = 8  # lanes of vector code

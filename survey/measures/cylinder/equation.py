@@ -24,6 +24,10 @@ MOST = 2000  # operations
 MOST_PATHS = 16  # through the code of f and g that are kept
 HIGHEST = 64  # the largest exponent that is multiplied out
 SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is checked
+# Of the circle: samples in which a spike of f or g is seen, whose coefficients count above RESOLVED,
+# relative to the largest; and what a step may span of the angle in which they vary.
+EVENLY, RESOLVED, SPAN = 512, 1e-12, 1.2
+SIMPLE = 4  # sines and cosines of lines, multiplied with each other, cannot hide a spike
 
 
 class Angle:
@@ -345,7 +349,8 @@ class Template:
             *found,
             slope,
         )
-        self._row[pg.RADIUS] = 1e300 if on_circle else 1.0
+        self._row[pg.RADIUS] = pg.UNLIMITED if on_circle else 1.0
+        self.may_hide = on_circle and max(_degrees(table)[k] for k in found) > SIMPLE
 
     def serve(self, points, which, found):
         """Add to `found` (which points, their rows of a flow, less the initial states) for those of
@@ -360,7 +365,7 @@ class Template:
             rounded = [_rounded(own[i]) for i in some]
             rows[:, [at + pg.NUMBER, at + column]] = np.reshape(rounded, (-1, 2))
         if some.size:
-            found.append((which[some], rows))
+            found.append((which[some], rows, self.may_hide))
         return which[~np.array(fits, bool)]
 
 
@@ -372,6 +377,43 @@ def _rounded(x):
         return np.nan, np.nan
     rounded = float(x)
     return rounded, abs(float(x - rounded)) * (1 + 1e-15) if np.isfinite(rounded) else 0.0
+
+
+def _degrees(table):
+    """Of how many sines and cosines of lines each of the values of a program is a product, no sums
+    counted; infinite where it is anything else.
+    """
+    degrees, lines = [0.0], [True]
+    for code, first, second, _number in table[1:]:
+        a, b = int(first), int(second)
+        line = code == pg.CONSTANT or (code in (pg.PLUS, pg.TIMES, pg.FROM) and lines[a])
+        if code in (pg.ADD, pg.SUBTRACT):
+            degree = max(degrees[a], degrees[b])
+        elif code == pg.MULTIPLY:
+            degree = degrees[a] + degrees[b]
+        elif code in (pg.CONSTANT, pg.PLUS, pg.TIMES, pg.FROM):
+            degree = 0.0 if code == pg.CONSTANT else degrees[a]
+        else:
+            degree = 1.0 if code in (pg.SIN, pg.COS) and lines[a] else np.inf
+        degrees.append(degree)
+        lines.append(line)
+    return degrees
+
+
+def _limit(rows):
+    """Limit the steps of programs on the circle, whose f and g may have spikes that the series of other
+    steps do not show.
+    """
+    values = np.empty((2, EVENLY))
+    for p in rows:
+        if not np.isfinite(p[pg.BOUND_F]):
+            continue
+        pg.sample(p, *values)
+        c = abs(np.fft.rfft(values, axis=1)) / EVENLY
+        with np.errstate(all="ignore"):
+            share = c / c.max(axis=1, keepdims=True)
+            rate = np.where(share > RESOLVED, np.arange(c.shape[1]) / (1.0 - np.log(share)), 0.0)
+        p[pg.RADIUS] = min(SPAN / max(rate.max(), 1e-300), pg.UNLIMITED)
 
 
 @lru_cache(maxsize=64)
@@ -407,9 +449,11 @@ def flows(f, g, points, on_circle):
                 known.append(template)
                 del known[:-MOST_PATHS]
                 left = template.serve(own, left, found)
-    longest = max((rows.shape[1] for _, rows in found), default=pg.OPERATIONS)
+    longest = max((rows.shape[1] for _, rows, _ in found), default=pg.OPERATIONS)
     out = np.full((len(own), longest), np.nan)
-    for served, rows in found:
+    for served, rows, may_hide in found:
         pg.complete(rows, SAMPLES)
+        if may_hide:
+            _limit(rows)
         out[served] = np.pad(rows, ((0, 0), (0, longest - rows.shape[1])))
     return out[where.reshape(-1)]
