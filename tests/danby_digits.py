@@ -11,8 +11,7 @@ SPARE = 15
 
 def invariants(mu, e):
     """a and b (mpf), to DIGITS digits and more of the larger of 1 and themselves."""
-    with mp.workdps(DIGITS):
-        spare, largest = SPARE, None
+    spare = SPARE
     while True:
         with mp.workdps(DIGITS + spare):
             phi = _half_period(mpf(mu), mpf(e))

@@ -470,10 +470,10 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
             if not lockstep.busy(row):
                 return
         _begin(circle, state, fixed, phi)
-        if not circle:
-            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
-        elif limited:
+        if circle and limited:
             _limit(P, row, bounds, radius)
+        elif limited:
+            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
         if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
@@ -608,10 +608,10 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                     fixed[BOUND_F, i] + fixed[BOUND_G, i] / state[far.W, i]
                 )
                 state[far.T_BOUND, i] += slip / state[far.W, i]
-        else:
-            _bound(p, N, state[far.AT], radius, row, points, over, known, out, bounds, width)
         if circle and limited:
             _limit(P, row, bounds, radius)
+        elif limited:
+            _bound(p, N, state[far.AT], radius, row, points, over, known, out, bounds, width)
         if limited:
             for i in range(LANES):
                 # a step no longer than the radius: see `lockstep_phi._advance`
@@ -902,10 +902,10 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
             if not lockstep.busy(row):
                 return
         _begin(circle, state, fixed, phi)
-        if not circle:
-            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
-        elif limited:
+        if circle and limited:
             _limit(P, row, bounds, radius)
+        elif limited:
+            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
         if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)

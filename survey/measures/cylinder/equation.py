@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from survey.kernels.cylinder import program as pg
+from survey.kernels.math import chebyshev
 from survey.measures.cylinder.numbers import Number, Steps
 from survey.measures.hill import multiprecision
 from survey.measures.hill.multiprecision import LOCK, Unsupported
@@ -386,17 +387,19 @@ def _degrees(table):
     degrees, lines = [0.0], [True]
     for code, first, second, _number in table[1:]:
         a, b = int(first), int(second)
-        line = code == pg.CONSTANT or (code in (pg.PLUS, pg.TIMES, pg.FROM) and lines[a])
+        with_number = code in (pg.PLUS, pg.TIMES, pg.FROM)
         if code in (pg.ADD, pg.SUBTRACT):
             degree = max(degrees[a], degrees[b])
         elif code == pg.MULTIPLY:
             degree = degrees[a] + degrees[b]
-        elif code in (pg.CONSTANT, pg.PLUS, pg.TIMES, pg.FROM):
-            degree = 0.0 if code == pg.CONSTANT else degrees[a]
+        elif with_number:
+            degree = degrees[a]
+        elif code == pg.CONSTANT:
+            degree = 0.0
         else:
             degree = 1.0 if code in (pg.SIN, pg.COS) and lines[a] else np.inf
         degrees.append(degree)
-        lines.append(line)
+        lines.append(code == pg.CONSTANT or (with_number and lines[a]))
     return degrees
 
 
@@ -412,8 +415,8 @@ def _limit(rows):
         c = abs(np.fft.rfft(values, axis=1)) / EVENLY
         with np.errstate(all="ignore"):
             share = c / c.max(axis=1, keepdims=True)
-            rate = np.where(share > RESOLVED, np.arange(c.shape[1]) / (1.0 - np.log(share)), 0.0)
-        p[pg.RADIUS] = min(SPAN / max(rate.max(), 1e-300), pg.UNLIMITED)
+            rate = chebyshev.fastest(share, share > RESOLVED).max()
+        p[pg.RADIUS] = min(SPAN / max(rate, 1e-300), pg.UNLIMITED)
 
 
 @lru_cache(maxsize=64)

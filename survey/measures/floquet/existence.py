@@ -108,7 +108,7 @@ class OrbitSteps:
         moduli = abs(series)
         self.X = _sum(series)
         self.noise_X = ROUNDOFF_UP * _sum(moduli * (2 * k + 2))
-        dX = _sum((series * k)[:, :, 1:]) / self.h[:, None, None]
+        dX = _slopes(series, self.h)
         noise = ROUNDOFF_UP * _sum((moduli * k * (2 * k + 2))[:, :, 1:]) / self.h[:, None, None]
         f, df = (one[..., 0].swapaxes(1, 2) for one in self.along(programs.f, self.noise_X))
         defect = (abs(dX - f) + df + noise).max(axis=2)
@@ -136,11 +136,10 @@ class OrbitSteps:
 
     def _between(self, series):
         """The defect (tasks, n) of the series X' - f(t, X) at BETWEEN; infinite where there is none."""
-        k = np.arange(ORDER + 1.0)
-        X, dX = _sum(series, BETWEEN), _sum((series * k)[:, :, 1:], BETWEEN)
+        X, dX = _sum(series, BETWEEN), _slopes(series, self.h, BETWEEN)
         t = self.begin[:, None] + self.h[:, None] * BETWEEN
         f, _ = self.programs.along(self.programs.f, self.numbers, t, X, 0.0 * X)
-        off = abs(dX / self.h[:, None, None] - f[..., 0].swapaxes(1, 2)).max(axis=2)
+        off = abs(dX - f[..., 0].swapaxes(1, 2)).max(axis=2)
         return np.where(np.isnan(off), np.inf, off)
 
     def along(self, program, width):
@@ -313,6 +312,11 @@ def _sum(series, nodes=NODES):
     for k in range(series.shape[2] - 1, -1, -1):
         total = total * nodes + series[:, :, k, None]
     return total
+
+
+def _slopes(series, h, nodes=NODES):
+    """The derivatives by time of the series of steps of lengths h (N), as `_sum`."""
+    return _sum((series * np.arange(ORDER + 1.0))[:, :, 1:], nodes) / h[:, None, None]
 
 
 def product(A, B):

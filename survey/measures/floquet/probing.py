@@ -3,9 +3,9 @@ of other steps.
 
 A step's Taylor series sees a pole from afar, but not exp(-x^2) from x = 10 on, nor cos^200 at its
 zeros. So basis functions that may hide such a spike are sampled densely; products of a few sines
-and cosines of lines, and of states, cannot. Chebyshev coefficients tell how fast a function varies, but of a spike
-at an end of the interval too little, as the square root of their number resolves it there: next to
-the ends differences tell.
+and cosines of lines, and of states, cannot. Chebyshev coefficients tell how fast a function varies,
+but of a spike at an end of the interval too little, as the square root of their number resolves it
+there: next to the ends differences tell.
 """
 
 import math
@@ -28,7 +28,7 @@ AT_ONCE = 64  # points that are sampled together: their arrays stay in the cache
 HARMLESS = 1e-16  # what an entry of A, in balanced units, may change by over a piece
 ENDS = 1 / 8  # of the interval: so far from its ends differences count
 ORDER = 4  # of differences
-# (max |f''''| / 24 max |f|)^(1/4) times this is the rate: half of what the coefficients of a Gaussian show
+# (max |f''''| / 24 max |f|)^(1/4) times this is the rate: half of what a Gaussian's coefficients show
 OF_DIFFERENCES = 0.6
 BY_RATE = 0.6  # what a step may span of 1 / rate, relative to the reach
 SEEN = 2.0  # a rate this many times that of fewer samples takes its place
@@ -36,16 +36,17 @@ SEEN = 2.0  # a rate this many times that of fewer samples takes its place
 
 def suspects(program):
     """The basis functions of the entries that may hide a spike."""
-    known = _degrees(program, program.used)
+    known = _degrees(program)
     return [int(node) for node in program.used if known[int(node)][0] > SIMPLE]
 
 
-def _degrees(program, nodes):
-    """{node: (of how many waves or states it is a product, does it depend on a state?)} of these basis
-    functions and of those that they are made of.
+@lru_cache(maxsize=64)
+def _degrees(program):
+    """{node: (of how many waves or states it is a product, does it depend on a state?)} of the basis
+    functions of the entries and of those that they are made of.
     """
     known = {}
-    for node in program.needed(nodes):
+    for node in program.needed(program.used):
         code, a, b, first, last = program.operations[node]
         if code == pg.COMBINATION:
             inside = [known[int(k)] for k in program.inside[first:last, pg.ADDED]]
@@ -63,18 +64,12 @@ def _degrees(program, nodes):
     return known
 
 
-@lru_cache(maxsize=64)
-def _of_time(program):
-    """The basis functions of t alone that may hide a spike, wherever they stand in a program."""
-    known = _degrees(program, program.used)
-    return [k for k, (degree, of_state) in known.items() if degree > SIMPLE and not of_state]
-
-
 def longest_steps(program, numbers, span, reach):
     """The longest steps (N) that see every spike, between 0 and `span` (N), of what depends on t
     alone in the f of x' = f(t, x); infinite where nothing may hide one.
     """
-    nodes, found = _of_time(program), np.full(len(span), np.inf)
+    known, found = _degrees(program), np.full(len(span), np.inf)
+    nodes = [k for k, (degree, of_state) in known.items() if degree > SIMPLE and not of_state]
     if not nodes:
         return found
     for first in range(0, len(span), AT_ONCE):
@@ -151,7 +146,7 @@ def _rate_by_coefficients(values, bar, change):
     c = abs(np.fft.rfft(mirrored, axis=1)[:, :number]) / number
     share = c / c.max(axis=1, keepdims=True)
     counts = _counts(c, share, bar[:, None], change[:, None])
-    rate = 2.0 * np.where(counts, np.arange(number) / (1.0 - np.log(share)), 0.0).max(axis=1)
+    rate = 2.0 * chebyshev.fastest(share, counts)
     return np.where(np.isfinite(c).all(axis=1), rate, np.nan)
 
 

@@ -88,12 +88,13 @@ def trace(solve, square, seeds, each=in_turn):
     of_seed = np.full(seeds.kind.size, -1)
     towards = np.full(seeds.x.shape, np.nan)
     row = np.unique(seeds.x[:, 0], return_inverse=True)[1].ravel()
+    in_row = np.bincount(row)
 
     def doubtful(of):
         """Which of the seeds beside a path may lie on another curve, which crosses it: a row that the
         path crosses has its own seed there, and others are listed too.
         """
-        in_row, beside = np.bincount(row), np.bincount(row[of], minlength=row.max() + 1)
+        beside = np.bincount(row[of], minlength=in_row.size)
         return of[((beside > 1) | (in_row == 1))[row[of]]]
 
     def know_directions(of):
@@ -115,9 +116,9 @@ def trace(solve, square, seeds, each=in_turn):
             alike = (seeds.kind == seeds.kind[seed]) & (seeds.index == seeds.index[seed])
             near = np.flatnonzero((of_seed < 0) & alike)
             beside.append(near[_on(path, seeds.x[near], towards[near])])
-        know_directions(np.concatenate([doubtful(near) for near in beside]))
-        for path, seed, near in zip(new, start, beside, strict=True):
-            some = doubtful(near)
+        doubts = [doubtful(near) for near in beside]
+        know_directions(np.concatenate(doubts))
+        for path, seed, near, some in zip(new, start, beside, doubts, strict=True):
             other = some[~_on(path, seeds.x[some], towards[some])]
             of_seed[np.setdiff1d(near, other)] = len(paths)
             of_seed[seed] = len(paths)

@@ -332,13 +332,7 @@ def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, ope
         kernels.exponents(
             rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.missed
         )
-    rows = _run(rows)
     open_points[rows] = answers.missed.reshape(problem.p.shape)[rows]
-
-
-def _run(rows):
-    """Ascending rows as a slice, if they follow each other: no copies are made."""
-    return slice(rows[0], rows[-1] + 1) if rows[-1] - rows[0] == rows.size - 1 else rows
 
 
 def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis, x, open_points):

@@ -25,6 +25,7 @@ TOLERANCES = Ladder(10.0 ** (-3 - 0.5 * np.arange(25)), np.arange(25) + 2, BOUND
 # Keep a kernel call below about a second and its samples in the processor's cache.
 CALL_WORK = 8_000_000
 CALL_SAMPLES = 40_000
+OWN = ("C", "W")  # kernels would be compiled again for a view to read alone
 # Points of shorter rows go each in a lane of its own, samples and all: the same bits.
 LANES_PER_ROW = 3
 # Radians of the fastest phase per step, at most: zeros are counted by signs at the ends of steps.
@@ -124,7 +125,7 @@ def _first_tolerance(problem, rtol):
 def _first_rungs(problem, phase, distance):
     rung = np.empty(problem.p.shape, np.int64)
     first_rungs(
-        np.array(problem.p),  # kernels would be compiled again for a view
+        np.require(problem.p, requirements=OWN),
         problem.bound,
         problem.span,
         problem.rate,
@@ -151,7 +152,7 @@ def _chain(problem, method, rung, out):
     bounded work.
     """
     order, rows, on_rung, starts, ends = _segments(rung)
-    nodes, p = np.array(method.NODES), np.array(problem.p).reshape(-1)
+    nodes, p = np.array(method.NODES), np.require(problem.p, requirements=OWN).reshape(-1)
     scattered = rung.shape[1] < LANES_PER_ROW
 
     def compose(samples, h, first, last):
