@@ -14,6 +14,14 @@ import survey
 from survey.errors import BadInput
 from survey.request import user_scene
 
+# (where, how wide, how high in f and g), (phi0, w0), phi, and w there by mpmath's odefun
+WEAK = [
+    ((-1.3733220339125074, 0.03183080124391897, 1.4072984489891925e-10, -0.00013614986357607695),
+     (-2.5756311076490217, 76.07933131862355), 2.6773880321872925, 74.537339570643251128),
+    ((1.2976326084382581, 0.3659114532848368, -8.114926344828097e-09, -1.975218906556532e-08),
+     (-1.4475267886324334, 80.67259040083464), 1.2893107887369997, 79.870450055565215785),
+]  # fmt: skip
+
 SCENE = '''"""Van der Pol's oscillator of my own.
 
 phi'' = mu (1 - phi^2) phi' - phi."""
@@ -200,8 +208,9 @@ def test_constants_may_stand_in_a_dict_or_be_fractions():
     assert own.w.values == plain.w.values
 
 
+@pytest.mark.parametrize("period", [2 * np.pi, None], ids=["circle", "line"])
 @pytest.mark.parametrize("question", ["trajectory", "abel"])
-def test_spikes_between_the_angles_of_a_step_are_seen(question):
+def test_spikes_between_the_angles_of_a_step_are_seen(question, period):
     """Of random ones a quarter were passed in time, and one in 13 in the angle."""
     random = np.random.default_rng(8)
     n = 40
@@ -216,12 +225,13 @@ def test_spikes_between_the_angles_of_a_step_are_seen(question):
     )
 
     def spike(phi, at, width):
-        return np.exp(-((np.sin(0.5 * (phi - at)) / width) ** 2))
+        chord = np.sin(0.5 * (phi - at)) if period else 0.5 * (phi - at)
+        return np.exp(-((chord / width) ** 2))
 
     scene = survey.abel(
         lambda phi, p: -0.3 + p[2] * spike(phi, p[0], p[1]),
         lambda phi, p: 0.5 - np.sin(phi) + p[3] * spike(phi, p[0], p[1]),
-        period=2 * np.pi,
+        period=period,
         parameters=names[:4],
     )
     given = {k: xr.DataArray(v, dims="point") for k, v in zip(names, values, strict=True)}
@@ -247,3 +257,23 @@ def test_spikes_between_the_angles_of_a_step_are_seen(question):
         )
         off = abs(float(ds.w[i]) - exact.y[-1, -1])
         assert off <= float(ds.w_error[i]) + 2e-10 * (1 + abs(exact.y[-1, -1])), i
+
+
+@pytest.mark.parametrize(("system", "start", "goal", "exact"), WEAK, ids=["narrow", "wide"])
+def test_weak_features_count_in_the_error_bar(system, start, goal, exact):
+    """Their series fall more slowly than the others', whose terms hide them."""
+
+    def step(phi, at, width):
+        return np.tanh((phi - at) / width)
+
+    scene = survey.abel(
+        lambda phi, p: -0.3 + p[2] * step(phi, p[0], p[1]),
+        lambda phi, p: 0.5 - np.sin(phi) + p[3] * step(phi, p[0], p[1]),
+        period=None,
+        parameters=("at", "width", "steep", "high"),
+    )
+    given = dict(
+        zip(("at", "width", "steep", "high", "phi0", "w0"), (*system, *start), strict=True)
+    )
+    ds = survey.evaluate(scene, question="abel", phi=goal, **given)
+    assert abs(float(ds.w) - exact) <= float(ds.w_error) < 1e-10

@@ -101,15 +101,15 @@ def spread_programs(rows, P, starts):
 
 
 @inline
-def _no_bounds_needed(p, phi):
+def _no_bounds_needed(p, phi, w):
     pass
 
 
 @for_constants(_no_bounds_needed)
-def bound_start(p, phi):
-    """On a line, write bounds near phi into p, where a solution starts."""
+def bound_start(p, phi, w):
+    """On a line, write bounds near phi into p, where a solution starts with w."""
     if not on_circle(p):
-        program.bound_near(p, phi)
+        program.bound_near(p, phi, w)
 
 
 @inline
@@ -172,7 +172,7 @@ def series(p, phi, w, T, order):
         _series_of_gyrostat(p, phi, w, T, order)
         return
     if not on_circle(p):
-        program.bound_near(p, phi)
+        program.bound_near(p, phi, w)
     program.in_time(p, phi, w, order, T[:, PHI], T[:, W], T[:, E], T[:, Y])
 
 

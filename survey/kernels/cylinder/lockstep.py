@@ -306,6 +306,19 @@ def last_terms(T, i):
 
 
 @inline
+def left_out(ends, h):
+    """What a series leaves out at h beyond its last term, of order ORDER: as much as its last terms
+    (`ends` of `ellipse`) where these fall by a third in two orders, more where they fall less.
+    """
+    last, previous, third, fourth = ends
+    h2 = h * h
+    h4 = h2 * h2
+    high, low = max(last * h, previous) * h2, max(third * h, fourth)
+    fallen = min(FALL * high / (low + 1e-300), 0.9)
+    return h4 * h4 * h4 * h * max(max(high, low), high * (2.0 * fallen / (1.0 - fallen)))
+
+
+@inline
 def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
     """The error ellipse at dt in a step, where w = v, from the one at its start.
 
@@ -314,11 +327,7 @@ def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
     """
     saa, sab, sbb = carried
     u1, u2, z1, z2 = jacobian
-    last, previous, third, fourth = ends
-    d2 = dt * dt
-    d4 = d2 * d2
-    d13 = d4 * d4 * d4 * dt
-    cut = d13 * max(max(last * d2, third) * dt, max(previous * d2, fourth))
+    cut = left_out(ends, dt)
     speed = most_f * abs(v) + most_g
     e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
     g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)

@@ -40,6 +40,7 @@ from survey.kernels.cylinder.lockstep import (
     LANES,
     NEAREST,
     busy,
+    left_out,
     polynomial,
     sine_cosine,
 )
@@ -276,17 +277,8 @@ def _advance(T, state, before, step, fixed, tolerance):
         v = w + w * _rise(omega, h)
         spent = _elapsed(_integral(T, i), h) * inverse
         lowest = 0.5 * (w + v - h * slope)
-        h2 = h * h
-        h4 = h2 * h2
-        h13 = h4 * h4 * h4 * h
-        cut = w * h13 * max(max(last * h2, third) * h, max(previous * h2, fourth))
-        cut_t = (
-            2.0
-            * inverse
-            * h13
-            * h
-            * max(max(last_r * h2, third_r) * h, max(previous_r * h2, fourth_r))
-        )
+        cut = w * left_out((last, previous, third, fourth), h)
+        cut_t = 2.0 * inverse * h * left_out((last_r, previous_r, third_r, fourth_r), h)
         local = cut + ROUNDOFF_UP * (1.5 * max(w, v) + 8.0 * h * slope)
         bound, most = state[W_BOUND, i], 1.0 / (lowest * lowest)
         grown = h * most_g * most

@@ -59,7 +59,6 @@ from survey.kernels.cylinder.program import (
     FORCES,
     FROM,
     G_AT,
-    LEAST_RADIUS,
     MIRRORED,
     MULTIPLY,
     ON_CIRCLE,
@@ -249,10 +248,18 @@ def _tables(p, of_angle):
 
 @splice
 def _ball_tables(p):
-    """(points, over, known, out, found), as `_bound` takes them."""
+    """(points, over, known, out, found, hidden), as `_bound` takes them."""
     slots = max(1, int(p[SLOTS]))
-    points, over = np.zeros(slots * 2 * LANES), np.zeros(slots * 6 * LANES)
-    return points, over, np.zeros(slots, np.bool_), np.empty(4), np.empty((4, LANES))
+    points = np.zeros(slots * 2 * LANES)
+    over = np.zeros(len(points) * (program.DERIVATIVES + 1))
+    return (
+        points,
+        over,
+        np.zeros(slots, np.bool_),
+        np.empty(4),
+        np.empty((4, LANES)),
+        np.zeros(LANES),
+    )
 
 
 @kernel
@@ -312,13 +319,13 @@ def _extend(operations, N, degree, S, K, n, first, last, width):
 
 
 @splice
-def _bound(p, N, phi, radius, row, points, over, known, out, found, width):
-    """Fill `found` (bounds, LANES) with bounds of f, g, g', g'' within `radius` of phi, which is twice
-    as large as it was, or smaller where there are none.
+def _bound(p, N, phi, w, radius, hidden, row, points, over, known, out, found, width):
+    """Fill `found` (bounds, LANES) with bounds of f, g, g', g'' within `radius` of phi, which changes
+    as what was `hidden` in the last one lets it: see `program.bounded`.
     """
     none, near, left = np.zeros(LANES), np.zeros(LANES, np.bool_), True
     for q in range(LANES):
-        radius[q] = min(2.0 * radius[q], 0.25 * (1.0 + abs(phi[q])))
+        radius[q] = min(radius[q] * program.wider(hidden[q]), 1.0 + abs(phi[q]))
     program.balls(p, N, known, phi[:width], none, points)
     while left:
         program.balls(p, N, known, phi[:width], radius, over)
@@ -326,15 +333,13 @@ def _bound(p, N, phi, radius, row, points, over, known, out, found, width):
         for q in range(LANES):
             if near[q]:
                 continue
-            for k in range(len(out)):
-                out[k] = 0.0
-            program.raised(p, points, over, q, out)
-            near[q] = math.isfinite(out.sum()) or radius[q] < LEAST_RADIUS or row[q] < 0
+            hidden[q] = program.bounded(p, points, over, q, radius[q], w[q], out)
+            near[q] = hidden[q] <= 1.0 or row[q] < 0
             if near[q]:
                 for k in range(len(out)):
                     found[k, q] = out[k]
             else:
-                radius[q] *= 0.5
+                radius[q] *= min(program.wider(hidden[q]), 0.9)
                 left = True
 
 
@@ -400,10 +405,8 @@ def _begin(circle, state, fixed, phi):
 def _stay(state, fixed, found, radius):
     """Note the bounds, and those that keep `lockstep.advance` within `radius`, where they hold."""
     for i in range(LANES):
-        most_f, most_g, w = found[0, i], found[1, i], abs(state[V, i])
-        root = math.sqrt(radius[i] * most_g) + 1e-300
-        most = 2.0 * w + root
-        rate = max(most / radius[i], (most_f * most + most_g + 1e-300) / (w + root))
+        most_f, most_g = found[0, i], found[1, i]
+        rate = program.leaving(most_f, most_g, radius[i], abs(state[V, i]))
         fixed[PF, i], fixed[PG, i], fixed[PDG, i] = most_f, most_g, max(found[2, i], rate * rate)
 
 
@@ -459,7 +462,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
-    points, over, known, out, bounds = _ball_tables(p)
+    points, over, known, out, bounds, hidden = _ball_tables(p)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, free = np.int64(lead), True
     while True:
@@ -473,7 +476,9 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
         if circle and limited:
             _limit(P, row, bounds, radius)
         elif limited:
-            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
+            _bound(
+                p, N, phi, state[V], radius, hidden, row, points, over, known, out, bounds, width
+            )
         if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
@@ -584,7 +589,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     forms = np.zeros((2 * far.ORDER, LANES))
     radius = np.ones(LANES)
-    points, over, known, out, bounds = _ball_tables(p)
+    points, over, known, out, bounds, hidden = _ball_tables(p)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
     goal = np.zeros(LANES)
     waiting, free, ended = np.int64(lead), True, np.zeros(LANES, dtype=np.bool_)
@@ -611,11 +616,25 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
         if circle and limited:
             _limit(P, row, bounds, radius)
         elif limited:
-            _bound(p, N, state[far.AT], radius, row, points, over, known, out, bounds, width)
+            _bound(
+                p,
+                N,
+                state[far.AT],
+                state[far.W],
+                radius,
+                hidden,
+                row,
+                points,
+                over,
+                known,
+                out,
+                bounds,
+                width,
+            )
         if limited:
             for i in range(LANES):
-                # a step no longer than the radius: see `lockstep_phi._advance`
-                fixed[BOUND_F, i] = max(bounds[0, i], 0.5 * state[far.W, i] / radius[i])
+                # a step of at most 0.8 of the radius, on which series fall: see `lockstep_phi._advance`
+                fixed[BOUND_F, i] = max(bounds[0, i], 0.625 * state[far.W, i] / radius[i])
                 fixed[BOUND_G, i] = bounds[1, i]
         _in_angle(p, operations, N, degree, S, K, state[far.AT], state[far.W], forms, width)
         for n in range(far.ORDER):
@@ -850,7 +869,7 @@ def _enter_near(
             if p[ON_CIRCLE] > 0.0:
                 phi, turns = reduced(phi0)
             elif w0 == 0.0:
-                program.bound_near(p, phi0)
+                program.bound_near(p, phi0, w0)
             at, rows, codes = row_of(targets, r)[:size], planes[:, r, :size].T, status[r, :size]
             if not begun and at_rest(p, phi, phi0, w0, at, rows, codes):
                 continue
@@ -885,7 +904,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
-    points, over, known, out, bounds = _ball_tables(p)
+    points, over, known, out, bounds, hidden = _ball_tables(p)
     row, sizes, column = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     doubt, goal, delay = np.full(LANES, -1), np.zeros(LANES), np.zeros(LANES)
     started, calm = np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)
@@ -905,7 +924,9 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
         if circle and limited:
             _limit(P, row, bounds, radius)
         elif limited:
-            _bound(p, N, phi, radius, row, points, over, known, out, bounds, width)
+            _bound(
+                p, N, phi, state[V], radius, hidden, row, points, over, known, out, bounds, width
+            )
         if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)

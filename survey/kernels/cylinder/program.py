@@ -56,6 +56,10 @@ CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
     POWER,
 ) = range(9, 26)
 LEAST_RADIUS = 1e-9
+# On a line, f and g are bounded over an interval with as many of their derivatives. What their series
+# leave out, as these bound it, is to be at most HIDDEN of them, unless the interval is as narrow as FINE.
+DERIVATIVES, HIDDEN, FINE = 6, 1e-3, 1e-6
+NEGLIGIBLE = 1e-18  # what changes w by such a share may be left out
 UNLIMITED = 1e300  # RADIUS on a circle where f and g cannot have spikes
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
 LANES = 32  # of them at once
@@ -188,10 +192,10 @@ def _function_ball(code, x, r, number):
         steep = math.cos(x) if code == SIN else math.sin(x)
         spread = min(r, abs(steep) * r + 0.5 * r * r, 1.0 + abs(value))
     else:
-        spread = max(
-            abs(function(code, x - r, number) - value), abs(function(code, x + r, number) - value)
-        )
-        spread += 2.0 * EPS * abs(value)
+        below = abs(function(code, x - r, number) - value)
+        above = abs(function(code, x + r, number) - value)
+        spread = (below if below > above else above) + 2.0 * EPS * abs(value)
+        spread = spread if math.isfinite(below + above) else math.inf  # max drops a NaN
         if code == TAN and math.floor((x - r) / math.pi + 0.5) != math.floor(
             (x + r) / math.pi + 0.5
         ):
@@ -258,6 +262,15 @@ def _ball_add(B, a, b, factor, rounding, o, i):
     middle, radius = _product(B[a + i], B[a + LANES + i], B[b + i], B[b + LANES + i])
     B[o + i] = B[o + i] + factor * middle
     B[o + LANES + i] = B[o + LANES + i] + abs(factor) * (radius + rounding * abs(middle))
+
+
+@unroll
+def _ball_square(B, a, o, i):
+    """That of a square, which is not negative."""
+    size, radius = abs(B[a + i]), B[a + LANES + i]
+    low = 0.5 * ((size - radius) + abs(size - radius))
+    low, high = 0.5 * low * low, 0.5 * (size + radius) * (size + radius)
+    B[o + i], B[o + LANES + i] = high + low, (high - low) + 2.0 * ROUNDOFF_UP * (high + low)
 
 
 @unroll
@@ -331,6 +344,9 @@ def _extend_balls(p, numbers, known, lanes, orders, B, n):
                 r, s = own + np.uint64(LANES), low + np.uint64(LANES)
                 wide = B[r] + n * ROUNDOFF_UP * abs(B[own])
                 B[own], B[r] = _quotient(B[own], wide, B[low], B[s])
+        elif code == MULTIPLY and a == b and n == 0:
+            for q in range(width):
+                _ball_square(B, one, o, q)
         elif code == MULTIPLY:
             for k in range(n + 1):
                 for q in range(width):
@@ -386,14 +402,15 @@ def ball(p, phi, radius, orders, B):
 @kernel
 def raised(p, points, over, q, out):
     """Raise `out` (_BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| in lane q of the
-    balls `over`, of three orders.
+    balls `over`, of three orders or more.
 
     The first two also bound what rounds f and g at its middle, as the balls `points` of one order
     have it, in roundoffs: `steps` takes them for the sizes of their terms.
     """
     f, g, step = int(p[F_AT]), int(p[G_AT]), 2 * LANES
     rounded_f, rounded_g = points[step * f + LANES + q], points[step * g + LANES + q]
-    at_f, at_g = 3 * step * f + q, 3 * step * g + q
+    orders = len(over) // len(points)
+    at_f, at_g = orders * step * f + q, orders * step * g + q
     most_f = 1.0001 * max(_largest(over, at_f), _largest(over, at_f + step))
     out[_ON_F] = max(out[_ON_F], rounded_f / ROUNDOFF_UP, most_f)
     out[_ON_G] = max(out[_ON_G], rounded_g / ROUNDOFF_UP, 1.0001 * _largest(over, at_g))
@@ -402,16 +419,32 @@ def raised(p, points, over, q, out):
 
 
 @kernel
-def bounds(p, phi, radius, out):
-    """Raise `out` (_BOUNDS) to bounds within `radius` of phi: see `raised`."""
-    count = _count(p, SLOTS)
-    numbers, known = np.zeros((2 * count, LANES)), np.zeros(count, np.bool_)
-    points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
-    note(p, numbers, 0, 1)
-    at = np.full(1, phi)
-    balls(p, numbers.ravel(), known, at, np.zeros(1), points)
-    balls(p, numbers.ravel(), known, at, np.full(1, radius), over)
-    raised(p, points, over, 0, out)
+def bounded(p, points, over, q, radius, w, out):
+    """Fill `out` (_BOUNDS) with the bounds that hold within `radius` in lane q: see `raised`. Returns
+    how much of f w + g their series, the middles of `over`, leave out at most: up to 1, little enough.
+    """
+    for k in range(_BOUNDS):
+        out[k] = 0.0
+    raised(p, points, over, q, out)
+    if not math.isfinite(out.sum()):
+        return 0.0 if radius < LEAST_RADIUS else math.inf
+    f, more_f = _shown(over, int(p[F_AT]), q, radius)
+    g, more_g = _shown(over, int(p[G_AT]), q, radius)
+    w = abs(w) + math.sqrt(radius * g)
+    enough = HIDDEN * (f * w + g) + NEGLIGIBLE * w * w / radius + 1e-300
+    hidden = 0.0 if radius < FINE else (more_f * w + more_g) / enough
+    return hidden if hidden >= 0.0 else math.inf
+
+
+@inline
+def _shown(over, value, q, radius):
+    """Sizes of the series of a value, and of what it leaves out, within the radius of lane q."""
+    at, power, size = 2 * LANES * (DERIVATIVES + 1) * value + q, 1.0, 0.0
+    for _ in range(DERIVATIVES):
+        size += power * abs(over[at])
+        at += 2 * LANES
+        power *= radius
+    return size, power * _largest(over, at)
 
 
 @inline
@@ -547,28 +580,50 @@ def complete(rows, angles):
             p[:] = math.nan
 
 
+@inline
+def wider(hidden):
+    """By what factor the radius may change where so much is hidden: see `bounded`."""
+    return min(max((0.5 / (hidden + 1e-300)) ** (1.0 / DERIVATIVES), 0.25), 2.0)
+
+
 @kernel
-def bound_near(p, phi):
+def bound_near(p, phi, w):
     """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they
-    are not finite.
+    do not show f w + g.
     """
-    out, near = np.empty(_BOUNDS), False
-    p[RADIUS] = min(4.0 * p[RADIUS], 0.5 * (1.0 + abs(phi)))
-    while not near:
-        p[RADIUS] *= 0.5
-        for k in range(_BOUNDS):
-            out[k] = 0.0
-        bounds(p, phi, p[RADIUS], out)
-        near = math.isfinite(out.sum()) or p[RADIUS] < LEAST_RADIUS
+    count, out = _count(p, SLOTS), np.empty(_BOUNDS)
+    numbers, known = np.zeros((2 * count, LANES)), np.zeros(count, np.bool_)
+    points = np.zeros(count * 2 * LANES)
+    over = np.zeros(len(points) * (DERIVATIVES + 1))
+    note(p, numbers, 0, 1)
+    at, radius = np.full(1, phi), np.full(1, min(4.0 * p[RADIUS], 2.0 * (1.0 + abs(phi))))
+    balls(p, numbers.ravel(), known, at, np.zeros(1), points)
+    hidden = math.inf
+    while hidden > 1.0:
+        radius[0] *= 0.5
+        balls(p, numbers.ravel(), known, at, radius, over)
+        hidden = bounded(p, points, over, 0, radius[0], w, out)
+    p[RADIUS] = radius[0]
     for k in range(_BOUNDS):
         p[BOUND_F + k] = out[k]
 
 
+@inline
+def _leaving(factor, most_f, most_g, radius, w):
+    root = math.sqrt(radius * most_g) + 1e-300
+    most = factor * w + root
+    return max(most / radius, (most_f * most + most_g) / ((factor - 1.0) * w + root))
+
+
+@inline
+def leaving(most_f, most_g, radius, w):
+    """A rate: for the time 1 / rate, phi stays within the radius where |f| and |g| are below these
+    bounds, since |w| stays below a multiple of its first value and of sqrt(radius g).
+    """
+    return min(_leaving(1.25, most_f, most_g, radius, w), _leaving(2.0, most_f, most_g, radius, w))
+
+
 @kernel
 def longest_step(p, w):
-    """A step on which phi stays within p[RADIUS], where the bounds hold: |w| stays below 2 |w| +
-    sqrt(RADIUS g).
-    """
-    root = math.sqrt(p[RADIUS] * p[BOUND_G]) + 1e-300
-    most = 2.0 * abs(w) + root
-    return min(p[RADIUS] / most, (abs(w) + root) / (p[BOUND_F] * most + p[BOUND_G] + 1e-300))
+    """A step on which phi stays within p[RADIUS], where the bounds hold."""
+    return 1.0 / leaving(p[BOUND_F], p[BOUND_G], p[RADIUS], abs(w))

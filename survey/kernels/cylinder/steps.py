@@ -125,7 +125,7 @@ def trusted(saa, sbb, w):
 def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats, turnings):
     """Fill floats[j] (PHI to W_BAR) and turnings[j] at the ascending times[j] >= 0; returns a status."""
     T = table()
-    bound_start(p, phi0)
+    bound_start(p, phi0, w0)
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0) if on_circle(p) else (phi0, 0.0)
     w, t, t_low, n = w0, 0.0, 0.0, 0
@@ -375,7 +375,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
     target that is reached with no certain w is in doubt until the solution has left it behind.
     """
     T = table()
-    bound_start(p, phi0)
+    bound_start(p, phi0, w0)
     how = setting(p, w0, tolerance)
     phi, turns = reduced(phi0) if on_circle(p) else (phi0, 0.0)
     w, t, t_low, n, started = w0, 0.0, 0.0, 0, w0 > 0.0

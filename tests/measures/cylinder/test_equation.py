@@ -107,21 +107,49 @@ def test_series_and_balls_hold_mpmaths(x):
         assert pg.values(row, x)[2] == pytest.approx(float(wanted[1]), rel=1e-12)
         middle, radius = ball_of_g(row, x)
         assert abs(middle - wanted[0]) <= radius < 1e-13
-        out = np.zeros(4)
-        pg.bounds(row, x, 0.05, out)
-        for y in np.linspace(x - 0.05, x + 0.05, 5):
+        row[pg.RADIUS] = 0.1
+        pg.bound_near(row, x, 1.0)
+        out, radius = row[pg.BOUND_F :], row[pg.RADIUS]
+        assert 1e-3 < radius
+        for y in np.linspace(x - radius, x + radius, 5):
             near = truth(y, p, 2)
             assert max(abs(near[0]), abs(near[1])) <= out[0] and abs(near[0]) <= out[1]
             assert abs(near[1]) <= out[2] and 2 * abs(near[2]) <= out[3] < 100
+
+
+@pytest.mark.parametrize(
+    ("g", "x", "radius"),
+    [
+        (lambda x, p: np.arcsin(x), 0.8, 0.3),
+        (lambda x, p: np.arccosh(x), 1.2, 0.3),
+        (lambda x, p: np.exp(x), 700.0, 20.0),
+    ],
+    ids=["arcsin", "arccosh", "exp"],
+)
+def test_balls_beyond_the_domain_of_a_function_have_no_bound(g, x, radius):
+    row = equation.program(plain, g, (1.0,), False)
+    out = np.zeros((int(row[pg.SLOTS]), 1, 2))
+    pg.ball(row, x, radius, 1, out)
+    assert out[int(row[pg.G_AT]), 0, 1] == np.inf
+
+
+def test_balls_of_squares_hold_them_and_are_not_negative():
+    row = equation.program(plain, lambda x, p: x * x, (1.0,), False)
+    out = np.zeros((int(row[pg.SLOTS]), 1, 2))
+    for x, radius in ((0.3, 1.0), (-2.0, 0.5), (0.0, 3.0)):
+        pg.ball(row, x, radius, 1, out)
+        middle, wide = out[int(row[pg.G_AT]), 0]
+        low = max(abs(x) - radius, 0.0) ** 2
+        assert 0.0 <= low - (middle - wide) < 1e-14
+        assert 0.0 <= (middle + wide) - (abs(x) + radius) ** 2 < 1e-14
 
 
 def test_what_cancels_is_counted_as_rounding():
     row = equation.program(plain, lambda x, p: (x + 1e8) - 1e8, (1.0,), False)
     middle, radius = ball_of_g(row, 0.1)
     assert 1e-9 < abs(middle - 0.1) <= radius < 1e-7
-    out = np.zeros(4)
-    pg.bounds(row, 0.1, 0.01, out)
-    assert out[1] > 1e7  # the size of the terms
+    pg.bound_near(row, 0.1, 1.0)
+    assert row[pg.BOUND_G] > 1e7  # the size of the terms
 
 
 def test_what_depends_on_the_parameters_alone_may_branch():
