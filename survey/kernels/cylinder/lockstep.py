@@ -308,14 +308,15 @@ def last_terms(T, i):
 @inline
 def left_out(ends, h):
     """What a series leaves out at h beyond its last term, of order ORDER: as much as its last terms
-    (`ends` of `ellipse`) where these fall by a third in two orders, more where they fall less.
+    (`ends` of `ellipse`, of which one may be small by accident) where these fall by a third in two
+    orders, more where they fall less.
     """
     last, previous, third, fourth = ends
     h2 = h * h
     h4 = h2 * h2
-    high, low = max(last * h, previous) * h2, max(third * h, fourth)
+    high, low = (last * h + previous) * h2, max(third * h, fourth)
     fallen = min(FALL * high / (low + 1e-300), 0.9)
-    return h4 * h4 * h4 * h * max(max(high, low), high * (2.0 * fallen / (1.0 - fallen)))
+    return h4 * h4 * h4 * h * max(high + low, high * (2.0 * fallen / (1.0 - fallen)))
 
 
 @inline
