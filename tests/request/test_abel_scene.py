@@ -277,3 +277,26 @@ def test_weak_features_count_in_the_error_bar(system, start, goal, exact):
     )
     ds = survey.evaluate(scene, question="abel", phi=goal, **given)
     assert abs(float(ds.w) - exact) <= float(ds.w_error) < 1e-10
+
+
+@pytest.mark.parametrize("question", ["trajectory", "abel"])
+def test_without_a_period_sets_have_the_same_bits_alone_and_among_others(question):
+    """More sets than lanes, so that each takes the place of another."""
+    scene = survey.abel(
+        lambda phi, p: -p[0] * np.exp(-phi * phi),
+        lambda phi, p: 0.5 - np.tanh((phi - 1.0) / p[1]),
+        period=None,
+        parameters=("a", "width"),
+    )
+    a, width = np.linspace(0.1, 2.0, 90), np.geomspace(0.01, 3.0, 90)
+    goal = {"trajectory": {"t": 1.5}, "abel": {"phi": 2.0}}[question]
+
+    def solved(of):
+        given = {k: xr.DataArray(v[of], dims="point") for k, v in (("a", a), ("width", width))}
+        return survey.evaluate(scene, question=question, phi0=-1.0, w0=4.0, **given, **goal)
+
+    together = solved(slice(None))
+    for i in range(0, 90, 7):
+        alone = solved(slice(i, i + 1))
+        for name in ("w", "w_error"):
+            np.testing.assert_array_equal(alone[name].values[0], together[name].values[i])

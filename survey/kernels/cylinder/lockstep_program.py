@@ -423,7 +423,20 @@ def _limit(P, row, bounds, radius):
 
 @splice
 def _enter(
-    P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, row, column, status
+    P,
+    leads,
+    lead,
+    starts,
+    times,
+    waiting,
+    state,
+    fixed,
+    numbers,
+    radius,
+    hidden,
+    row,
+    column,
+    status,
 ):
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
     circle = P[lead, ON_CIRCLE] > 0.0
@@ -445,7 +458,7 @@ def _enter(
                 slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
                 state[SAA, i], state[RATE, i] = slip * slip, 1.0 + abs(w0)
                 fixed[PF, i], fixed[PG, i], fixed[PDG, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG]
-                fixed[TURN, i], radius[i] = 0.0, 1.0
+                fixed[TURN, i], radius[i], hidden[i] = 0.0, 1.0, 0.0
                 program.note(p, numbers, i, i + 1)
                 fixed[lockstep.NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
             waiting += 1
@@ -468,7 +481,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
     while True:
         if free:
             waiting = _enter(
-                P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, row, column, status
+                P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, hidden, row, column, status
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
@@ -528,6 +541,7 @@ def _enter_far(
     fixed,
     numbers,
     radius,
+    hidden,
     row,
     sizes,
     goal,
@@ -557,7 +571,7 @@ def _enter_far(
                     state[far.RATE, i] = 2.0 + bend / w0
                     state[far.W_BOUND, i], state[far.T_BOUND, i] = bound, slip / w0
                     program.note(p, numbers, i, i + 1)
-                    row[i], radius[i] = waiting, 1.0
+                    row[i], radius[i], hidden[i] = waiting, 1.0, 0.0
                     sizes[i], goal[i] = finite(own), own[0]
                     for k in range(sizes[i]):
                         status[waiting, k] = OK
@@ -596,8 +610,8 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
     while True:
         if free:
             waiting = _enter_far(
-                P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, radius, row,
-                sizes, goal
+                P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, radius, hidden,
+                row, sizes, goal
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
@@ -848,7 +862,7 @@ def _calm(T, state, before, fixed, goal, doubt, started, calm):
 
 @splice
 def _enter_near(
-    P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, row, sizes, goal,
+    P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, hidden, row, sizes, goal,
     started, column, delay, ahead, planes, status,
 ):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
@@ -883,7 +897,7 @@ def _enter_near(
                 state[TIME, i], state[TIME_LOW, i] = ahead[r, far.TIME], ahead[r, far.TIME_LOW]
                 state[SAA, i], state[SBB, i] = 0.0, ahead[r, far.W_BOUND] * ahead[r, far.W_BOUND]
                 state[STEPS, i] = 1.0
-            state[V, i], state[RATE, i], radius[i] = own, 1.0 + own, 1.0
+            state[V, i], state[RATE, i], radius[i], hidden[i] = own, 1.0 + own, 1.0, 0.0
             fixed[PF, i], fixed[PG, i], fixed[PDG, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG]
             fixed[lockstep.NEXT, i] = math.inf
             program.note(p, numbers, i, i + 1)
@@ -915,7 +929,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
                 if row[i] < 0:
                     doubt[i] = -1
             waiting = _enter_near(
-                P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, row, sizes, goal,
+                P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, hidden, row, sizes, goal,
                 started, column, delay, ahead, planes, status
             )  # fmt: skip
             if not lockstep.busy(row):
