@@ -37,20 +37,20 @@ FLOW_WORK = 1
 _NO_FORM = 19  # as in the STATUS of scenes/gyrostat.py
 
 
-def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     """See `steps.trajectories`; tolerance and limit have no meaning here. Only the forms that apply
     are compiled.
     """
     forms, curves = np.zeros(times.shape, np.int8), np.empty((len(P), 2))
-    _sort(P, starts, times, forms, curves, floats, turnings, status)
+    _sort(P, starts, times, forms, curves, planes, turnings, status)
     for form, solve in ((closed.LIBRATION, _elliptics), (closed.TRIGONOMETRIC, _trigonometrics)):
         indices = np.flatnonzero(forms == form)
         if indices.size > 0:
-            solve(indices, P, starts, curves, times, floats, turnings)
+            solve(indices, P, starts, curves, times, planes, turnings)
 
 
 @kernel
-def _sort(P, starts, times, forms, curves, floats, turnings, status):
+def _sort(P, starts, times, forms, curves, planes, turnings, status):
     """Fill `forms` (as times) with the closed form to evaluate there, curves with its mu and 1 - mu."""
     for i in range(len(P)):
         kind, curves[i, 0], curves[i, 1] = closed.applies(
@@ -61,21 +61,21 @@ def _sort(P, starts, times, forms, curves, floats, turnings, status):
             if times[i, j] != 0.0:
                 forms[i, j] = kind
                 continue
-            _store(floats[i, j], starts[i, rc.START_PHI], 0.0, starts[i, rc.START_W], 0.0, 0.0)
+            _store(planes[:, i, j], starts[i, rc.START_PHI], 0.0, starts[i, rc.START_W], 0.0, 0.0)
             turnings[i, j] = 0
 
 
 @kernel
-def _elliptics(indices, P, starts, curves, times, floats, turnings):
+def _elliptics(indices, P, starts, curves, times, planes, turnings):
     """b = 0."""
     T = weierstrass.lanes()
     _solve(
-        weierstrass.enter, weierstrass.solve, T, indices, P, starts, curves, times, floats, turnings
+        weierstrass.enter, weierstrass.solve, T, indices, P, starts, curves, times, planes, turnings
     )
 
 
 @kernel
-def _trigonometrics(indices, P, starts, curves, times, floats, turnings):
+def _trigonometrics(indices, P, starts, curves, times, planes, turnings):
     """g = 0 and (61)."""
     T = trigonometric.lanes()
     _solve(
@@ -87,13 +87,13 @@ def _trigonometrics(indices, P, starts, curves, times, floats, turnings):
         starts,
         curves,
         times,
-        floats,
+        planes,
         turnings,
     )
 
 
 @inline
-def _solve(enter, solve, T, indices, P, starts, curves, times, floats, turnings):
+def _solve(enter, solve, T, indices, P, starts, curves, times, planes, turnings):
     """The solutions at `indices` of the flattened `times`, as many at once as there are lanes."""
     columns = times.shape[1]
     for first in range(0, len(indices), LANES):
@@ -107,7 +107,7 @@ def _solve(enter, solve, T, indices, P, starts, curves, times, floats, turnings)
         for k in range(len(some)):
             i, j = some[k] // columns, some[k] % columns
             if _store(
-                floats[i, j], starts[i, rc.START_PHI], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]
+                planes[:, i, j], starts[i, rc.START_PHI], T[X, k], T[W, k], T[BAR_X, k], T[BAR_W, k]
             ):
                 turnings[i, j] = int(T[COUNT, k])
 

@@ -133,9 +133,9 @@ def _trajectory(p, phi0, w0, times, tolerance, limit, floats, turnings):
 
 
 @kernel
-def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     """See `steps.trajectories`."""
     for i in range(len(P)):
         size = finite(times[i])
         status[i] = _trajectory(P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], times[i, :size],
-                               tolerance, limit, floats[i], turnings[i])  # fmt: skip
+                               tolerance, limit, planes[:, i].T, turnings[i])  # fmt: skip

@@ -159,7 +159,7 @@ def flow_begin(p, phi, w, h, T):
 
 
 @kernel
-def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     """See `steps.trajectories`."""
     steps.trajectories(
         flow_setting,
@@ -170,7 +170,7 @@ def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, stat
         times,
         tolerance,
         limit,
-        floats,
+        planes,
         turnings,
         status,
     )

@@ -1,11 +1,13 @@
 """What the decorators of kernels do to the process that compiles."""
 
 import gc
+import math
 
 import llvmlite.binding
 import numba
 import numpy as np
 import pytest
+from numba.core.registry import cpu_target
 
 from survey.kernels import jit
 
@@ -84,3 +86,34 @@ def test_what_kernels_call_is_compiled_once_for_all_constants(decorator):
     )
     assert caller(3.0) == 2 * 3.0**2 + 3.0**3 + 2 * 3.0**4
     assert len(power.signatures) == 1
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_arrays_that_kernels_make_begin_with_a_cache_line_and_those_of_others_as_before():
+    before = cpu_target.target_context.get_preferred_array_alignment(numba.types.float64)
+
+    def begins(n):
+        return np.empty(n).ctypes.data
+
+    begins.__module__ = "survey.kernels.some"
+    kernel = jit.fresh(begins)
+    assert {kernel(n) % 64 for n in range(1, 300, 7)} == {0}
+    assert cpu_target.target_context.get_preferred_array_alignment(numba.types.float64) == before
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+def test_what_is_inlined_serves_kernels_and_is_plain_python_otherwise():
+    def root(x, n):
+        for _ in range(n):
+            x = math.sqrt(x) + x
+        return x
+
+    inlined = jit.inline(root)
+    caller = jit.fresh(lambda x, n: inlined(x, n) + inlined(0.5 * x, 2))
+    assert caller(3.0, 4) == root(3.0, 4) + root(1.5, 2)
+    assert inlined(3.0, 4) == root(3.0, 4)  # after it was compiled for a kernel, and
+    assert jit.inline(root)(3.0, 4) == root(3.0, 4)  # before
+    result = inlined.overloads[numba.types.float64, numba.types.int64]
+    assert result.entry_point is root
+    # no machine code of its own: the engine knows no symbol of this name
+    assert not result.library.codegen._engine.is_symbol_defined(result.fndesc.llvm_func_name)

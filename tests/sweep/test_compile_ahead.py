@@ -124,6 +124,10 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
             ["survey.kernels.cylinder.lockstep_program:abels_near"],
         ),
         (
+            OWN.format(more='question="trajectory", phi0=0.0, w0=1.0, t=1.0'),
+            ["survey.kernels.cylinder.lockstep_program:trajectories"],
+        ),
+        (
             OWN.format(more='question="portrait"'),
             [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
         ),

@@ -389,29 +389,29 @@ def _moved(c, dt):
 
 @inline
 def _passed(fate):
-    return fate == _PASSED or fate == _PASSED + _LOST
+    return (fate == _PASSED) | (fate == _PASSED + _LOST)
 
 
-@kernel
-def _due(times, state, before, found, fate, row, column, first):
+@inline
+def _due(state, before, fixed, found, fate, first):
     """Set DUE and AFTER of BLOCK lanes, from the `first` on, by whether their next time lies in the
-    step; does any?
+    step; how many do?
     """
-    some = False
-    for i in range(first, first + BLOCK):
-        found[DUE, i] = found[AFTER, i] = 0.0
-        if row[i] >= 0 and _passed(fate[i]) and column[i] < times.shape[1]:
-            after = (times[row[i], column[i]] - before[TIME, i]) - before[TIME_LOW, i]
-            if after < 1.0 / state[RATE, i]:
-                found[DUE, i], found[AFTER, i], some = 1.0, after, True
-    return some
+    count = 0
+    for j in range(BLOCK):
+        i = np.uint64(first + j)  # no index that may count from the end: else no vector code
+        after = (fixed[NEXT, i] - before[TIME, i]) - before[TIME_LOW, i]
+        due = _passed(fate[i]) & (after < 1.0 / state[RATE, i])
+        found[DUE, i], found[AFTER, i] = (1.0, after) if due else (0.0, 0.0)
+        count += due
+    return count
 
 
 @inline
 def _evaluate(T, state, before, fixed, found, first):
     """Find what there is AFTER the start of the step in BLOCK lanes."""
     for j in range(BLOCK):
-        i = np.uint64(first + j)  # no index that may count from the end: else no vector code
+        i = np.uint64(first + j)
         dt = found[AFTER, i]
         x, v = _moved(coefficients(T, i), dt)
         carried = before[SAA, i], before[SAB, i], before[SBB, i]
@@ -434,7 +434,7 @@ def _evaluate(T, state, before, fixed, found, first):
 
 
 @kernel
-def _note(found, fate, row, column, first, floats, turnings):
+def _note(times, fixed, found, fate, row, column, first, planes, turnings):
     """Note what BLOCK lanes have found for their next times; those whose bars are too wide are lost."""
     for i in range(first, first + BLOCK):
         if found[DUE, i] == 0.0:
@@ -442,11 +442,12 @@ def _note(found, fate, row, column, first, floats, turnings):
         if found[NARROW, i] == 0.0:
             fate[i] = _LOST
             continue
-        own = floats[row[i], column[i]]
-        own[rc.PHI], own[rc.PHI_BAR] = found[PHI_AT, i], found[WIDE_AT, i]
-        own[rc.W], own[rc.W_BAR] = found[V_AT, i], found[HIGH_AT, i]
-        turnings[row[i], column[i]] = int(found[TURNINGS_AT, i])
-        column[i] += 1
+        r, j = row[i], column[i]
+        planes[rc.PHI, r, j], planes[rc.PHI_BAR, r, j] = found[PHI_AT, i], found[WIDE_AT, i]
+        planes[rc.W, r, j], planes[rc.W_BAR, r, j] = found[V_AT, i], found[HIGH_AT, i]
+        turnings[r, j] = int(found[TURNINGS_AT, i])
+        column[i] = j + 1
+        fixed[NEXT, i] = times[r, j + 1] if j + 1 < times.shape[1] else math.inf
 
 
 @kernel
@@ -471,24 +472,21 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
 
 
 @kernel
-def _free(times, limit, state, fixed, fate, row, column, status):
+def _free(limit, state, fixed, fate, row, status):
     """Free the lanes that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
         if row[i] < 0 or (fate[i] == 0.0 and state[STEPS, i] < limit):
             continue
-        r, j, ending = row[i], column[i], -1
-        if _passed(fate[i]):
-            if j == times.shape[1] or not math.isfinite(times[r, j]):
-                ending = OK
-            else:
-                fixed[NEXT, i] = times[r, j]
+        r, ending = row[i], -1
+        if _passed(fate[i]) and fixed[NEXT, i] == math.inf:
+            ending = OK
         if ending < 0 and fate[i] >= _LOST:
             ending = NO_CONVERGENCE if math.isfinite(state[V, i]) else OVERFLOW
         if ending < 0 and state[STEPS, i] >= limit:
             ending = STEP_LIMIT
         if ending >= 0:
-            status[r], row[i], freed = ending, -1, True
+            status[r], row[i], fixed[NEXT, i], freed = ending, -1, math.inf, True
     return freed
 
 
@@ -502,7 +500,7 @@ def busy(row):
 
 
 @splice
-def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+def trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     """phi, w, their bars and turnings at the ascending times >= 0 of each row, which end at its
     first infinity.
 
@@ -513,15 +511,16 @@ def trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
     T, state, before, fixed, found, fate = split(work)
     tolerance = min(tolerance, COARSEST)
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    fixed[NEXT, :] = math.inf  # of lanes that stay free, too
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
     waiting, steps = _refill(P, starts, times, waiting, state, fixed, row, column, status), 0
     while busy(row):
         step(T, state, before, fixed, fate, tolerance)
         steps += LANES
         for first in range(0, LANES, BLOCK):
-            while _due(times, state, before, found, fate, row, column, first):
+            while _due(state, before, fixed, found, fate, first):
                 _evaluate(T, state, before, fixed, found, first)
-                _note(found, fate, row, column, first, floats, turnings)
-        if _free(times, limit, state, fixed, fate, row, column, status):
+                _note(times, fixed, found, fate, row, column, first, planes, turnings)
+        if _free(limit, state, fixed, fate, row, status):
             waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
     return steps

@@ -466,7 +466,7 @@ def _enter(
 
 
 @kernel
-def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnings, status):
+def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnings, status):
     """As `lockstep.trajectories`, of the rows of P that have the program `lead`: see `grouped`."""
     work = np.zeros((lockstep.ROWS, LANES))
     T, state, before, fixed, found, fate = lockstep.split(work)
@@ -476,6 +476,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
     points, over, known, out, bounds, hidden = _ball_tables(p)
+    fixed[lockstep.NEXT, :] = math.inf  # of lanes that stay free, too
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, free = np.int64(lead), True
     while True:
@@ -505,10 +506,10 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, floats, turnin
         lockstep.advance(T, state, before, fixed, fate, tolerance)
         lockstep._turnings(state)
         for first in range(0, LANES, lockstep.BLOCK):
-            while lockstep._due(times, state, before, found, fate, row, column, first):
+            while lockstep._due(state, before, fixed, found, fate, first):
                 lockstep._evaluate(T, state, before, fixed, found, first)
-                lockstep._note(found, fate, row, column, first, floats, turnings)
-        free = lockstep._free(times, limit, state, fixed, fate, row, column, status)
+                lockstep._note(times, fixed, found, fate, row, column, first, planes, turnings)
+        free = lockstep._free(limit, state, fixed, fate, row, status)
 
 
 @splice

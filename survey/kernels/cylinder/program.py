@@ -292,14 +292,12 @@ def _quotient(a, r, b, s):
     return (middle, radius) if abs(b) > s else (0.0, math.inf)
 
 
-@splice
-def _extend_balls(p, numbers, known, lanes, orders, B, n):
-    """As `extend`, on balls: those of B of order n, but where known[i]; functions only in the first
-    `lanes`.
+@inline
+def _extend_balls(p, numbers, known, lanes, width, orders, B, n):
+    """As `extend`, on balls: those of B of order n, but where known[i], in `width` lanes; functions
+    only in the first `lanes`.
     """
     share = 1.0 if n == 0 else 0.0
-    # a short loop of known length would be unrolled, not vector code
-    width = (lanes + VECTOR - 1) // VECTOR * VECTOR
     for i in range(1, _count(p, SLOTS)):
         if known[i]:
             continue
@@ -371,28 +369,45 @@ def _largest(B, at):
     return size if size >= 0.0 else math.inf
 
 
+@inline
+def _angles(p, phi, radius, orders, B, q):
+    """Fill lane q of the first value, the angles within `radius` of phi."""
+    for n in range(orders):
+        at = 2 * LANES * n + q
+        B[at] = p[MIRRORED] * phi if n == 0 else (p[MIRRORED] if n == 1 else 0.0)
+        B[at + LANES] = radius if n == 0 else 0.0
+
+
 @kernel
 def balls(p, numbers, known, phi, radius, B):
     """Fill B, flat (SLOTS, orders, 2, LANES), middles and radii of the Taylor coefficients of every
     value over the angles within `radius` (lanes) of phi (lanes); `known` ones stand there already.
     """
     lanes, orders = len(phi), len(B) // (2 * LANES * _count(p, SLOTS))
+    # a short loop of known length would be unrolled, not vector code
+    width = (lanes + VECTOR - 1) // VECTOR * VECTOR
+    for q in range(lanes):
+        _angles(p, phi[q], radius[q], orders, B, q)
     for n in range(orders):
-        for q in range(lanes):
-            at = 2 * LANES * n + q
-            B[at] = p[MIRRORED] * phi[q] if n == 0 else (p[MIRRORED] if n == 1 else 0.0)
-            B[at + LANES] = radius[q] if n == 0 else 0.0
-        _extend_balls(p, numbers, known, lanes, orders, B, n)
+        _extend_balls(p, numbers, known, lanes, width, orders, B, n)
+
+
+@kernel
+def balls_of_one(p, numbers, known, phi, radius, B):
+    """As `balls`, of the first lane: less code by far, and three times as fast."""
+    orders = len(B) // (2 * LANES * _count(p, SLOTS))
+    _angles(p, phi, radius, orders, B, 0)
+    for n in range(orders):
+        _extend_balls(p, numbers, known, 1, 1, orders, B, n)
 
 
 @kernel
 def ball(p, phi, radius, orders, B):
     """As `balls`, of one lane: B (SLOTS, orders, 2)."""
     count = _count(p, SLOTS)
-    numbers, flat = np.zeros((2 * count, LANES)), np.zeros(count * orders * 2 * LANES)
+    numbers, flat = np.empty((2 * count, LANES)), np.empty(count * orders * 2 * LANES)
     note(p, numbers, 0, 1)
-    known = np.zeros(count, np.bool_)
-    balls(p, numbers.ravel(), known, np.full(1, phi), np.full(1, radius), flat)
+    balls_of_one(p, numbers.ravel(), np.zeros(count, np.bool_), phi, radius, flat)
     for i in range(count):
         for n in range(orders):
             at = 2 * LANES * (orders * i + n)
@@ -592,18 +607,18 @@ def bound_near(p, phi, w):
     do not show f w + g.
     """
     count, out = _count(p, SLOTS), np.empty(_BOUNDS)
-    numbers, known = np.zeros((2 * count, LANES)), np.zeros(count, np.bool_)
-    points = np.zeros(count * 2 * LANES)
-    over = np.zeros(len(points) * (DERIVATIVES + 1))
+    numbers, known = np.empty((2 * count, LANES)), np.zeros(count, np.bool_)
+    points = np.empty(count * 2 * LANES)
+    over = np.empty(len(points) * (DERIVATIVES + 1))
     note(p, numbers, 0, 1)
-    at, radius = np.full(1, phi), np.full(1, min(4.0 * p[RADIUS], 2.0 * (1.0 + abs(phi))))
-    balls(p, numbers.ravel(), known, at, np.zeros(1), points)
+    N, radius = numbers.ravel(), min(4.0 * p[RADIUS], 2.0 * (1.0 + abs(phi)))
+    balls_of_one(p, N, known, phi, 0.0, points)
     hidden = math.inf
     while hidden > 1.0:
-        radius[0] *= 0.5
-        balls(p, numbers.ravel(), known, at, radius, over)
-        hidden = bounded(p, points, over, 0, radius[0], w, out)
-    p[RADIUS] = radius[0]
+        radius *= 0.5
+        balls_of_one(p, N, known, phi, radius, over)
+        hidden = bounded(p, points, over, 0, radius, w, out)
+    p[RADIUS] = radius
     for k in range(_BOUNDS):
         p[BOUND_F + k] = out[k]
 

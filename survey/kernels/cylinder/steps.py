@@ -183,13 +183,15 @@ def trajectory(setting, begin, at, p, phi0, w0, times, tolerance, limit, floats,
 
 
 @splice
-def trajectories(setting, begin, at, P, starts, times, tolerance, limit, floats, turnings, status):
-    """`trajectory` for each row of P; a row of times ends at its first infinity."""
+def trajectories(setting, begin, at, P, starts, times, tolerance, limit, planes, turnings, status):
+    """`trajectory` for each row of P; a row of times ends at its first infinity; planes (STATE, rows, n)
+    are filled.
+    """
     for i in range(len(P)):
         size = finite(times[i])
         phi0, w0 = starts[i, rc.START_PHI], starts[i, rc.START_W]
         status[i] = trajectory(setting, begin, at, P[i], phi0, w0, times[i, :size],
-                               tolerance, limit, floats[i], turnings[i])  # fmt: skip
+                               tolerance, limit, planes[:, i].T, turnings[i])  # fmt: skip
 
 
 @splice

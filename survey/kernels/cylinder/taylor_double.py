@@ -19,16 +19,17 @@ FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
 
 
-def flow_trajectories(P, starts, times, tolerance, limit, floats, turnings, status):
+def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     """See `steps.trajectories`; tolerance and limit have no meaning here.
 
     One call per row, so that a run can be interrupted.
     """
     for i in range(len(P)):
-        asked = _asked(times[i])
+        asked, floats = _asked(times[i]), np.full((planes.shape[2], len(planes)), np.nan)
         status[i] = flow_double.trajectory(
-            P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], asked, floats[i], turnings[i]
+            P[i], starts[i, rc.START_PHI], starts[i, rc.START_W], asked, floats, turnings[i]
         )
+        planes[:, i] = floats.T
 
 
 def flow_abels(P, starts, targets, tolerance, limit, planes, status):

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel
 from survey.kernels.math.chebyshev import restrict
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
@@ -194,7 +194,7 @@ def _polynomials(table):
             own[lane] = 2.0 * x[lane] * one[lane] - two[lane]
 
 
-@splice
+@inline
 def answer_lanes(
     c, bars, z, y, outputs, count, n, paired, asked, rtol, floats, signs, verdict, crossing, missed, found
 ):  # fmt: skip

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, ONE, ROW, extend
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 16
@@ -120,7 +120,7 @@ def factors(
                 doubt[first + lane] = found[lane] * total[lane] * total[lane]
 
 
-@splice
+@inline
 def norm_of(S, U, terms, k, sums, out):
     """The maximum norm of A's coefficient of order k, by rows; U (terms, lanes): the terms' numbers."""
     q = 0
@@ -141,7 +141,7 @@ def norm_of(S, U, terms, k, sums, out):
                 out[lane] = max(out[lane], sums[lane])
 
 
-@splice
+@inline
 def times_step(U, s, n, W):
     """Fill W (terms, n lanes) with the numbers U (terms, lanes) times half the steps, s, for every column."""
     lanes = len(s)
@@ -152,7 +152,7 @@ def times_step(U, s, n, W):
                 own[c * lanes + lane] = one[lane] * s[lane]
 
 
-@splice
+@inline
 def next_term(S, W, terms, used, needed, k, n, B, C, X):
     """Fill X[k + 1] = half / (k + 1) * sum over j of A_j X[k - j], W from `times_step`; `needed` (basis,
     row) rows of X are multiplied.
@@ -244,7 +244,7 @@ def _rounded(a, w, e, own, s, k, most):
         new[lane] *= s[lane] / (k + 1)
 
 
-@splice
+@inline
 def _halves(X, even, odd):
     """Fill the sums of the terms of even and of odd order of the series at tau = 1, like X[0]."""
     for i in range(X.shape[1]):
@@ -260,7 +260,7 @@ def _halves(X, even, odd):
                     two[q] += term[q]
 
 
-@splice
+@inline
 def _missing(a, w, e, s, total, of_both, of_odd):
     """Fill bounds (lanes) of the errors of a series at tau = 1 and of the sum of its odd terms, and
     `total`, the sum of its terms' norms: what it lacks beyond its last term, and its rounding.
@@ -309,7 +309,7 @@ def _missing(a, w, e, s, total, of_both, of_odd):
         of_odd[lane] += cut
 
 
-@splice
+@inline
 def _over(even, odd, of_both, of_odd, work, error):
     """Make `odd` G = F - 1, F the propagator over the steps, from the halves of U; fill the bounds
     `error` of its rows.

@@ -21,9 +21,9 @@ METHODS = {
             "how many steps it takes where Taylor's method of order 20 takes one", int, needed=True
         ),
         "flow_trajectories": Function(
-            "fill floats (rows, n, STATE: PHI to W_BAR), turnings (rows, n; UNDETERMINED if unknown) and status (rows) "
+            "fill planes (STATE: PHI to W_BAR, rows, n), turnings (rows, n; UNDETERMINED if unknown) and status (rows) "
             "at ascending times (rows, n) >= 0, a row of which may end in infinities",
-            ("P", "starts", "times", "tolerance", "limit", "floats", "turnings", "status"),
+            ("P", "starts", "times", "tolerance", "limit", "planes", "turnings", "status"),
             needed=True,
         ),
         "flow_turnings": Function(
@@ -42,6 +42,10 @@ METHODS = {
         "flow_abels_by_row": Function(
             "the same, one row after the other, where that is compiled sooner",
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
+        ),
+        "flow_trajectories_ahead": Function(
+            "compile `flow_trajectories` for `own` functions, while another process compiles what they need besides",
+            ("own",),
         ),
         "flow_abels_ahead": Function(
             "compile some of what `flow_abels` calls, for `own` functions or for the gyrostat, while another process "

@@ -2,7 +2,7 @@
 `survey.sweep.compile_ahead`).
 
 The kernels are called on nothing. They are those that come after the cycles of fates and portraits,
-or one of the two of Abel's equation.
+one of the two of Abel's equation, or the trajectories of a user's f and g.
 """
 
 import numpy as np
@@ -28,6 +28,8 @@ def of_functions(variables, options):
 
 def _compile(p, options, own):
     question = options.get("question")
+    if question == "trajectory" and "separatrix" not in options:
+        taylor.flow_trajectories_ahead(own)
     if question == "abel" and "separatrix" not in options:
         taylor.flow_abels_ahead(own)
     none = np.empty((0, rc.EXACT_START))

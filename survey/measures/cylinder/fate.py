@@ -489,10 +489,10 @@ def fates(method, s, starts, tolerance, more=1):
         return out
     if s.stratum in (I0, I1):
         return (_free if s.stratum == I0 else _conservative)(s, starts)
-    waiting.wait("fates")
     starts = np.pad(starts, ((0, 0), (0, 4 - starts.shape[1])))
     known = {kind: s.cycles(kind).table for kind in (KINDS if len(starts) > FEW else s.found)}
     run = partial(_by_tables, method, s, tolerance, more)
+    waiting.wait("fates")
     out = run(known, starts)
     for kind in (PLUS, MINUS):
         rising = (_needs(out) == kind) & (out[:, rc.RISING_FROM] > 0.0)

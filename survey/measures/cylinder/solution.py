@@ -115,7 +115,8 @@ def _in_time(method, rows, times, rtol):
         at = np.array(times[pick], order="C")  # never read-only, as a broadcast array is
         floats, turnings, status = _nothing(at.shape)
         ends = np.zeros(len(P), dtype=np.int64)
-        method.flow_trajectories(P, starts, at, tolerance, budget, floats, turnings, ends)
+        planes = floats.transpose(2, 0, 1)
+        method.flow_trajectories(P, starts, at, tolerance, budget, planes, turnings, ends)
         np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
         if (lost := floats[..., rc.W_BAR] < LEAST_BAR).any():
             lost &= floats[..., rc.W] != 0

@@ -110,11 +110,11 @@ def test_regions_of_attraction_hold():
                 np.linalg.cholesky(V).T, [np.cos(angles), np.sin(angles)]
             ) * math.sqrt(row[eq.LEVEL])
             starts = np.ascontiguousarray(x.T + np.array([row[eq.ANGLE], 0.0]))
-            floats, n, s = np.zeros((8, 1, 4)), np.zeros((8, 1), dtype=int), np.zeros(8, dtype=int)
+            planes, n, s = np.zeros((4, 8, 1)), np.zeros((8, 1), dtype=int), np.zeros(8, dtype=int)
             taylor.flow_trajectories(
-                np.tile(p, (8, 1)), starts, np.full((8, 1), 300.0), 1e-14, 99999, floats, n, s
+                np.tile(p, (8, 1)), starts, np.full((8, 1), 300.0), 1e-14, 99999, planes, n, s
             )
-            assert np.abs(floats[:, 0, 0] - row[eq.ANGLE]).max() < 1e-6
+            assert np.abs(planes[0, :, 0] - row[eq.ANGLE]).max() < 1e-6
             tried += 1
     assert tried > 10
 

@@ -19,9 +19,9 @@ TURN = lockstep.LANES + 3  # more rows than lanes
 
 
 @fresh
-def one_by_one(P, starts, times, tolerance, limit, floats, turnings, status):
+def one_by_one(P, starts, times, tolerance, limit, planes, turnings, status):
     steps.trajectories(taylor.flow_setting, taylor.flow_begin, taylor.flow_at, P, starts, times, tolerance, limit,
-                       floats, turnings, status)  # fmt: skip
+                       planes, turnings, status)  # fmt: skip
 
 
 @fresh
@@ -34,10 +34,10 @@ def solved(rows, times, tolerance=1e-13, run=taylor.flow_trajectories, limit=sol
     """floats, turnings and status of `run` at the same times for every row."""
     P, starts = solution.split(np.asarray(rows, float))
     times = np.tile(np.asarray(times, float), (len(P), 1))
-    floats, turnings = np.full((*times.shape, 4), np.nan), np.full(times.shape, steps.UNDETERMINED)
+    planes, turnings = np.full((4, *times.shape), np.nan), np.full(times.shape, steps.UNDETERMINED)
     status = np.full(len(P), 99)
-    run(P, starts, times, tolerance, limit, floats, turnings, status)
-    return floats, turnings, status
+    run(P, starts, times, tolerance, limit, planes, turnings, status)
+    return planes.transpose(1, 2, 0), turnings, status
 
 
 def drawn(count, seed, scale=(1, 1, 1, 1, 1, 1, 3, 1)):
