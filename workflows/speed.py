@@ -3,10 +3,11 @@ one run on one core.
 
     python workflows/speed.py [PART ...]    prints `name ratio`, and to stderr times, errors and what is below its floor
 
-Above 1 survey is faster. All is called as users call it, by `survey.evaluate` and `survey.run`, labels and files
-included; "all" means every output of the scene, else the named ones. Both sides meet |error| <= 1e-9 (1 + |value|),
-checked against heyoka at a tolerance of 1e-15. heyoka at its best: batches of 16, fast_math, half periods by symmetry,
-elliptic and circular functions as states, points sorted by effort; it gives the factors of Hill's equation alone.
+Above 1 survey is faster. All is called as users call it, by `survey.evaluate`, `survey.edge` and
+`survey.run`, labels and files included; "all" means every output of the scene, else the named ones. Both
+sides meet |error| <= 1e-9 (1 + |value|), checked against heyoka at a tolerance of 1e-15. heyoka at its best:
+batches of 16, fast_math, half periods by symmetry, elliptic and circular functions as states, points sorted
+by effort; it gives the factors of Hill's equation alone.
 Times are of the processor (`time.process_time`), medians of REPEATS interleaved repetitions; ranges of parameters move
 by a rounding from one to the next, so that no map is remembered. Needs heyoka; exit code 1 where a ratio is below its
 floor or an error too large.
@@ -53,7 +54,8 @@ FLOORS = {
     "own_hill_map_all": 3.8,
     "own_hill_scattered": 3.5,
     "own_square_wave": 0.45,
-    "tongue_edges": 0.57,
+    "tongue_edges": 2.2,
+    "tongue_edges_and_curves": 0.72,
     "gyrostat_trajectory": 1.3,
     "gyrostat_200_times": 0.81,
     "danby_map": 21,
@@ -356,7 +358,9 @@ def wave(harness):
 # --------------------------------------------------------------------------------------------------
 # tongues' edges
 def edges(harness):
-    """Edges of tongues in 500 rows, the file included, against heyoka and SciPy's vectorised root finder."""
+    """Edges of tongues in 500 rows, against heyoka and SciPy's vectorised root finder; then with the
+    curves through them and the file, of which these make none.
+    """
     rows, batch = 500, Batch(satellite_equations(), 3, 1e-12)
     k, rho = np.linspace(0, 0.98, rows), np.linspace(0.57735, 3.2, 300)
 
@@ -379,6 +383,10 @@ def edges(harness):
         )
 
     def ours(i):
+        ends = (0.57735, 3.2)
+        return survey.edge("satellite", along="rho", body="oblate", k=moved(k, i), rho=ends)
+
+    def with_curves(i):
         path = Path(harness.folder) / f"edges_{i}.nc"
         path.unlink(missing_ok=True)
         axes = {
@@ -390,11 +398,12 @@ def edges(harness):
             "output": {"path": str(path), "variables": ["verdict"]},
         })  # fmt: skip
 
-    a, b = np.sort(ours(0).edge_position.values), theirs()
+    a, b = np.sort(ours(0).edge.values), theirs()
     print(f"    edges: {a.size} against {b.size}", file=sys.stderr)
     # narrow tongues are seen by us alone
     error = float(abs(a - b).max()) if a.size == b.size else 0.0
     harness.compare("tongue_edges", ours, a.size, theirs, b.size, lambda: error)
+    harness.compare("tongue_edges_and_curves", with_curves, a.size, theirs, b.size, lambda: error)
 
 
 # -------------------------------------------------------------------------------------------------------

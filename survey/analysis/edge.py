@@ -3,6 +3,7 @@ parameters.
 """
 
 import os
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,8 @@ from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
 from survey.sweep import boundaries
-from survey.sweep.line import second_axis
+from survey.sweep.edges_and_cells import on_threads
+from survey.sweep.line import second_axis, together
 from survey.sweep.progress import watched
 from survey.wording import shown
 
@@ -45,9 +47,10 @@ def edge(
     scene : as in `survey.evaluate`.
     along : the name of the parameter along which boundaries are searched for.
     near : a value of it: only the nearest boundary on each side of it is returned, at most two.
-    **parameters : numbers for the scene's other parameters, and options. `along=(low, high)`, under that parameter's
-        name, is the range that is searched; by default its whole domain, if that is bounded, less a thousandth at an
-        end that does not belong to it, or what is `near`. Physical input, such as moments of inertia, as in `evaluate`.
+    **parameters : the scene's other parameters, and options. Parameters are numbers, or arrays as in `evaluate`, which
+        give rows: their boundaries are found together. `along=(low, high)`, under that parameter's name, is the range
+        that is searched; by default its whole domain, if that is bounded, less a thousandth at an end that does not
+        belong to it, or what is `near`. Physical input, such as moments of inertia, as in `evaluate`.
 
     Returns
     -------
@@ -59,6 +62,10 @@ def edge(
     is marginal at a single value between two sides of the same verdict, such as `rho` = 0 of an oblate satellite's
     librations, there is none.
 
+    With arrays one row follows the other along `place`, where coordinates give the parameters of each boundary. The
+    attribute `rows` is the number of rows, those without a boundary included; `complete` is 1 where it is for every
+    row, and `incomplete_rows` counts those for which it is not.
+
     Raises
     ------
     survey.BadInput where the scene has no boundaries along the parameter, or it has no bounded range.
@@ -68,6 +75,9 @@ def edge(
     >>> import survey
     >>> survey.edge("satellite", along="rho", near=1.2, k=0.5).edge.values.round(6)
     array([1.026056, 1.604051])
+    >>> tongues = survey.edge("satellite", along="rho", k=[0.4, 0.5], rho=(1, 2))
+    >>> tongues.to_dataframe()[["k", "edge"]].round(4).values.tolist()
+    [[0.4, 1.0151], [0.4, 1.4131], [0.5, 1.0261], [0.5, 1.6041]]
     """
     return _edge(scene, along, near, parameters)
 
@@ -96,6 +106,8 @@ def _edge(scene, along, near, parameters, alone=False):
     chosen = {key: value for key, value in parameters.items() if key in names}
     options = check_options(module, chosen, [*given, along])
     used = check_parameters(module, name, options, dict.fromkeys([along, *given]))
+    if any(np.ndim(value) for value in given.values()):
+        return _of_rows(name, module, measure, options, used, along, ends, near, given)
     fixed = {
         key: _number(key, given.get(key, p.default), p) for key, p in used.items() if key != along
     }
@@ -111,6 +123,46 @@ def _edge(scene, along, near, parameters, alone=False):
             scene, module, {along: near if ends is None else sum(ends) / 2} | fixed, options
         )
     return _described(module, measure, used, along, fixed, found, searched)
+
+
+def _of_rows(name, module, measure, options, used, along, ends, near, given):
+    """As `edge`, where some of the other parameters, `given`, are arrays."""
+    if near is not None:
+        raise BadInput(
+            f"near = {shown(near)}: it applies to a single row; leave it out, or give numbers instead of arrays"
+        )
+    ends = _range(used[along], ends, None, rows=True)
+    others = {key: p for key, p in used.items() if key != along}
+    arrays = {key: api._labelled(key, given.get(key, p.default)) for key, p in others.items()}
+    for key, array in arrays.items():
+        outside = ~others[key].holds(array.values)
+        if along in array.dims:
+            raise BadInput(
+                f"{key}: its dimension {along!r} is the parameter along which is searched; rename it"
+            )
+        if outside.any():
+            value = float(array.values[outside].flat[0])
+            raise BadInput(
+                f"{key} = {value:g} is outside its domain; allowed: {_domain(others[key])}"
+            )
+    api._check_dimensions(module, arrays)
+    grid = api._grid(others, arrays)
+    user_scene.check(module)
+    with watched(name, module, grid.points, lambda: np.inf, "rows") as progress:
+        report = progress and (lambda done, total, *_: progress(done, total))
+        row, found = boundaries.on_rows(module, options, along, ends, grid, on_threads(report))
+    fixed = {key: float(array) for key, array in arrays.items() if not array.ndim}
+    ds = _described(module, measure, used, along, fixed, replace(found, complete=None), ends)
+    about = {key: {"long_name": p.long_name, "units": p.units} for key, p in others.items()}
+    named = {key: array.variable for key, array in arrays.items() if array.ndim}
+    for key, values in (named | api._own_coordinates(arrays)).items():
+        every = values.set_dims(dict(grid.sizes)).values.ravel()
+        ds.coords[key] = "place", every[row], about.get(key, values.attrs)
+    ds.attrs["rows"] = grid.points
+    if found.complete is not None:
+        lost = int((~found.complete).sum())
+        ds.attrs |= {"complete": int(not lost), "incomplete_rows": lost}
+    return ds
 
 
 def _not_searched(module, measure, along, known):
@@ -161,7 +213,7 @@ def _domain(parameter):
     return parameter.domain + ("" if parameter.units == "1" else f" ({parameter.units})")
 
 
-def _range(parameter, ends, near):
+def _range(parameter, ends, near, rows=False):
     """(low, high) of the part of the domain that is searched; None for a range around `near`."""
     name = parameter.name
     if ends is None and near is not None:
@@ -169,7 +221,8 @@ def _range(parameter, ends, near):
     low, high = parameter.minimum, parameter.maximum
     if ends is None:
         if high - low > WIDEST:
-            raise BadInput(f"edge: give near= a value of {name}, or a range as {name}=(low, high)")
+            near = "" if rows else f"near= a value of {name}, or "
+            raise BadInput(f"edge: give {near}a range as {name}=(low, high)")
         return low + INSIDE * (high - low) * parameter.open_minimum, high - INSIDE * (
             high - low
         ) * parameter.open_maximum
@@ -214,17 +267,8 @@ def _find(scene, options, parameter, ends, near, fixed, alone):
 
 def _together(parts):
     """The OnLine of pieces of a line."""
-
-    def all_of(name):
-        values = [getattr(one, name) for one in parts]
-        return None if any(one is None for one in values) else np.concatenate(values)
-
     complete = [one.complete for one in parts]
-    found = boundaries.OnLine(
-        *map(all_of, ("position", "error", "kind")),
-        None if None in complete else all(complete),
-        all_of("index"),
-    )
+    found = together(parts, None if None in complete else all(complete))
     return found[np.argsort(found.position, kind="stable")]
 
 

@@ -11,6 +11,7 @@ back.
 """
 
 import heapq
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise, product
 from math import prod
@@ -26,7 +27,7 @@ from survey.measures.segments import UNKNOWN
 from survey.measures.square import Square
 from survey.measures.tasks import in_turn
 from survey.scene import Request
-from survey.sweep.line import OnLine, on_line
+from survey.sweep.line import OnLine, on_line, together
 
 # of the time of a map, measured: of one axis, of which most are short or have few boundaries; and
 # the exponent with which the time of a part of a map grows with the part
@@ -89,16 +90,33 @@ def _about(workflow):
 
 def along(scene, options, name, ends, fixed):
     """The OnLine between `ends` of the parameter `name`; `fixed`: all others."""
-    measure = measures.curves(scene)
-    if hasattr(measure, "refusal"):
+    others = Grid({}, {key: ((), np.float64(value)) for key, value in fixed.items()})
+    found = on_rows(scene, options, name, ends, others)[1]
+    return replace(found, complete=None if found.complete is None else bool(found.complete[0]))
+
+
+def on_rows(scene, options, name, ends, others, each=in_turn):
+    """The boundaries between `ends` of the parameter `name` on each row of the Grid of all `others`:
+    (the row of each, in the grid's order; the OnLine of all, whose `complete` says it of each row).
+    """
+    rows = range(others.points)
+    if not hasattr(measures.curves(scene), "refusal"):
+        parameters = {name: ((name,), np.array(ends)), **others.parameters}
+        grid = Grid({**others.sizes, name: 2}, parameters)
+        line = SimpleNamespace(scene=scene, grid=grid, request=Request(options))
+        edges = _edges(line, name, each)
+        found = edges.position, edges.error, edges.kind, edges.complete.astype(bool), edges.index
+        return edges.row, OnLine(*found)
+
+    def task(row):
+        values = _at(others.parameters, _indices(others, list(others.sizes), row))
+        fixed = {key: float(value) for key, value in values.items()}
         return on_line(scene, options, name, ends, fixed)
-    parameters = {name: ((name,), np.array(ends))} | {
-        key: ((), np.float64(value)) for key, value in fixed.items()
-    }
-    line = SimpleNamespace(scene=scene, grid=Grid({name: 2}, parameters), request=Request(options))
-    edges = _edges(line, name)
-    complete = bool(edges.complete.all())
-    return OnLine(edges.position, edges.error, edges.kind, complete, edges.index)
+
+    parts = each(task, rows, "rows")
+    complete = [part.complete for part in parts]
+    found = together(parts, None if None in complete else np.array(complete))
+    return np.repeat(rows, [part.position.size for part in parts]), found
 
 
 def plan(workflow, cost, threads):
@@ -296,11 +314,7 @@ def _row_solver(workflow, axis, rows):
     """What `edges.find` asks of the scene, for these rows."""
     grid = workflow.grid
     at = _indices(grid, [dim for dim in grid.sizes if dim != axis], rows)
-    others = {
-        name: values[at[dims[0]]] if dims else values
-        for name, (dims, values) in grid.parameters.items()
-        if name != axis
-    }
+    others = _at({name: grid.parameters[name] for name in grid.parameters if name != axis}, at)
 
     def solve(row, x, wanted):
         point = {
@@ -406,6 +420,14 @@ def _indices(grid, dims, rows):
     """{name: indices} along these dimensions of the rows with these numbers."""
     shape = [grid.sizes[dim] for dim in dims]
     return dict(zip(dims, np.unravel_index(rows, shape) if dims else (), strict=True))
+
+
+def _at(parameters, indices):
+    """{name: its values} at these indices, {dimension: of each row}; a number where it has no dimension."""
+    return {
+        name: values[tuple(indices[dim] for dim in dims)] if dims else values
+        for name, (dims, values) in parameters.items()
+    }
 
 
 def _on_plane(workflow, square, across, axis, of_rows, plane, each):

@@ -12,21 +12,21 @@ def find(workflow, once, progress=None):
     found = []
     parts = requested(workflow)
     if "edges" in parts and not (workflow.proves and workflow.refine is None):
-        found.append(parts["edges"].find(workflow, _on_threads(progress), once))
+        found.append(parts["edges"].find(workflow, on_threads(progress), once))
     if "surfaces" in parts:
-        found.append(parts["surfaces"].find(workflow, _on_threads(progress), once))
+        found.append(parts["surfaces"].find(workflow, on_threads(progress), once))
     if workflow.proves:
         from survey.sweep import proofs  # most runs prove nothing
 
         found.append(proofs.find(workflow, once, progress))
     elif "cells" in parts:
         found.append(
-            parts["cells"].find(workflow, _on_threads(), once, getattr(progress, "refining", None))
+            parts["cells"].find(workflow, on_threads(), once, getattr(progress, "refining", None))
         )
     return found
 
 
-def _on_threads(progress=None):
+def on_threads(progress=None):
     """`each` of `survey.measures.tasks` on threads of this process; `progress` is called as each
     task ends.
     """

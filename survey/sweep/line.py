@@ -38,6 +38,16 @@ class OnLine:
         )
 
 
+def together(parts, complete):
+    """The OnLine of all parts, one after another."""
+
+    def all_of(name):
+        values = [getattr(part, name) for part in parts]
+        return None if any(one is None for one in values) else np.concatenate(values)
+
+    return OnLine(*map(all_of, ("position", "error", "kind")), complete, all_of("index"))
+
+
 def on_line(scene, options, along, ends, fixed):
     """The OnLine between `ends` (low, high) of the parameter `along`; `fixed`: {name: value} of all
     others.

@@ -36,6 +36,42 @@ def test_edges_of_a_row_are_those_of_boundaries(tmp_path):
     assert found.attrs["complete"] == 1 and found.edge.attrs["units"] == "1"
 
 
+@pytest.mark.parametrize(
+    ("scene", "along", "ends", "rows"),
+    [
+        ("satellite", "rho", (0.6, 2.5), {"k": np.linspace(0.0, 0.9, 140), "body": "oblate"}),
+        (
+            "satellite_triaxial",
+            "k",
+            (0.0, 0.8),
+            {
+                "A": 0.5,
+                "B": xr.DataArray([0.7, 0.8], dims="body_number"),
+                "C": xr.DataArray([1.0, 1.1], dims="body_number"),
+            },
+        ),
+        ("libration_elliptic", "mu", (0.0, 0.05), {"e": [0.0, 0.1, 0.5]}),  # one row after another
+    ],
+)
+def test_rows_have_the_boundaries_of_each_alone(scene, along, ends, rows):
+    together = survey.edge(scene, along=along, **{along: ends}, **rows)
+    arrays = {key: np.asarray(values) for key, values in rows.items() if np.ndim(values)}
+    count = len(next(iter(arrays.values())))
+    first = 0
+    for row in range(count):
+        own = {key: values[row] for key, values in arrays.items()}
+        alone = survey.edge(scene, along=along, **{along: ends}, **rows | own)
+        here = together.isel(place=slice(first, first + alone.place.size))
+        first += alone.place.size
+        for name in ("edge", "edge_error", "edge_class"):
+            np.testing.assert_array_equal(here[name], alone[name])
+        for key, value in own.items():
+            assert (here[key] == value).all()
+    assert first == together.place.size > count and together.rows == count
+    assert together.attrs.get("complete") == alone.attrs.get("complete")
+    assert together.attrs.get("incomplete_rows", 0) == 0
+
+
 def test_characteristic_values_of_mathieu():
     """DLMF 28.8 / Abramowitz-Stegun table 20.1: a_0, b_1, a_1, b_2 at q = 5 (to the ten digits
     given there).
@@ -279,7 +315,14 @@ def test_what_has_no_boundaries_is_reported():
         (r"give a range as rho=\(low, high\)", {"along": "rho", "k": 0.5, "near": (0, 3)}),
         ("rho is missing", {"along": "k", "near": 0.3}),
         (r"so give a range \(low, high\)", {"along": "rho", "k": 0.5, "rho": 1.0}),
-        ("it must be one number in its domain", {"along": "rho", "near": 1.0, "k": [0.1, 0.2]}),
+        ("near = 1.0: it applies to a single row", {"along": "rho", "near": 1.0, "k": [0.1, 0.2]}),
+        (r"^edge: give a range as rho=\(low, high\)$", {"along": "rho", "k": [0.1, 0.2]}),
+        ("k = -1 is outside its domain", {"along": "rho", "rho": (1, 2), "k": [0.1, -1.0]}),
+        ("k = \\['x'\\]: it must be a real number", {"along": "rho", "rho": (1, 2), "k": ["x"]}),
+        (
+            "k: its dimension 'rho' is the parameter along which",
+            {"along": "rho", "rho": (1, 2), "k": xr.DataArray([0.1, 0.2], dims="rho")},
+        ),
     ):
         with pytest.raises(BadInput, match=match):
             survey.edge("satellite", **keywords)
@@ -440,8 +483,8 @@ def test_edge_takes_physical_input_and_says_what_it_searched():
     assert near[0] < 1.03 and near[1] > 1.6
     with pytest.raises(survey.BadInput, match="inertia_ratio is given twice"):
         survey.edge("satellite", along="inertia_ratio", amplitude=0.5, **shape)
-    with pytest.raises(survey.BadInput, match="body"):
-        survey.edge("libration_elliptic", along="e", body=["Earth-Moon", "Sun-Earth"])
+    bodies = survey.edge("libration_elliptic", along="e", body=["Earth-Moon", "Sun-Jupiter"])
+    assert bodies.body.values.tolist() == ["Earth-Moon", "Sun-Jupiter"]
 
 
 @pytest.mark.parametrize("e", [0.6, 0.9, 0.99, 0.999])
