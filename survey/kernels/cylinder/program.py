@@ -135,13 +135,6 @@ def values(p, phi):
 
 
 @kernel
-def sample(p, f, g):
-    """Fill f and g with their values at evenly spread angles of the circle, from 0 on."""
-    for i in range(len(f)):
-        f[i], g[i], _dg = values(p, i * (2.0 * math.pi / len(f)))
-
-
-@kernel
 def in_angle(p, phi, f, g):
     """Fill f and g with their Taylor coefficients about phi."""
     count, size = _count(p, FORCES), len(f)
@@ -536,6 +529,73 @@ def _unchanged(p, last, known):
             of_two = code == CONSTANT or code == PLUS or code == FROM or code == TIMES or known[b]
             if known[i] and not (of_one and of_two):
                 known[i], found = False, True
+
+
+@kernel
+def sampled(rows, out):
+    """Fill out (rows, 2, n) with f and g of programs, all of one length, at n evenly spread angles of the
+    circle, from 0 on; rows whose bounds are not finite are left as they are. What does not depend on
+    parameters is found once for all rows.
+    """
+    if len(rows) == 0:
+        return
+    n, count, signed = out.shape[2], _count(rows[0], FORCES), math.nan
+    S, known = np.empty((count, n)), np.zeros(_count(rows[0], SLOTS), np.bool_)
+    last = np.full(rows.shape[1], math.nan)
+    for r in range(len(rows)):
+        p = rows[r]
+        if not math.isfinite(p[BOUND_F]):
+            continue
+        known[0] = p[MIRRORED] == signed
+        _unchanged(p, last, known)
+        signed = p[MIRRORED]
+        for k in range(len(p)):
+            last[k] = p[k]
+        for j in range(n if not known[0] else 0):
+            S[0, j] = signed * (j * (2.0 * math.pi / n))
+        for i in range(1, count):
+            if not known[i]:
+                _sample(p, i, S)
+        f, g = S[int(p[F_AT])], S[int(p[G_AT])]
+        for j in range(n):
+            out[r, 0, j], out[r, 1, j] = p[REVERSED] * f[j], signed * g[j]
+
+
+@splice
+def _sample(p, i, S):
+    """Fill S[i] with the i-th value at all angles, as `extend` finds it at one."""
+    code, a, b, number = _operation(p, i)
+    own, one, two = S[i], S[a], S[b]
+    if code == ADD:
+        for j in range(len(own)):
+            own[j] = one[j] + two[j]
+    elif code == SUBTRACT:
+        for j in range(len(own)):
+            own[j] = one[j] - two[j]
+    elif code == MULTIPLY:
+        for j in range(len(own)):
+            own[j] = one[j] * two[j]
+    elif code == DIVIDE:
+        for j in range(len(own)):
+            own[j] = one[j] / two[j]
+    elif code == PLUS:
+        for j in range(len(own)):
+            own[j] = one[j] + number
+    elif code == TIMES:
+        for j in range(len(own)):
+            own[j] = number * one[j]
+    elif code == FROM:
+        for j in range(len(own)):
+            own[j] = number - one[j]
+    elif code == OVER:
+        for j in range(len(own)):
+            own[j] = number / two[j]
+    elif code == CONSTANT:
+        for j in range(len(own)):
+            own[j] = number
+    else:
+        for j in range(len(own)):
+            own[j] = function(code, one[j], number)
 
 
 @kernel

@@ -74,8 +74,7 @@ def _integrals(row, number):
     """mean(f), mean(g), K and L by the trapezoidal rule, which converges geometrically, F by its
     Fourier series.
     """
-    f, g = np.empty(number), np.empty(number)
-    pg.sample(row, f, g)
+    f, g = _sampled(row, number)
     k = np.fft.rfftfreq(number, 1 / number)
     series = np.fft.rfft(f)
     series[1:] /= 1j * k[1:]
@@ -84,10 +83,16 @@ def _integrals(row, number):
     return np.array([f.mean(), g.mean(), -2 * (g * F).mean(), 2 * np.pi * (g * F * F).mean()])
 
 
+def _sampled(row, number):
+    """f and g at evenly spread angles, from 0 on."""
+    values = np.full((1, 2, number), np.nan)
+    pg.sampled(row[None], values)
+    return values[0]
+
+
 def potential(row, angles):
     """V = -int (g - mean g) at the angles, to a few digits: which saddle is the highest."""
-    f, g = np.empty(1024), np.empty(1024)
-    pg.sample(row, f, g)
+    _f, g = _sampled(row, 1024)
     total = -np.cumsum(g - g.mean()) * (2 * np.pi / len(g))
     at = np.linspace(0.0, 2 * np.pi, len(g), endpoint=False)
     return np.interp(np.asarray(angles) % (2 * np.pi), at, total)

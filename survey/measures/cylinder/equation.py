@@ -28,6 +28,7 @@ SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is
 # Of the circle: samples in which a spike of f or g is seen, whose coefficients count above RESOLVED,
 # relative to the largest; and what a step may span of the angle in which they vary.
 EVENLY, RESOLVED, SPAN = 512, 1e-12, 1.2
+TOGETHER = 128  # programs that are sampled together
 SIMPLE = 4  # sines and cosines of lines, multiplied with each other, cannot hide a spike
 
 
@@ -407,16 +408,17 @@ def _limit(rows):
     """Limit the steps of programs on the circle, whose f and g may have spikes that the series of other
     steps do not show.
     """
-    values = np.empty((2, EVENLY))
-    for p in rows:
-        if not np.isfinite(p[pg.BOUND_F]):
-            continue
-        pg.sample(p, *values)
-        c = abs(np.fft.rfft(values, axis=1)) / EVENLY
+    for first in range(0, len(rows), TOGETHER):
+        some = rows[first : first + TOGETHER]
+        values = np.zeros((len(some), 2, EVENLY))
+        pg.sampled(some, values)
+        c = abs(np.fft.rfft(values.reshape(-1, EVENLY), axis=1)) / EVENLY
         with np.errstate(all="ignore"):
             share = c / c.max(axis=1, keepdims=True)
-            rate = chebyshev.fastest(share, share > RESOLVED).max()
-        p[pg.RADIUS] = min(SPAN / max(rate, 1e-300), pg.UNLIMITED)
+            rate = chebyshev.fastest(share, share > RESOLVED).reshape(-1, 2).max(axis=1)
+        bounded = np.isfinite(some[:, pg.BOUND_F])
+        radius = np.minimum(SPAN / np.maximum(rate, 1e-300), pg.UNLIMITED)
+        some[bounded, pg.RADIUS] = radius[bounded]
 
 
 @lru_cache(maxsize=64)

@@ -133,6 +133,28 @@ def test_balls_beyond_the_domain_of_a_function_have_no_bound(g, x, radius):
     assert out[int(row[pg.G_AT]), 0, 1] == np.inf
 
 
+def of_the_circle(phi, p):
+    """Every kind of operation, most without parameters, with the period 2 pi."""
+    s, c = np.sin(phi), np.cos(phi)
+    y = 2.0 / (3.0 + p[0] * c) - s * c / (2.0 - s) + (1.5 - c) * np.tanh(3 * s) - 0.7
+    return y + p[1] * np.exp(p[0] * s) + np.sqrt(2.0 + c) * (c - s)
+
+
+def test_samples_are_the_values_at_each_angle_for_all_parameters_at_once():
+    points = [(0.3, 1.1), (0.3, 2.3), (np.nan, 1.1), (0.9, 2.3), (0.8, 2.3), (-0.4, -1.2)]
+    rows = equation.flows(of_the_circle, lambda phi, p: np.sin(phi) * p[1], np.array(points), True)
+    rows[4, [pg.REVERSED, pg.MIRRORED]] = -1.0, -1.0  # as the symmetries of solutions turn it
+    found = np.full((len(rows), 2, 48), 99.0)
+    pg.sampled(rows, found)
+    for row, own in zip(rows, found, strict=True):
+        if np.isnan(row[0]):
+            assert (own == 99.0).all()
+            continue
+        values = [pg.values(row, j * (2 * math.pi / 48))[:2] for j in range(48)]
+        assert np.array_equal(own.T, values)
+    pg.sampled(rows[:0], found[:0])
+
+
 def test_balls_of_squares_hold_them_and_are_not_negative():
     row = equation.program(plain, lambda x, p: x * x, (1.0,), False)
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
