@@ -477,24 +477,46 @@ def _agree(p, out, first):
 
 
 @splice
-def _bound_finely(p):
-    """Write bounds over the whole circle into p, from the third number of its pieces on."""
-    count, pieces, near = _count(p, SLOTS), 16 * COARSEST, False
+def _bound_finely(p, numbers, middles, radii, bounds):
+    """Lower the bounds over the whole circle in p, which are the largest `bounds` (n, _BOUNDS) of its
+    pieces: those with more than half of the largest are divided by four, until no bound falls to less
+    than half by that.
+    """
+    count, near = _count(p, SLOTS), False
     points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
-    numbers, known, none = np.empty((2 * count, LANES)), np.zeros(count, np.bool_), np.zeros(LANES)
-    note(p, numbers, 0, LANES)
-    out = np.empty(_BOUNDS)
-    while not near and pieces <= FINEST:
-        middles, out[:] = np.empty(pieces), 0.0
-        radii = np.full(LANES, _middles(pieces, middles))
-        for first in range(0, pieces, LANES):
-            phi = middles[first : first + LANES]
-            balls(p, numbers.ravel(), known, phi, none, points)
-            balls(p, numbers.ravel(), known, phi, radii, over)
-            for q in range(LANES):
-                raised(p, points, over, q, out)
+    known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(_BOUNDS)
+    while not near and len(radii) <= FINEST and radii.min() > math.pi / FINEST:
+        pieces, left = len(radii), 0
+        for i in range(pieces):  # those that stay come first
+            large = False
+            for k in range(_BOUNDS):
+                large |= not bounds[i, k] <= 0.5 * p[BOUND_F + k] or bounds[i, k] == math.inf
+            if not large:
+                middles[i], middles[left] = middles[left], middles[i]
+                radii[i], radii[left] = radii[left], radii[i]
+                for k in range(_BOUNDS):
+                    bounds[i, k], bounds[left, k] = bounds[left, k], bounds[i, k]
+                left += 1
+        size = left + 4 * (pieces - left)
+        finer, narrower, lower = np.empty(size), np.empty(size), np.zeros((size, _BOUNDS))
+        for i in range(left):
+            finer[i], narrower[i] = middles[i], radii[i]
+            for k in range(_BOUNDS):
+                lower[i, k] = bounds[i, k]
+        for i in range(left, pieces):
+            for j in range(4):
+                finer[left + 4 * (i - left) + j] = middles[i] + (0.5 * j - 0.75) * radii[i]
+                narrower[left + 4 * (i - left) + j] = 0.250001 * radii[i]
+        for first in range(left, size, LANES):
+            phi = finer[first : first + LANES]
+            balls(p, numbers, known, phi, none, points)
+            balls(p, numbers, known, phi, narrower[first : first + LANES], over)
+            for q in range(len(phi)):
+                raised(p, points, over, q, lower[first + q])
+        for k in range(_BOUNDS):
+            out[k] = lower[:, k].max()
         near = _agree(p, out, False)
-        pieces *= 4
+        middles, radii, bounds = finer, narrower, lower
 
 
 @inline
@@ -603,8 +625,9 @@ def complete(rows, angles):
     """Fill in AT_REST and, on a circle, the bounds of programs, all of one length; NaN where a number
     is not finite, or f and g have no bounds or, by these angles, not the period 2 pi.
 
-    Bounds are within a factor of 2, of 4 COARSEST pieces of the circle or more: infinite where no
-    FINEST pieces bound f and g. What does not depend on parameters is found once for all rows.
+    Bounds are within a factor of 2, of 4 COARSEST pieces of the circle or more: infinite where pieces
+    as narrow as one of FINEST do not bound f and g. What does not depend on parameters is found once
+    for all rows.
     """
     if len(rows) == 0:
         return
@@ -647,7 +670,14 @@ def complete(rows, angles):
                     raised(p, points[k], over[k], q % LANES, out)
                 near = _agree(p, out, first == 0)
             if not near:
-                _bound_finely(p)
+                bounds = np.zeros((pieces - COARSEST, _BOUNDS))
+                for q in range(COARSEST, pieces):
+                    k = 2 + q // LANES
+                    raised(p, points[k], over[k], q % LANES, bounds[q - COARSEST])
+                first = 2 * LANES + COARSEST
+                finer = at[first : first + len(bounds)].copy()
+                narrower = radii[first : first + len(bounds)].copy()
+                _bound_finely(p, numbers.ravel(), finer, narrower, bounds)
             for k in range(_BOUNDS):
                 good &= math.isfinite(p[BOUND_F + k])
             good = good and _periodic(p, points[1], 0, many)

@@ -155,6 +155,28 @@ def test_samples_are_the_values_at_each_angle_for_all_parameters_at_once():
     pg.sampled(rows[:0], found[:0])
 
 
+@pytest.mark.parametrize("width", [0.3, 0.03, 0.003])
+def test_bounds_over_the_circle_hold_spikes_and_poles_beside_it_tightly(width):
+    def f(phi, p):
+        return -np.exp(-((np.sin(phi - 0.7) / p[0]) ** 2))
+
+    def g(phi, p):
+        return 1.0 / (1.0 + p[0] ** 2 + np.cos(phi + 0.4)) + np.sin(phi)
+
+    row = equation.program(f, g, (width,), True)
+    # both at and around where they are largest, and all round
+    phi = np.concatenate([np.linspace(-4, 4, 4001) * width + 0.7, np.linspace(-4, 4, 4001) * width + np.pi - 0.4,
+                          np.linspace(0, 2 * np.pi, 1001)])  # fmt: skip
+    values = np.array([pg.values(row, x) for x in phi])
+    slopes = abs(np.diff(values, axis=0) / np.diff(phi)[:, None])[np.diff(phi) > 0]
+    most = np.array([max(abs(values[:, 0]).max(), slopes[:, 0].max()), abs(values[:, 1]).max(),
+                     abs(values[:, 2]).max(), slopes[:, 2].max()])  # fmt: skip
+    bounds = row[pg.BOUND_F : pg.BOUND_F + 4]
+    assert (bounds >= most * (1 - 1e-12)).all()
+    # those of f and g are also what their roundings are, in roundoffs
+    assert (bounds < np.array([5, 30, 2, 2]) * most).all()
+
+
 def test_balls_of_squares_hold_them_and_are_not_negative():
     row = equation.program(plain, lambda x, p: x * x, (1.0,), False)
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
