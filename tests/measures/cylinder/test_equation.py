@@ -173,8 +173,8 @@ def test_bounds_over_the_circle_hold_spikes_and_poles_beside_it_tightly(width):
                      abs(values[:, 2]).max(), slopes[:, 2].max()])  # fmt: skip
     bounds = row[pg.BOUND_F : pg.BOUND_F + 4]
     assert (bounds >= most * (1 - 1e-12)).all()
-    # those of f and g are also what their roundings are, in roundoffs
-    assert (bounds < np.array([5, 30, 2, 2]) * most).all()
+    # those of f and g are what their roundings are, in roundoffs, where that is more
+    assert (bounds[2:] < 1.2 * most[2:]).all()
 
 
 def test_balls_of_squares_hold_them_and_are_not_negative():
