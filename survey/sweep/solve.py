@@ -51,10 +51,10 @@ def solve_point(scene, request, point, shape):
     Values outside a parameter's domain reach the scene as NaN.
     """
     used = {p.name: p for p in scene.PARAMETERS}
-    valid = {
-        key: np.where(used[key].holds(values, request.variables), values, np.nan)
-        for key, values in point.items()
-    }
+    valid = {}
+    for key, values in point.items():
+        inside = used[key].holds(values, request.variables)
+        valid[key] = values if inside.all() else np.where(inside, values, np.nan)
     with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
         solved = scene.solve({key: np.atleast_1d(values) for key, values in valid.items()}, request)
     return stored(scene, request, solved, shape)
