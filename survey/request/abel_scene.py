@@ -92,7 +92,10 @@ class AbelScene(FunctionScene):
             return measure(point, names, self.flows, method, request)
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
-        rows = solution.rows(self.flows(given[:, :-2]), given[:, -2], given[:, -1])
+        flows = self._flows(given[:, :-2])
+        if request.method not in ("auto", "taylor"):  # whose kernels bound f and g for every step
+            self._limit(flows)
+        rows = solution.rows(flows, given[:, -2], given[:, -1])
         if question == "trajectory":
             return blocks.trajectories(rows, last, back, solution, method, request.rtol)
         return blocks.abel(rows, last, back, solution, method, request)
@@ -126,6 +129,15 @@ class AbelScene(FunctionScene):
 
     def flows(self, points):
         """The programs of the parameters (N, n)."""
+        flows = self._flows(points)
+        self._limit(flows)
+        return flows
+
+    def _limit(self, flows):
+        if self.period is not None:
+            equation.limit(flows)
+
+    def _flows(self, points):
         try:
             return equation.flows(self.f, self.g, points, self.period is not None)
         except Unsupported as error:
@@ -141,9 +153,9 @@ class AbelScene(FunctionScene):
         for point in points if len(points) else np.ones((1, len(self.own))):
             self._try(point)
         if not len(points):
-            self.flows(np.ones((1, len(self.own))))
+            self._flows(np.ones((1, len(self.own))))
             return
-        flows = self.flows(points)
+        flows = self._flows(points)
         lost = np.flatnonzero(np.isnan(flows[:, 0]))
         if lost.size and self.period is not None and self._finite(points[lost[0]]):
             self._refuse(

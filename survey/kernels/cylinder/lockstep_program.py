@@ -4,8 +4,8 @@ points, and in time.
 All lanes run one program, each with its own numbers, operation by operation (see `program`): series
 S[value, order, lane]. Steps, error bounds and what is noted at angles and times are those of
 `lockstep_phi` and `lockstep`, which see only the series of f, g, g' and bounds of them. Those hold
-on the whole circle; on a line, they are found anew for each step, which stays where they hold, and
-phi is counted from its value at the start of the step.
+on the whole circle where f and g are simple; else they are found anew for each step, which stays
+where they hold. On a line phi is counted from its value at the start of the step.
 
 A value that is a polynomial in phi has no orders above its degree, and these are not computed.
 """
@@ -411,17 +411,6 @@ def _stay(state, fixed, found, radius):
 
 
 @splice
-def _limit(P, row, bounds, radius):
-    """As `_bound`, on a circle: the bounds that hold all round it, and the rows' own radii."""
-    for i in range(LANES):
-        if row[i] >= 0:
-            own = P[row[i]]
-            radius[i] = own[RADIUS]
-            for k in range(len(bounds)):
-                bounds[k, i] = own[BOUND_F + k]
-
-
-@splice
 def _enter(
     P,
     leads,
@@ -487,13 +476,10 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
             if not lockstep.busy(row):
                 return
         _begin(circle, state, fixed, phi)
-        if circle and limited:
-            _limit(P, row, bounds, radius)
-        elif limited:
+        if limited:
             _bound(
                 p, N, phi, state[V], radius, hidden, row, points, over, known, out, bounds, width
             )
-        if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
@@ -628,9 +614,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                     fixed[BOUND_F, i] + fixed[BOUND_G, i] / state[far.W, i]
                 )
                 state[far.T_BOUND, i] += slip / state[far.W, i]
-        if circle and limited:
-            _limit(P, row, bounds, radius)
-        elif limited:
+        if limited:
             _bound(
                 p,
                 N,
@@ -646,7 +630,6 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                 bounds,
                 width,
             )
-        if limited:
             for i in range(LANES):
                 # a step of at most 0.8 of the radius, on which series fall: see `lockstep_phi._advance`
                 fixed[BOUND_F, i] = max(bounds[0, i], 0.625 * state[far.W, i] / radius[i])
@@ -936,13 +919,10 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
             if not lockstep.busy(row):
                 return
         _begin(circle, state, fixed, phi)
-        if circle and limited:
-            _limit(P, row, bounds, radius)
-        elif limited:
+        if limited:
             _bound(
                 p, N, phi, state[V], radius, hidden, row, points, over, known, out, bounds, width
             )
-        if limited:
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):

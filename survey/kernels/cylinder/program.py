@@ -60,6 +60,7 @@ LEAST_RADIUS = 1e-9
 # leave out, as these bound it, is to be at most HIDDEN of them, unless the interval is as narrow as FINE.
 DERIVATIVES, HIDDEN, FINE = 6, 1e-3, 1e-6
 NEGLIGIBLE = 1e-18  # what changes w by such a share may be left out
+WEAK = 1e-9  # of the largest on the circle, where steps have the same limit all round it
 UNLIMITED = 1e300  # RADIUS on a circle where f and g cannot have spikes
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
 LANES = 32  # of them at once
@@ -485,7 +486,7 @@ def _bound_finely(p, numbers, middles, radii, bounds):
     count, near = _count(p, SLOTS), False
     points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
     known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(_BOUNDS)
-    while not near and len(radii) <= FINEST and radii.min() > math.pi / FINEST:
+    while not near and len(radii) <= FINEST and radii.min() > 1.01 * math.pi / FINEST:
         pieces, left = len(radii), 0
         for i in range(pieces):  # those that stay come first
             large = False
@@ -683,6 +684,66 @@ def complete(rows, angles):
             good = good and _periodic(p, points[1], 0, many)
         if not good:
             p[:] = math.nan
+
+
+@kernel
+def limit_to_shown(rows):
+    """Limit RADIUS of programs on the circle, all of one length, to the half-width of pieces that show all
+    that f and g have in them, where their bounds are finite: pieces of LONGEST, or shorter ones where
+    these leave out more than HIDDEN, and than WEAK of the largest.
+    """
+    if len(rows) == 0:
+        return
+    count, orders, pieces = _count(rows[0], SLOTS), DERIVATIVES + 1, 4 * LANES
+    over, known = np.zeros((4, count * orders * 2 * LANES)), np.zeros(count, np.bool_)
+    finer, numbers = np.zeros(count * orders * 2 * LANES), np.zeros((2 * count, LANES))
+    at, sizes, last = np.empty(pieces), np.empty((4, pieces)), np.full(rows.shape[1], math.nan)
+    longest = _middles(pieces, at)
+    wide = np.full(LANES, longest)
+    for r in range(len(rows)):
+        p = rows[r]
+        if not math.isfinite(p[BOUND_F]):
+            continue
+        known[0] = True
+        _unchanged(p, last, known)
+        for k in range(len(p)):
+            last[k] = p[k]
+        note(p, numbers, 0, LANES)
+        f, g, N = int(p[F_AT]), int(p[G_AT]), numbers.ravel()
+        for k in range(4):
+            balls(p, N, known, at[k * LANES : (k + 1) * LANES], wide, over[k])
+            for q in range(LANES):
+                i = k * LANES + q
+                sizes[0, i], sizes[1, i] = _shown(over[k], f, q, longest)
+                sizes[2, i], sizes[3, i] = _shown(over[k], g, q, longest)
+        weak_f, weak_g = WEAK * sizes[0].max(), WEAK * sizes[2].max()
+        phi, left = at.copy(), 0
+        for i in range(pieces):
+            if not _all_shown(sizes[0, i], sizes[1, i], sizes[2, i], sizes[3, i], weak_f, weak_g):
+                phi[left], left = at[i], left + 1
+        radius, none = longest, np.zeros(count, np.bool_)
+        while left > 0 and radius > FINE and left < FINEST:
+            radius *= 0.5
+            inner, narrow = np.empty(2 * left), np.full(LANES, 1.0001 * radius)
+            for i in range(left):
+                inner[2 * i], inner[2 * i + 1] = phi[i] - radius, phi[i] + radius
+            phi, size, left = np.empty(len(inner)), len(inner), 0
+            for first in range(0, size, LANES):
+                some = inner[first : first + LANES]
+                balls(p, N, none, some, narrow, finer)
+                for q in range(len(some)):
+                    own_f, more_f = _shown(finer, f, q, radius)
+                    own_g, more_g = _shown(finer, g, q, radius)
+                    if not _all_shown(own_f, more_f, own_g, more_g, weak_f, weak_g):
+                        phi[left], left = some[q], left + 1
+        if radius < longest:
+            p[RADIUS] = min(p[RADIUS], radius)
+
+
+@inline
+def _all_shown(f, more_f, g, more_g, weak_f, weak_g):
+    """Do series of these sizes leave out little enough of f and of g?"""
+    return more_f <= HIDDEN * f + weak_f and more_g <= HIDDEN * g + weak_g
 
 
 @inline

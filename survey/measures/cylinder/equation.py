@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from survey.kernels.cylinder import program as pg
+from survey.kernels.cylinder.lockstep_program import grouped
 from survey.kernels.math import chebyshev
 from survey.measures.cylinder.numbers import Number, Steps
 from survey.measures.hill import multiprecision
@@ -25,7 +26,7 @@ MOST = 2000  # operations
 MOST_PATHS = 16  # through the code of f and g that are kept
 HIGHEST = 64  # the largest exponent that is multiplied out
 SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is checked
-# Of the circle: samples in which a spike of f or g is seen, whose coefficients count above RESOLVED,
+# Of the circle: samples in which what f or g vary by is seen, whose coefficients count above RESOLVED,
 # relative to the largest; and what a step may span of the angle in which they vary.
 EVENLY, RESOLVED, SPAN = 512, 1e-12, 1.2
 TOGETHER = 128  # programs that are sampled together
@@ -351,8 +352,8 @@ class Template:
             *found,
             slope,
         )
-        self._row[pg.RADIUS] = pg.UNLIMITED if on_circle else 1.0
-        self.may_hide = on_circle and max(_degrees(table)[k] for k in found) > SIMPLE
+        simple = on_circle and max(_degrees(table)[k] for k in found) <= SIMPLE
+        self._row[pg.RADIUS] = pg.UNLIMITED if simple else 1.0
 
     def serve(self, points, which, found):
         """Add to `found` (which points, their rows of a flow, less the initial states) for those of
@@ -367,7 +368,7 @@ class Template:
             rounded = [_rounded(own[i]) for i in some]
             rows[:, [at + pg.NUMBER, at + column]] = np.reshape(rounded, (-1, 2))
         if some.size:
-            found.append((which[some], rows, self.may_hide))
+            found.append((which[some], rows))
         return which[~np.array(fits, bool)]
 
 
@@ -404,10 +405,22 @@ def _degrees(table):
     return degrees
 
 
-def _limit(rows):
+def limit(rows):
     """Limit the steps of programs on the circle, whose f and g may have spikes that the series of other
-    steps do not show.
+    steps do not show: for those who take steps without bounds of their own.
     """
+    spiky = np.flatnonzero((rows[:, pg.ON_CIRCLE] > 0.0) & (rows[:, pg.RADIUS] < pg.UNLIMITED))
+    leads = grouped(np.ascontiguousarray(rows[spiky]))
+    for lead in np.unique(leads):
+        own = spiky[leads == lead]
+        some = rows[own]
+        _limit(some)
+        pg.limit_to_shown(some)
+        rows[own] = some
+
+
+def _limit(rows):
+    """As `limit`, of one program: by samples all round the circle."""
     for first in range(0, len(rows), TOGETHER):
         some = rows[first : first + TOGETHER]
         values = np.zeros((len(some), 2, EVENLY))
@@ -438,7 +451,9 @@ def program(f, g, point, on_circle):
 
 
 def flows(f, g, points, on_circle):
-    """The programs (N, n) of the parameters (N, m), padded to one length; NaN where there is none."""
+    """The programs (N, n) of the parameters (N, m), padded to one length; NaN where there is none.
+    Their steps have no limit yet: see `limit`.
+    """
     own, where = np.unique(np.asarray(points, dtype=float), axis=0, return_inverse=True)
     left = np.flatnonzero(np.isfinite(own).all(axis=1))
     found = []
@@ -454,11 +469,9 @@ def flows(f, g, points, on_circle):
                 known.append(template)
                 del known[:-MOST_PATHS]
                 left = template.serve(own, left, found)
-    longest = max((rows.shape[1] for _, rows, _ in found), default=pg.OPERATIONS)
+    longest = max((rows.shape[1] for _, rows in found), default=pg.OPERATIONS)
     out = np.full((len(own), longest), np.nan)
-    for served, rows, may_hide in found:
+    for served, rows in found:
         pg.complete(rows, SAMPLES)
-        if may_hide:
-            _limit(rows)
         out[served] = np.pad(rows, ((0, 0), (0, longest - rows.shape[1])))
     return out[where.reshape(-1)]

@@ -13,6 +13,7 @@ from survey.kernels.cylinder.accuracy import all_within
 from survey.kernels.cylinder.flow import spread, spread_programs
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
+from survey.measures.cylinder import equation
 
 LEAST_BAR = 1e-150  # bars are carried on by their squares, which underflow below
 STEPS = 200_000  # budget of one solution; about 0.1 s with the Taylor method
@@ -138,6 +139,8 @@ def _count(method, rows, times, tolerance, asked, results):
     pick = (asked & (turnings == UNDETERMINED) & (status == OK)).any(axis=1)
     if pick.any():
         P, starts = split(rows[pick])
+        if P.shape[1] > COLUMNS:
+            equation.limit(P)
         counted = turnings[pick]
         method.flow_turnings(
             P, starts, np.ascontiguousarray(times[pick]), tolerance, STEPS, counted
