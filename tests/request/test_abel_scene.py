@@ -317,13 +317,21 @@ def test_weak_features_count_in_the_error_bar(system, start, goal, exact):
     assert abs(float(ds.w) - exact) <= float(ds.w_error) < 1e-10
 
 
+@pytest.mark.parametrize("period", [2 * np.pi, None], ids=["circle", "line"])
 @pytest.mark.parametrize("question", ["trajectory", "abel"])
-def test_without_a_period_sets_have_the_same_bits_alone_and_among_others(question):
+def test_sets_have_the_same_bits_alone_and_among_others(question, period):
     """More sets than lanes, so that each takes the place of another."""
+
+    def chord(phi):
+        return 2 * np.sin(0.5 * phi) if period else phi
+
+    def g(phi, p):
+        return 0.5 - np.tanh(np.sin(phi - 1.0) / p[1] if period else (phi - 1.0) / p[1])
+
     scene = survey.abel(
-        lambda phi, p: -p[0] * np.exp(-phi * phi),
-        lambda phi, p: 0.5 - np.tanh((phi - 1.0) / p[1]),
-        period=None,
+        lambda phi, p: -p[0] * np.exp(-(chord(phi) ** 2)),
+        g,
+        period=period,
         parameters=("a", "width"),
     )
     a, width = np.linspace(0.1, 2.0, 90), np.geomspace(0.01, 3.0, 90)
