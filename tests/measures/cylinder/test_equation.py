@@ -177,6 +177,33 @@ def test_bounds_over_the_circle_hold_spikes_and_poles_beside_it_tightly(width):
     assert (bounds[2:] < 1.5 * most[2:]).all()
 
 
+@pytest.mark.parametrize("width", [1e-2, 1e-4])
+def test_one_limit_of_steps_all_round_the_circle_shows_spikes_and_spares_what_is_smooth(width):
+    def spiky(phi, p):
+        return p[0] * np.exp(-((np.sin(phi - 0.7) / width) ** 2)) - np.sin(phi)
+
+    def smooth(phi, p):
+        return p[0] / (1.5 + np.cos(phi)) + np.sin(phi) ** 7
+
+    def simple(phi, p):
+        return p[0] * np.sin(phi) * np.cos(2 * phi) - 0.3
+
+    limits = []
+    for g in (spiky, smooth, simple):
+        rows = equation.flows(lambda phi, p: -0.1, g, np.array([[1e-6], [1.2]]), True)
+        sampled = rows.copy()
+        equation.limit(rows)
+        limits.append(rows[:, pg.RADIUS])
+        if g is smooth:  # what samples say holds
+            equation._limit(sampled)
+            assert (rows[:, pg.RADIUS] == sampled[:, pg.RADIUS]).all()
+        else:
+            changed = (rows != sampled).any(axis=0)
+            assert changed.sum() == (g is spiky) and changed[pg.RADIUS] == (g is spiky)
+    assert (width / 20 < limits[0]).all() and (limits[0] < 4 * width).all()
+    assert (limits[1] > 0.1).all() and (limits[2] == pg.UNLIMITED).all()
+
+
 def test_balls_of_squares_hold_them_and_are_not_negative():
     row = equation.program(plain, lambda x, p: x * x, (1.0,), False)
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
