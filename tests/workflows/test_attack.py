@@ -24,7 +24,7 @@ def found(family, seed, size, index=0):
 @pytest.mark.slow
 @pytest.mark.parametrize(("family", "size"), [
     ("satellite", 40), ("mathieu", 60), ("libration_elliptic", 40), ("libration", 60), ("own", 40), ("floquet", 60),
-    ("orbit", 100),
+    ("orbit", 100), ("abel", 100),
     # compile for long
     *(pytest.param(*one, marks=pytest.mark.slow) for one in (("gyrostat", 150), ("brun", 150))),
 ])  # fmt: skip

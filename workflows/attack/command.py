@@ -32,10 +32,11 @@ FAMILIES = {
     "libration": (0.056, 2000),
     "floquet": (0.02, 500),
     "orbit": (0.002, 100),
+    "abel": (0.02, 500),
 }
 WHERE = {"satellite": ("hill", "satellites"), "mathieu": ("hill", "mathieu"), "own": ("hill", "own"),
          "libration_elliptic": ("danby", "chunk"), "gyrostat_fate": ("fate", "chunk")}  # fmt: skip
-LATER = ("floquet", "orbit")
+LATER = ("floquet", "orbit", "abel")
 # later families last: those before keep their points
 SEEDS = (*sorted(FAMILIES.keys() - set(LATER)), *LATER)
 FOLDER, TRUTHS = Path(__file__).parent, Path(truth.__file__).parent
@@ -260,8 +261,9 @@ equation for satellites, the eccentric anomaly for Danby's map), closed forms wh
 sums for Brun's problem (with 120 digits for a sample of the states beside a saddle, where double-double is too
 short), exact fractions, 60 digits of the closed forms of the normal form (whose integers are the package's), long
 motions and exact mirror images for fates and portraits, 45 digits of the exponentials of matrices that are composed of
-integers for linear periodic systems. Some points of each batch are solved again, alone and at
-another rtol: both answers must lie within the sum of their bars.
+integers for linear periodic systems, 40 digits of the closed forms of narrow steps for Abel equations of one's own.
+Some points of each batch are solved again, alone and at another rtol: both answers must lie within the sum of their
+bars.
 
 A **lie** is a value farther from the truth than its error bar and the truth's own doubt together. A **wrong** verdict
 is one that the truth contradicts; an undecided one is honest, and so are a bar wider than rtol asks for (missed) and
