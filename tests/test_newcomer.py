@@ -289,8 +289,12 @@ PYTHON = [
         "give a range (low, high)",
     ),
     (
-        lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio=[0.2, 0.3]),
-        "it must be one number",
+        lambda ds: survey.edge("satellite", along="amplitude", inertia_ratio="thin"),
+        "it must be one number in its domain or an array of them",
+    ),
+    (
+        lambda ds: survey.edge("satellite", along="rho", k=["thin", "thick"], rho=(1, 2)),
+        "it must be a real number or an array of real numbers",
     ),
     (
         lambda ds: survey.edge("brun", along="ratio", l=0.5, alpha=0.1, beta=0.2, sign="1"),

@@ -109,7 +109,9 @@ def _edge(scene, along, near, parameters, alone=False):
     if any(np.ndim(value) for value in given.values()):
         return _of_rows(name, module, measure, options, used, along, ends, near, given)
     fixed = {
-        key: _number(key, given.get(key, p.default), p) for key, p in used.items() if key != along
+        key: _number(key, given.get(key, p.default), p, " or an array of them")
+        for key, p in used.items()
+        if key != along
     }
     if near is not None:
         if np.ndim(near):
@@ -201,10 +203,10 @@ def _check_inside(scene, module, point, options):
         )
 
 
-def _number(key, value, parameter):
+def _number(key, value, parameter, or_else=""):
     if not is_number(value) or not parameter.holds([value]).all():
         raise BadInput(
-            f"{key} = {shown(value)}: it must be one number in its domain; allowed: {_domain(parameter)}"
+            f"{key} = {shown(value)}: it must be one number in its domain{or_else}; allowed: {_domain(parameter)}"
         )
     return float(value)
 
