@@ -55,7 +55,7 @@ FLOORS = {
     "own_hill_scattered": 3.5,
     "own_square_wave": 0.45,
     "tongue_edges": 2.2,
-    "tongue_edges_and_curves": 0.72,
+    "tongue_edges_and_curves": 0.68,
     "gyrostat_trajectory": 1.3,
     "gyrostat_200_times": 0.81,
     "danby_map": 21,
