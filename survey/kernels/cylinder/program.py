@@ -486,7 +486,8 @@ def _bound_finely(p, numbers, middles, radii, bounds):
     count, near = _count(p, SLOTS), False
     points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
     known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(_BOUNDS)
-    while not near and len(radii) <= FINEST and radii.min() > 1.01 * math.pi / FINEST:
+    narrowest = radii[0]
+    while not near and len(radii) <= FINEST and narrowest > 1.01 * math.pi / FINEST:
         pieces, left = len(radii), 0
         for i in range(pieces):  # those that stay come first
             large = False
@@ -515,9 +516,13 @@ def _bound_finely(p, numbers, middles, radii, bounds):
             for q in range(len(phi)):
                 raised(p, points, over, q, lower[first + q])
         for k in range(_BOUNDS):
-            out[k] = lower[:, k].max()
+            out[k] = 0.0
+            for i in range(size):
+                out[k] = max(out[k], lower[i, k])
         near = _agree(p, out, False)
         middles, radii, bounds = finer, narrower, lower
+        for i in range(size):
+            narrowest = min(narrowest, radii[i])
 
 
 @inline
@@ -588,37 +593,29 @@ def sampled(rows, out):
 def _sample(p, i, S):
     """Fill S[i] with the i-th value at all angles, as `extend` finds it at one."""
     code, a, b, number = _operation(p, i)
-    own, one, two = S[i], S[a], S[b]
-    if code == ADD:
-        for j in range(len(own)):
-            own[j] = one[j] + two[j]
-    elif code == SUBTRACT:
-        for j in range(len(own)):
-            own[j] = one[j] - two[j]
-    elif code == MULTIPLY:
-        for j in range(len(own)):
-            own[j] = one[j] * two[j]
-    elif code == DIVIDE:
-        for j in range(len(own)):
-            own[j] = one[j] / two[j]
-    elif code == PLUS:
-        for j in range(len(own)):
-            own[j] = one[j] + number
-    elif code == TIMES:
-        for j in range(len(own)):
-            own[j] = number * one[j]
-    elif code == FROM:
-        for j in range(len(own)):
-            own[j] = number - one[j]
-    elif code == OVER:
-        for j in range(len(own)):
-            own[j] = number / two[j]
-    elif code == CONSTANT:
-        for j in range(len(own)):
-            own[j] = number
-    else:
-        for j in range(len(own)):
-            own[j] = function(code, one[j], number)
+    for j in range(S.shape[1]):
+        one, two = S[a, j], S[b, j]
+        if code == ADD:
+            value = one + two
+        elif code == SUBTRACT:
+            value = one - two
+        elif code == MULTIPLY:
+            value = one * two
+        elif code == DIVIDE:
+            value = one / two
+        elif code == PLUS:
+            value = one + number
+        elif code == TIMES:
+            value = number * one
+        elif code == FROM:
+            value = number - one
+        elif code == OVER:
+            value = number / two
+        elif code == CONSTANT:
+            value = number
+        else:
+            value = function(code, one, number)
+        S[i, j] = value
 
 
 @kernel

@@ -410,7 +410,7 @@ def limit(rows):
     steps do not show: for those who take steps without bounds of their own.
     """
     spiky = np.flatnonzero((rows[:, pg.ON_CIRCLE] > 0.0) & (rows[:, pg.RADIUS] < pg.UNLIMITED))
-    leads = grouped(np.ascontiguousarray(rows[spiky]))
+    leads = grouped(np.ascontiguousarray(rows[spiky])) if spiky.size else spiky
     for lead in np.unique(leads):
         own = spiky[leads == lead]
         some = rows[own]
