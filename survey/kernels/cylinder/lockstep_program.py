@@ -248,18 +248,12 @@ def _tables(p, of_angle):
 
 @splice
 def _ball_tables(p):
-    """(points, over, known, out, found, hidden), as `_bound` takes them."""
+    """The `tables` (points, over, known, out) of `_bound`, its `found` and `hidden`."""
     slots = max(1, int(p[SLOTS]))
     points = np.zeros(slots * 2 * LANES)
     over = np.zeros(len(points) * (program.DERIVATIVES + 1))
-    return (
-        points,
-        over,
-        np.zeros(slots, np.bool_),
-        np.empty(4),
-        np.empty((4, LANES)),
-        np.zeros(LANES),
-    )
+    tables = points, over, np.zeros(slots, np.bool_), np.empty(4)
+    return tables, np.empty((4, LANES)), np.zeros(LANES)
 
 
 @kernel
@@ -319,10 +313,11 @@ def _extend(operations, N, degree, S, K, n, first, last, width):
 
 
 @splice
-def _bound(p, N, phi, w, radius, hidden, row, points, over, known, out, found, width):
+def _bound(p, N, phi, w, radius, hidden, row, tables, found, width):
     """Fill `found` (bounds, LANES) with bounds of f, g, g', g'' within `radius` of phi, which changes
     as what was `hidden` in the last one lets it: see `program.bounded`.
     """
+    points, over, known, out = tables
     none, near, left = np.zeros(LANES), np.zeros(LANES, np.bool_), True
     for q in range(LANES):
         radius[q] = min(radius[q] * program.wider(hidden[q]), 1.0 + abs(phi[q]))
@@ -412,21 +407,8 @@ def _stay(state, fixed, found, radius):
 
 @splice
 def _enter(
-    P,
-    leads,
-    lead,
-    starts,
-    times,
-    waiting,
-    state,
-    fixed,
-    numbers,
-    radius,
-    hidden,
-    row,
-    column,
-    status,
-):
+    P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, hidden, row, column, status
+):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
     circle = P[lead, ON_CIRCLE] > 0.0
     for i in range(LANES):
@@ -464,7 +446,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
-    points, over, known, out, bounds, hidden = _ball_tables(p)
+    tables, bounds, hidden = _ball_tables(p)
     fixed[lockstep.NEXT, :] = math.inf  # of lanes that stay free, too
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, free = np.int64(lead), True
@@ -477,9 +459,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
                 return
         _begin(circle, state, fixed, phi)
         if limited:
-            _bound(
-                p, N, phi, state[V], radius, hidden, row, points, over, known, out, bounds, width
-            )
+            _bound(p, N, phi, state[V], radius, hidden, row, tables, bounds, width)
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
@@ -515,24 +495,9 @@ def _in_angle(p, operations, N, degree, S, K, phi, w, forms, width):
 
 @splice
 def _enter_far(
-    P,
-    leads,
-    lead,
-    starts,
-    targets,
-    planes,
-    status,
-    timed,
-    waiting,
-    state,
-    fixed,
-    numbers,
-    radius,
-    hidden,
-    row,
-    sizes,
-    goal,
-):
+    P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, radius, hidden, row,
+    sizes, goal,
+):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait, whose status is OK at first; returns
     the first that still waits. Of rows that do not begin here nothing is known yet.
     """
@@ -590,7 +555,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     forms = np.zeros((2 * far.ORDER, LANES))
     radius = np.ones(LANES)
-    points, over, known, out, bounds, hidden = _ball_tables(p)
+    tables, bounds, hidden = _ball_tables(p)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
     goal = np.zeros(LANES)
     waiting, free, ended = np.int64(lead), True, np.zeros(LANES, dtype=np.bool_)
@@ -615,21 +580,7 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                 )
                 state[far.T_BOUND, i] += slip / state[far.W, i]
         if limited:
-            _bound(
-                p,
-                N,
-                state[far.AT],
-                state[far.W],
-                radius,
-                hidden,
-                row,
-                points,
-                over,
-                known,
-                out,
-                bounds,
-                width,
-            )
+            _bound(p, N, state[far.AT], state[far.W], radius, hidden, row, tables, bounds, width)
             for i in range(LANES):
                 # a step of at most 0.8 of the radius, on which series fall: see `lockstep_phi._advance`
                 fixed[BOUND_F, i] = max(bounds[0, i], 0.625 * state[far.W, i] / radius[i])
@@ -902,7 +853,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     phi, radius = np.zeros(LANES), np.ones(LANES)
-    points, over, known, out, bounds, hidden = _ball_tables(p)
+    tables, bounds, hidden = _ball_tables(p)
     row, sizes, column = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     doubt, goal, delay = np.full(LANES, -1), np.zeros(LANES), np.zeros(LANES)
     started, calm = np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)
@@ -920,9 +871,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
                 return
         _begin(circle, state, fixed, phi)
         if limited:
-            _bound(
-                p, N, phi, state[V], radius, hidden, row, points, over, known, out, bounds, width
-            )
+            _bound(p, N, phi, state[V], radius, hidden, row, tables, bounds, width)
             _stay(state, fixed, bounds, radius)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
@@ -937,7 +886,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
             own = P[r]
             if not circle:  # where the last step holds
                 own[RADIUS] = radius[i]
-                for k in range(len(out)):
+                for k in range(len(bounds)):
                     own[BOUND_F + k] = bounds[k, i]
             column[i], doubt[i], started[i], ending = _pass(
                 own, T, state, before, fixed, delay[i], i, block, row_of(targets, r)[:size], column[i], doubt[i],

@@ -488,27 +488,25 @@ def _bound_finely(p, numbers, middles, radii, bounds):
     known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(_BOUNDS)
     narrowest = radii[0]
     while not near and len(radii) <= FINEST and narrowest > 1.01 * math.pi / FINEST:
-        pieces, left = len(radii), 0
-        for i in range(pieces):  # those that stay come first
-            large = False
+        large, left = np.zeros(len(radii), np.bool_), len(radii)
+        for i in range(len(radii)):
             for k in range(_BOUNDS):
-                large |= not bounds[i, k] <= 0.5 * p[BOUND_F + k] or bounds[i, k] == math.inf
-            if not large:
-                middles[i], middles[left] = middles[left], middles[i]
-                radii[i], radii[left] = radii[left], radii[i]
-                for k in range(_BOUNDS):
-                    bounds[i, k], bounds[left, k] = bounds[left, k], bounds[i, k]
-                left += 1
-        size = left + 4 * (pieces - left)
+                large[i] |= not bounds[i, k] <= 0.5 * p[BOUND_F + k] or bounds[i, k] == math.inf
+            left -= large[i]
+        size = left + 4 * (len(radii) - left)
         finer, narrower, lower = np.empty(size), np.empty(size), np.zeros((size, _BOUNDS))
-        for i in range(left):
-            finer[i], narrower[i] = middles[i], radii[i]
-            for k in range(_BOUNDS):
-                lower[i, k] = bounds[i, k]
-        for i in range(left, pieces):
-            for j in range(4):
-                finer[left + 4 * (i - left) + j] = middles[i] + (0.5 * j - 0.75) * radii[i]
-                narrower[left + 4 * (i - left) + j] = 0.250001 * radii[i]
+        stays, part = 0, left  # what stays comes first
+        for i in range(len(radii)):
+            if large[i]:
+                for j in range(4):
+                    finer[part + j] = middles[i] + (0.5 * j - 0.75) * radii[i]
+                    narrower[part + j] = 0.250001 * radii[i]
+                part += 4
+            else:
+                finer[stays], narrower[stays] = middles[i], radii[i]
+                for k in range(_BOUNDS):
+                    lower[stays, k] = bounds[i, k]
+                stays += 1
         for first in range(left, size, LANES):
             phi = finer[first : first + LANES]
             balls(p, numbers, known, phi, none, points)
@@ -673,9 +671,8 @@ def complete(rows, angles):
                     k = 2 + q // LANES
                     raised(p, points[k], over[k], q % LANES, bounds[q - COARSEST])
                 first = 2 * LANES + COARSEST
-                finer = at[first : first + len(bounds)].copy()
-                narrower = radii[first : first + len(bounds)].copy()
-                _bound_finely(p, numbers.ravel(), finer, narrower, bounds)
+                place = slice(first, first + len(bounds))
+                _bound_finely(p, numbers.ravel(), at[place], radii[place], bounds)
             for k in range(_BOUNDS):
                 good &= math.isfinite(p[BOUND_F + k])
             good = good and _periodic(p, points[1], 0, many)

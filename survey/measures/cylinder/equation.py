@@ -429,9 +429,7 @@ def _limit(rows):
         with np.errstate(all="ignore"):
             share = c / c.max(axis=1, keepdims=True)
             rate = chebyshev.fastest(share, share > RESOLVED).reshape(-1, 2).max(axis=1)
-        bounded = np.isfinite(some[:, pg.BOUND_F])
-        radius = np.minimum(SPAN / np.maximum(rate, 1e-300), pg.UNLIMITED)
-        some[bounded, pg.RADIUS] = radius[bounded]
+        some[:, pg.RADIUS] = np.minimum(SPAN / np.maximum(rate, 1e-300), pg.UNLIMITED)
 
 
 @lru_cache(maxsize=64)
