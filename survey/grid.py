@@ -102,6 +102,16 @@ class Grid:
             aligned[name] = part.copy()
         return aligned
 
+    def ends_and_middles(self):
+        """{name: values (N)} of the points at the ends and middles of all dimensions."""
+        some = [sorted({0, size // 2, size - 1}) for size in self.shape]
+        index = dict(zip(self.sizes, np.ix_(*some), strict=True))
+        shape = tuple(map(len, some))
+        return {
+            name: np.broadcast_to(values[tuple(index[dim] for dim in dims)], shape).ravel()
+            for name, (dims, values) in self.parameters.items()
+        }
+
 
 def lines(parameters):
     """{name: (number, least, greatest)} of each parameter that has an axis which no other shares.

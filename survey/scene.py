@@ -45,9 +45,11 @@ class Parameter:
         NaN and infinities do not.
         """
         values = np.asarray(values, dtype=float)
-        above = values > self.minimum if self.open_minimum else values >= self.minimum
-        below = values < self.maximum if self.open_maximum else values <= self.maximum
-        inside = np.isfinite(values) & above & below
+        inside = np.isfinite(values)
+        if self.minimum > -inf:
+            inside &= values > self.minimum if self.open_minimum else values >= self.minimum
+        if self.maximum < inf:
+            inside &= values < self.maximum if self.open_maximum else values <= self.maximum
         if self.whole:
             inside = inside & (values == np.floor(values))
         if self.excluded and not (

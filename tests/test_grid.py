@@ -122,3 +122,14 @@ def test_log_coordinates_need_positive_ends():
 def test_bad_axes_are_refused_by_name(values, complaint):
     with pytest.raises(BadInput, match=f"axes.k: .*{complaint}"):
         check_axis("axes.k", np.array(values, float))
+
+
+def test_ends_and_middles_are_those_points_of_the_whole_grid():
+    a, b, pairs = np.arange(5.0), 10 + np.arange(2.0), 100 + np.arange(10.0).reshape(2, 5)
+    grid = Grid({"a": 5, "b": 2}, {"a": (("a",), a), "b": (("b",), b), "c": (("b", "a"), pairs)})
+    found = grid.ends_and_middles()
+    assert found["a"].tolist() == [0, 0, 2, 2, 4, 4]
+    assert found["b"].tolist() == [10, 11, 10, 11, 10, 11]
+    assert found["c"].tolist() == [100, 105, 102, 107, 104, 109]
+    alone = Grid({}, {"a": ((), np.array(3.0))}).ends_and_middles()
+    assert alone["a"].tolist() == [3]

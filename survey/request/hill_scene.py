@@ -217,6 +217,8 @@ class HillScene(FunctionScene):
         if axes.across is None:
             return [np.arange(len(points))]
         others = np.delete(points, [axes.lane, axes.across], axis=1)
+        if (others == others[0]).all():
+            return [np.arange(len(points))]
         _, family = np.unique(others, axis=0, return_inverse=True)
         return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
 

@@ -95,7 +95,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache, partial
-from itertools import product, zip_longest
+from itertools import zip_longest
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -446,18 +446,14 @@ def check(scene: Any, grid: Any = None) -> None:
     """Raise BadInput if `scene` is a user's and is wrong at the ends and middles of the grid's axes."""
     if not isinstance(scene, FunctionScene):
         return
-    along = [sorted({0, size // 2, size - 1}) for size in grid.sizes.values()] if grid else []
-    points = (
-        [grid.point(tuple(slice(i, i + 1) for i in index)) for index in product(*along)]
-        if grid
-        else []
-    )
-    own = scene.own
-    names = [p.name for p in own]
-    values = np.array([[float(np.ravel(point[name])[0]) for name in names] for point in points])
-    inside = [all(p.holds(v) for p, v in zip(own, row, strict=True)) for row in values]
+    values, inside = np.empty((0, len(scene.own))), np.empty(0, bool)
+    if grid:
+        some = grid.ends_and_middles()
+        values = np.stack([some[p.name] for p in scene.own], axis=1)
+        held = [p.holds(values[:, i]) for i, p in enumerate(scene.own)]
+        inside = np.logical_and.reduce(held)
     with np.errstate(all="ignore"):  # values that are not finite are found by the check
-        scene.check(values.reshape(-1, len(names))[np.array(inside, bool)])
+        scene.check(values[inside])
 
 
 def of_dataset(ds: Any) -> Any:

@@ -49,6 +49,7 @@ BY_PHASE = 0.15
 # spike unseen.
 STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
+MOST = np.finfo(float).max
 # So few points are asked one by one whether z may have spikes.
 FEW = 8
 # The most steps in double-double: 20 ms a hundred.
@@ -169,6 +170,10 @@ class Steps:
         """Starts and lengths of the steps (rows, number), and the ends between which z may be asked
         for in each.
         """
+        if self.length.shape[1] == 1:
+            low, high, slack = self.edges[rows, :1], self.edges[rows, 1:], self.slack[rows, None]
+            h = np.repeat(self.length[rows] / number, number, axis=1)
+            return low + np.arange(number) * h, h, low + slack, high - slack
         i, length, weight = np.arange(rows.size)[:, None], self.length[rows], self.weight[rows]
         share = (number - self.pieces[rows, None]) * (weight / self.total[rows])
         count = np.floor(share).astype(int) + (length > 0)
@@ -266,16 +271,19 @@ def unprobed(z, points, edges, slack, size):
     """
     if not len(points) or edges.shape[1] != 2 or slack.any():
         return np.zeros(len(points), np.bool_)
-    most = np.nan_to_num(abs(points))
-    end = float(np.nan_to_num(edges[:, -1]).max())
-    found = bands.missed(z, tuple(most.max(axis=0).tolist()), end, SIZES[0])
+    *most, end = _largest(np.column_stack([points, edges[:, -1]]))
+    found = bands.missed(z, tuple(most), end, SIZES[0])
     known = found <= 10 * RESOLVED * size
     if isfinite(found):  # where z is small by its parameters, each for itself
         for i in np.flatnonzero(~known)[:FEW]:
-            known[i] = (
-                bands.missed(z, tuple(most[i].tolist()), end, SIZES[0]) <= 10 * RESOLVED * size[i]
-            )
+            own = tuple(_largest(points[i : i + 1]))
+            known[i] = bands.missed(z, own, end, SIZES[0]) <= 10 * RESOLVED * size[i]
     return known
+
+
+def _largest(values):
+    """The largest size of the known values (N, n) of each column, a list of finite numbers."""
+    return np.fmin(np.fmax.reduce(abs(values), axis=0, initial=0.0), MOST).tolist()
 
 
 class Measured(NamedTuple):
@@ -297,12 +305,14 @@ def measured(z, points, edges, period, slack, probes=PROBES):
     shape = (len(points), edges.shape[1] - 1)
     owner = np.repeat(np.arange(len(points)), edges.shape[1] - 1)
     left, right = edges[:, :-1].reshape(-1, 1), edges[:, 1:].reshape(-1, 1)
+    length, apart = right - left, slack.any()
 
-    def values(pieces, number, mirrored=False):
-        own, ends = owner[pieces], slack[owner[pieces], None]
-        u = left[pieces] + (right - left)[pieces] * chebyshev.with_ends(number)
-        u = np.clip(u, left[pieces] + ends, right[pieces] - ends) if ends.any() else u
-        return at(z, points[own], period[own, None] - u if mirrored else u)
+    def nodes(pieces, number):
+        u = left[pieces] + length[pieces] * chebyshev.with_ends(number)
+        if apart:
+            ends = slack[owner[pieces], None]
+            u = np.clip(u, left[pieces] + ends, right[pieces] - ends)
+        return u
 
     def probed(pieces):
         """The points, the ends (N, 2) and the number of probes of each piece."""
@@ -323,7 +333,7 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         out = np.empty(len(pieces))
         for count in np.unique(number):
             rows = np.flatnonzero(number == count)
-            for some in np.array_split(rows, rows.size * count // CALL_SAMPLES + 1):
+            for some in _parts(rows, count):
                 u = ends[some, :1] + np.diff(ends[some], axis=1) * evenly(count)
                 out[some] = furthest(known[some], to_probes(int(count)), at(z, own[some], u))
         return out
@@ -336,17 +346,18 @@ def measured(z, points, edges, period, slack, probes=PROBES):
     size, rate, noise, last = np.empty((4, owner.size))
     unresolved, off = np.arange(owner.size), np.zeros(owner.size)
     for number in SIZES:
-        for some in np.array_split(unresolved, unresolved.size * number // CALL_SAMPLES + 1):
-            known = values(some, number)
+        for some in _parts(unresolved, number):
+            own, u = owner[some], nodes(some, number)
+            known = at(z, points[own], u)
             size[some], rate[some], noise[some], last[some] = spectrum(known)
             if number == SIZES[0] and period is not None:
-                off[some] = abs(known - values(some, number, mirrored=True)).max(axis=1)
+                mirrored = at(z, points[own], period[own, None] - u)
+                off[some] = abs(known - mirrored).max(axis=1)
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
             if number == SIZES[0]:
-                own = owner[some[smooth]]
-                smooth = smooth[
-                    ~unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])
-                ]
+                own = own[smooth]
+                known_so = unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])
+                smooth = smooth[~known_so]
             some = some[smooth]
             if not some.size:
                 continue
@@ -359,7 +370,7 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         unresolved = unresolved[last[unresolved] > RESOLVED * size[unresolved]]
         if not unresolved.size:
             break
-    length = (right - left)[:, 0]
+    length = length[:, 0]
     rate = np.where(length > 0, 2 * rate / np.where(length > 0, length, 1), 0)
     size, rate, noise, last, off = (a.reshape(shape) for a in (size, rate, noise, last, off))
     scale, off = size.max(axis=1), off.max(axis=1)
@@ -370,6 +381,12 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         scale=np.where(off <= MIRRORED * scale, known, np.nan),
         rough=(last > ROUGH * size).any(axis=1),
     )
+
+
+def _parts(pieces, number):
+    """The pieces, as many at a time as CALL_SAMPLES allows for at this `number` of samples each."""
+    count = pieces.size * number // CALL_SAMPLES + 1
+    return [pieces] if count == 1 else np.array_split(pieces, count)
 
 
 def unlike(z, points, ends, known, size, number):
