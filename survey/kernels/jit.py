@@ -208,7 +208,16 @@ def inline(function):
 
     Called from Python it is plain Python, which gives the same bits.
     """
-    dispatcher = _compiled(function, forceinline=True, pipeline_class=_OfCallers)
+    return _of_callers(function, forceinline=True)
+
+
+def part(function):
+    """As `inline`, but for what a kernel calls in several places: there it is once, and called."""
+    return _of_callers(function)
+
+
+def _of_callers(function, **flags):
+    dispatcher = _compiled(function, **flags, pipeline_class=_OfCallers)
     if not numba.config.DISABLE_JIT:
 
         def add_overload(result):

@@ -32,7 +32,7 @@ from survey.kernels.cylinder.flow import (
 from survey.kernels.floquet import runge_kutta
 from survey.kernels.hill import dop853 as hill
 from survey.kernels.hill.dop853 import DOUBT
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.math.dop853 import E3, E5, STAGES, A, B, C, combined
 
 ORDER = 8
@@ -168,19 +168,24 @@ def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     )
 
 
-@kernel
-def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
-    """See `returns.image`."""
+@part
+def _image(kind, p, eqs, count, anchor, x, tolerance, node):
     returns.image(
         flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node
     )
 
 
 @kernel
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
+    """See `returns.image`."""
+    _image(kind, p, eqs, count, anchor, x, tolerance, node)
+
+
+@kernel
 def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
     return returns.fixed_points(
-        flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+        _image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
     )
 
 

@@ -29,7 +29,7 @@ from survey.kernels.cylinder.flow import (
 )
 from survey.kernels.floquet import classical as floquet
 from survey.kernels.hill.matrix import doubled, samples_only
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.lanes import chain, scatter
 from survey.kernels.math.runge_kutta import classical
 
@@ -184,19 +184,24 @@ def flow_abels(P, starts, targets, tolerance, limit, planes, status):
     )
 
 
-@kernel
-def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
-    """See `returns.image`."""
+@part
+def _image(kind, p, eqs, count, anchor, x, tolerance, node):
     returns.image(
         flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node
     )
 
 
 @kernel
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
+    """See `returns.image`."""
+    _image(kind, p, eqs, count, anchor, x, tolerance, node)
+
+
+@kernel
 def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
     return returns.fixed_points(
-        flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+        _image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
     )
 
 

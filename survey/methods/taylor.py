@@ -38,7 +38,7 @@ from survey.kernels.cylinder.flow import (
 from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.cylinder.records import EXACT_START, STATE
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 
 ORDER = 20
 SERVES = ("abel", "body", "cylinder")
@@ -188,19 +188,24 @@ def flow_abels_by_row(P, starts, targets, tolerance, limit, planes, status):
     )
 
 
-@kernel
-def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
-    """See `returns.image`."""
+@part
+def _image(kind, p, eqs, count, anchor, x, tolerance, node):
     returns.image(
         flow_setting, flow_begin, flow_at, kind, p, eqs, count, anchor, x, tolerance, node
     )
 
 
 @kernel
+def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
+    """See `returns.image`."""
+    _image(kind, p, eqs, count, anchor, x, tolerance, node)
+
+
+@kernel
 def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
     """See `returns.fixed_points`."""
     return returns.fixed_points(
-        flow_image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+        _image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
     )
 
 

@@ -1,12 +1,13 @@
 """What a process of its own compiles at the first use of a question (see
 `survey.sweep.compile_ahead`).
 
-The kernels are called on nothing. They are those that come after the cycles of fates and portraits,
-one of the two of Abel's equation, or the trajectories of a user's f and g.
+The kernels are called on nothing. They are those that come with and after the cycles of fates and
+portraits, one of the two of Abel's equation, or the trajectories of a user's f and g.
 """
 
 import numpy as np
 
+from survey.kernels.cylinder import creeping
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import EQUILIBRIUM_SIZE
@@ -33,12 +34,17 @@ def _compile(p, options, own):
     if question == "abel" and "separatrix" not in options:
         taylor.flow_abels_ahead(own)
     none = np.empty((0, rc.EXACT_START))
+    eqs = np.empty((0, EQUILIBRIUM_SIZE))
+    fates = question in ("fate", "portrait") and "separatrix" not in options
+    if fates and own:
+        # cycles need it, too: the other process finds it when it comes to them
+        creeping.crept(p, eqs, 0, 0.0, 0.0, 0.0, 0.0, True, 0.0, np.empty(creeping.PASSAGE))
     if question == "portrait":
         planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)
         taylor.flow_abels_by_row(p[None][:0], none, none, 0.0, 0, planes, status)
-    if question in ("fate", "portrait") and "separatrix" not in options:
-        tables = np.empty((0, EQUILIBRIUM_SIZE)), *[np.empty((0, CYCLE_SIZE)) for _ in range(3)]
+    if fates:
+        tables = eqs, *[np.empty((0, CYCLE_SIZE)) for _ in range(3)]
         sizes = np.zeros(kf.SIZES, np.int64)
-        fates = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
-        taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *fates)
+        starts = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
+        taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *starts)
         yield "fates"
