@@ -4,8 +4,8 @@ points, and in time.
 All lanes run one program, each with its own numbers, operation by operation (see `program`): series
 S[value, order, lane]. Steps, error bounds and what is noted at angles and times are those of
 `lockstep_phi` and `lockstep`, which see only the series of f, g, g' and bounds of them. Those hold
-on the whole circle where f and g are simple; else they are found anew for each step, which stays
-where they hold. On a line phi is counted from its value at the start of the step.
+on the whole circle where f and g are simple; else steps stay where bounds hold that are found, as
+they go, for some way ahead. On a line phi is counted from its value at the start of the step.
 
 A value that is a polynomial in phi has no orders above its degree, and these are not computed.
 """
@@ -99,13 +99,22 @@ from survey.kernels.cylinder.steps import (
     unturned,
     values,
 )
-from survey.kernels.jit import kernel, splice
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import summed, unroll
 
 GOING = -1  # what has not ended
 SERIES = ORDER + 1  # coefficients of a value
+# Bounds that a lane holds: what they leave out, the middle of the angles, their half width, and what
+# `program.bounded` says of these.
+LEFT_OUT, CENTRE, REACH, HELD = range(4)
+HOLD = HELD + program.KNOWN
+# of the half width: how far ahead the middle is, and the least way ahead that serves another step
+AHEAD, ENOUGH = 0.85, 0.9
+# w keeps its sign for a way r if w^2 is so many times as large as r |g|: it falls to 0.75 w - sqrt(r |g|)
+# at least (see `program.leaving_at_most`)
+ONE_WAY = 2.0
 FREE = (
     4.0  # |phi| up to which the rounding of phi is counted in every step (see `lockstep.ellipse`)
 )
@@ -248,12 +257,17 @@ def _tables(p, of_angle):
 
 @splice
 def _ball_tables(p):
-    """The `tables` (points, over, known, out) of `_bound`, its `found` and `hidden`."""
+    """The `tables` (points, over, known, out, numbers, centres, radii, lanes) and `hold` of `_bound`."""
     slots = max(1, int(p[SLOTS]))
-    points = np.zeros(slots * 2 * LANES)
+    points, known, out = (
+        np.zeros(slots * 2 * LANES),
+        np.zeros(slots, np.bool_),
+        np.empty(program.KNOWN),
+    )
     over = np.zeros(len(points) * (program.DERIVATIVES + 1))
-    tables = points, over, np.zeros(slots, np.bool_), np.empty(4)
-    return tables, np.empty((4, LANES)), np.zeros(LANES)
+    numbers, lanes = np.zeros(slots * 2 * LANES), np.zeros(LANES, np.int64)
+    tables = points, over, known, out, numbers, np.zeros(LANES), np.zeros(LANES), lanes
+    return tables, np.zeros((HOLD, LANES))
 
 
 @kernel
@@ -312,30 +326,73 @@ def _extend(operations, N, degree, S, K, n, first, last, width):
             _times(S, K, factor, whole, o, q)
 
 
+@inline
+def _room(hold, q, phi, w):
+    """(how far phi of lane q may move until its bounds end, does w keep its sign on that way?)."""
+    away, reach = phi - hold[CENTRE, q], hold[REACH, q]
+    ahead = reach - (away if w > 0.0 else -away)
+    one_way = w * w > ONE_WAY * ahead * hold[HELD + 1, q]
+    return (ahead if one_way else reach - abs(away)), one_way
+
+
+@inline
+def _rate(hold, q, phi, w):
+    """A rate: for the time 1 / rate the angle of lane q stays where its bounds hold."""
+    room, one_way = _room(hold, q, phi, w)
+    most_f, most_g, room = hold[HELD, q], hold[HELD + 1, q], max(room, 1e-300)
+    if not one_way:
+        return program.leaving(most_f, most_g, room, abs(w))
+    slow = program.leaving_at_most(1.05, most_f, most_g, room, abs(w))
+    return min(slow, program.leaving_at_most(1.25, most_f, most_g, room, abs(w)))
+
+
+@inline
+def _serves(hold, q, phi, w):
+    """Do the bounds of lane q hold for a step from here that is not short, with little left out?"""
+    reach = hold[REACH, q]
+    if not abs(phi - hold[CENTRE, q]) <= reach:
+        return False
+    room, _one_way = _room(hold, q, phi, w)
+    f, more_f = hold[HELD + program.SHOWN_F, q], hold[HELD + program.MORE_F, q]
+    g, more_g = hold[HELD + program.SHOWN_G, q], hold[HELD + program.MORE_G, q]
+    return room > ENOUGH * reach and program.hidden(f, more_f, g, more_g, reach, w) <= 1.0
+
+
 @splice
-def _bound(p, N, phi, w, radius, hidden, row, tables, found, width):
-    """Fill `found` (bounds, LANES) with bounds of f, g, g', g'' within `radius` of phi, which changes
-    as what was `hidden` in the last one lets it: see `program.bounded`.
+def _bound(p, N, phi, w, row, tables, hold):
+    """Have all lanes that are not free `hold` bounds of f, g, g', g'' about phi or an angle ahead of it,
+    within a radius that changes as what the last one left out lets it: see `program.bounded`. Those of
+    earlier steps are kept as long as they serve.
     """
-    points, over, known, out = tables
-    none, near, left = np.zeros(LANES), np.zeros(LANES, np.bool_), True
+    points, over, known, out, numbers, centres, radii, lanes = tables
+    none, count = np.zeros(LANES), 0
     for q in range(LANES):
-        radius[q] = min(radius[q] * program.wider(hidden[q]), 1.0 + abs(phi[q]))
-    program.balls(p, N, known, phi[:width], none, points)
-    while left:
-        program.balls(p, N, known, phi[:width], radius, over)
-        left = False
-        for q in range(LANES):
-            if near[q]:
-                continue
-            hidden[q] = program.bounded(p, points, over, q, radius[q], w[q], out)
-            near[q] = hidden[q] <= 1.0 or row[q] < 0
-            if near[q]:
-                for k in range(len(out)):
-                    found[k, q] = out[k]
-            else:
-                radius[q] *= min(program.wider(hidden[q]), 0.9)
-                left = True
+        if row[q] >= 0 and not _serves(hold, q, phi[q], w[q]):
+            radius = hold[REACH, q] * program.wider(hold[LEFT_OUT, q])
+            hold[REACH, q], lanes[count] = min(radius, 1.0 + abs(phi[q])), q
+            count += 1
+    while count > 0:
+        for j in range(count):
+            q = lanes[j]
+            radius, speed = hold[REACH, q], abs(w[q])
+            one_way = speed * speed > ONE_WAY * 2.0 * radius * hold[HELD + 1, q]
+            shift = (AHEAD if w[q] > 0.0 else -AHEAD) * radius if one_way else 0.0
+            centres[j], radii[j], hold[CENTRE, q] = phi[q] + shift, radius, phi[q] + shift
+            for k in range(0, len(N), LANES):
+                numbers[k + j] = N[k + q]
+        program.balls(p, numbers, known, centres[:count], none, points)
+        program.balls(p, numbers, known, centres[:count], radii, over)
+        left = 0
+        for j in range(count):
+            q = lanes[j]
+            left_out = program.bounded(p, points, over, j, radii[j], w[q], out)
+            hold[LEFT_OUT, q] = left_out
+            for k in range(len(out)):
+                hold[HELD + k, q] = out[k]
+            if left_out > 1.0:
+                hold[REACH, q] *= min(program.wider(left_out), 0.9)
+                lanes[left], left = q, left + 1
+        count = left
 
 
 @unroll
@@ -397,17 +454,25 @@ def _begin(circle, state, fixed, phi):
 
 
 @splice
-def _stay(state, fixed, found, radius):
-    """Note the bounds, and those that keep `lockstep.advance` within `radius`, where they hold."""
+def _stay(state, fixed, phi, hold):
+    """Note the bounds, and those that keep `lockstep.advance` where they hold."""
     for i in range(LANES):
-        most_f, most_g = found[0, i], found[1, i]
-        rate = program.leaving(most_f, most_g, radius[i], abs(state[V, i]))
-        fixed[PF, i], fixed[PG, i], fixed[PDG, i] = most_f, most_g, max(found[2, i], rate * rate)
+        rate = _rate(hold, i, phi[i], state[V, i])
+        fixed[PF, i], fixed[PG, i] = hold[HELD, i], hold[HELD + 1, i]
+        fixed[PDG, i] = max(hold[HELD + 2, i], rate * rate)
+
+
+@splice
+def _hold_nothing(hold, i):
+    """Lane i begins with no bounds."""
+    for k in range(HOLD):
+        hold[k, i] = 0.0
+    hold[CENTRE, i], hold[REACH, i] = math.inf, 1.0
 
 
 @splice
 def _enter(
-    P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, hidden, row, column, status
+    P, leads, lead, starts, times, waiting, state, fixed, numbers, hold, row, column, status
 ):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
     circle = P[lead, ON_CIRCLE] > 0.0
@@ -429,7 +494,8 @@ def _enter(
                 slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
                 state[SAA, i], state[RATE, i] = slip * slip, 1.0 + abs(w0)
                 fixed[PF, i], fixed[PG, i], fixed[PDG, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG]
-                fixed[TURN, i], radius[i], hidden[i] = 0.0, 1.0, 0.0
+                fixed[TURN, i] = 0.0
+                _hold_nothing(hold, i)
                 program.note(p, numbers, i, i + 1)
                 fixed[lockstep.NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
             waiting += 1
@@ -445,22 +511,22 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
     circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
-    phi, radius = np.zeros(LANES), np.ones(LANES)
-    tables, bounds, hidden = _ball_tables(p)
+    phi = np.zeros(LANES)
+    tables, hold = _ball_tables(p)
     fixed[lockstep.NEXT, :] = math.inf  # of lanes that stay free, too
     row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
     waiting, free = np.int64(lead), True
     while True:
         if free:
             waiting = _enter(
-                P, leads, lead, starts, times, waiting, state, fixed, numbers, radius, hidden, row, column, status
+                P, leads, lead, starts, times, waiting, state, fixed, numbers, hold, row, column, status
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
         _begin(circle, state, fixed, phi)
         if limited:
-            _bound(p, N, phi, state[V], radius, hidden, row, tables, bounds, width)
-            _stay(state, fixed, bounds, radius)
+            _bound(p, N, phi, state[V], row, tables, hold)
+            _stay(state, fixed, phi, hold)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
             _vary(T, i)
@@ -495,7 +561,7 @@ def _in_angle(p, operations, N, degree, S, K, phi, w, forms, width):
 
 @splice
 def _enter_far(
-    P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, radius, hidden, row,
+    P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, hold, row,
     sizes, goal,
 ):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait, whose status is OK at first; returns
@@ -523,7 +589,8 @@ def _enter_far(
                     state[far.RATE, i] = 2.0 + bend / w0
                     state[far.W_BOUND, i], state[far.T_BOUND, i] = bound, slip / w0
                     program.note(p, numbers, i, i + 1)
-                    row[i], radius[i], hidden[i] = waiting, 1.0, 0.0
+                    row[i] = waiting
+                    _hold_nothing(hold, i)
                     sizes[i], goal[i] = finite(own), own[0]
                     for k in range(sizes[i]):
                         status[waiting, k] = OK
@@ -554,15 +621,14 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
     operations, numbers, S, K, degree = _tables(p, 1)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
     forms = np.zeros((2 * far.ORDER, LANES))
-    radius = np.ones(LANES)
-    tables, bounds, hidden = _ball_tables(p)
+    tables, hold = _ball_tables(p)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64)
     goal = np.zeros(LANES)
     waiting, free, ended = np.int64(lead), True, np.zeros(LANES, dtype=np.bool_)
     while True:
         if free:
             waiting = _enter_far(
-                P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, radius, hidden,
+                P, leads, lead, starts, targets, planes, status, timed, waiting, state, fixed, numbers, hold,
                 row, sizes, goal
             )  # fmt: skip
             if not lockstep.busy(row):
@@ -580,11 +646,12 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
                 )
                 state[far.T_BOUND, i] += slip / state[far.W, i]
         if limited:
-            _bound(p, N, state[far.AT], state[far.W], radius, hidden, row, tables, bounds, width)
+            _bound(p, N, state[far.AT], state[far.W], row, tables, hold)
             for i in range(LANES):
-                # a step of at most 0.8 of the radius, on which series fall: see `lockstep_phi._advance`
-                fixed[BOUND_F, i] = max(bounds[0, i], 0.625 * state[far.W, i] / radius[i])
-                fixed[BOUND_G, i] = bounds[1, i]
+                # a step of at most 0.8 of what is left, on which series fall: see `lockstep_phi._advance`
+                left = hold[CENTRE, i] + hold[REACH, i] - state[far.AT, i]
+                fixed[BOUND_F, i] = max(hold[HELD, i], 0.625 * state[far.W, i] / left)
+                fixed[BOUND_G, i] = hold[HELD + 1, i]
         _in_angle(p, operations, N, degree, S, K, state[far.AT], state[far.W], forms, width)
         for n in range(far.ORDER):
             for i in range(LANES):
@@ -797,7 +864,7 @@ def _calm(T, state, before, fixed, goal, doubt, started, calm):
 
 @splice
 def _enter_near(
-    P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, hidden, row, sizes, goal,
+    P, leads, lead, starts, targets, waiting, state, fixed, numbers, hold, row, sizes, goal,
     started, column, delay, ahead, planes, status,
 ):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
@@ -832,7 +899,8 @@ def _enter_near(
                 state[TIME, i], state[TIME_LOW, i] = ahead[r, far.TIME], ahead[r, far.TIME_LOW]
                 state[SAA, i], state[SBB, i] = 0.0, ahead[r, far.W_BOUND] * ahead[r, far.W_BOUND]
                 state[STEPS, i] = 1.0
-            state[V, i], state[RATE, i], radius[i], hidden[i] = own, 1.0 + own, 1.0, 0.0
+            state[V, i], state[RATE, i] = own, 1.0 + own
+            _hold_nothing(hold, i)
             fixed[PF, i], fixed[PG, i], fixed[PDG, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG]
             fixed[lockstep.NEXT, i] = math.inf
             program.note(p, numbers, i, i + 1)
@@ -852,8 +920,8 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
     circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
-    phi, radius = np.zeros(LANES), np.ones(LANES)
-    tables, bounds, hidden = _ball_tables(p)
+    phi = np.zeros(LANES)
+    tables, hold = _ball_tables(p)
     row, sizes, column = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     doubt, goal, delay = np.full(LANES, -1), np.zeros(LANES), np.zeros(LANES)
     started, calm = np.zeros(LANES, np.bool_), np.zeros(LANES, np.bool_)
@@ -864,15 +932,15 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
                 if row[i] < 0:
                     doubt[i] = -1
             waiting = _enter_near(
-                P, leads, lead, starts, targets, waiting, state, fixed, numbers, radius, hidden, row, sizes, goal,
+                P, leads, lead, starts, targets, waiting, state, fixed, numbers, hold, row, sizes, goal,
                 started, column, delay, ahead, planes, status
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
         _begin(circle, state, fixed, phi)
         if limited:
-            _bound(p, N, phi, state[V], radius, hidden, row, tables, bounds, width)
-            _stay(state, fixed, bounds, radius)
+            _bound(p, N, phi, state[V], row, tables, hold)
+            _stay(state, fixed, phi, hold)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
             _vary(T, i)
@@ -885,9 +953,9 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
             r, size = row[i], sizes[i]
             own = P[r]
             if not circle:  # where the last step holds
-                own[RADIUS] = radius[i]
-                for k in range(len(bounds)):
-                    own[BOUND_F + k] = bounds[k, i]
+                own[RADIUS] = hold[REACH, i]
+                for k in range(program.BOUNDS):
+                    own[BOUND_F + k] = hold[HELD + k, i]
             column[i], doubt[i], started[i], ending = _pass(
                 own, T, state, before, fixed, delay[i], i, block, row_of(targets, r)[:size], column[i], doubt[i],
                 started[i], planes[:, r, :size].T, status[r, :size]

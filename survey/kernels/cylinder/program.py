@@ -30,7 +30,9 @@ from survey.kernels.unroll import unroll
 REVERSED, ON_CIRCLE, MIRRORED, AT_REST, MEAN = 0, 2, 3, 4, 5
 BOUND_F, BOUND_G, BOUND_DG, BOUND_DDG = range(6, 10)  # as in `flow`
 _ON_F, _ON_G, _ON_DG, _ON_DDG = range(4)  # the same from BOUND_F on
-_BOUNDS = 4
+BOUNDS = 4
+SHOWN_F, MORE_F, SHOWN_G, MORE_G = range(4, 8)
+KNOWN = 8
 COLUMNS = 10  # of a row of `flow`; what has more is a program
 SLOTS, FORCES, F_AT, G_AT, DG_AT, RADIUS, OPERATIONS = range(10, 17)
 CODE, FIRST, SECOND, NUMBER, WIDTH = range(5)
@@ -292,7 +294,7 @@ def _extend_balls(p, numbers, known, lanes, width, orders, B, n):
     only in the first `lanes`.
     """
     share = 1.0 if n == 0 else 0.0
-    for i in range(1, _count(p, SLOTS)):
+    for i in range(1, _count(p, FORCES)):
         if known[i]:
             continue
         code, a, b, number = _operation(p, i)
@@ -410,7 +412,7 @@ def ball(p, phi, radius, orders, B):
 
 @kernel
 def raised(p, points, over, q, out):
-    """Raise `out` (_BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| in lane q of the
+    """Raise `out` (BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| in lane q of the
     balls `over`, of three orders or more.
 
     The first two also bound what rounds f and g at its middle, as the balls `points` of one order
@@ -429,20 +431,30 @@ def raised(p, points, over, q, out):
 
 @kernel
 def bounded(p, points, over, q, radius, w, out):
-    """Fill `out` (_BOUNDS) with the bounds that hold within `radius` in lane q: see `raised`. Returns
-    how much of f w + g their series, the middles of `over`, leave out at most: up to 1, little enough.
+    """Fill `out` (KNOWN) with the bounds that hold within `radius` in lane q, see `raised`, and the
+    sizes of the series of f and of g, the middles of `over`, each before what it leaves out at most.
+    Returns `hidden`.
     """
-    for k in range(_BOUNDS):
+    for k in range(KNOWN):
         out[k] = 0.0
     raised(p, points, over, q, out)
     if not math.isfinite(out.sum()):
         return 0.0 if radius < LEAST_RADIUS else math.inf
     f, more_f = _shown(over, int(p[F_AT]), q, radius)
     g, more_g = _shown(over, int(p[G_AT]), q, radius)
+    out[SHOWN_F], out[MORE_F], out[SHOWN_G], out[MORE_G] = f, more_f, g, more_g
+    return hidden(f, more_f, g, more_g, radius, w)
+
+
+@inline
+def hidden(f, more_f, g, more_g, radius, w):
+    """How much of f w + g series of these sizes leave out at most, within the radius, by these
+    bounds: up to 1, little enough.
+    """
     w = abs(w) + math.sqrt(radius * g)
     enough = HIDDEN * (f * w + g) + NEGLIGIBLE * w * w / radius + 1e-300
-    hidden = 0.0 if radius < FINE else (more_f * w + more_g) / enough
-    return hidden if hidden >= 0.0 else math.inf
+    share = (more_f * w + more_g) / enough
+    return 0.0 if radius < FINE else (share if share >= 0.0 else math.inf)
 
 
 @inline
@@ -471,7 +483,7 @@ def _agree(p, out, first):
     the first?
     """
     near = not first
-    for k in range(_BOUNDS):
+    for k in range(BOUNDS):
         near = near and math.isfinite(out[k]) and p[BOUND_F + k] <= 2.0 * out[k]
         p[BOUND_F + k] = out[k]
     return near
@@ -479,22 +491,22 @@ def _agree(p, out, first):
 
 @splice
 def _bound_finely(p, numbers, middles, radii, bounds):
-    """Lower the bounds over the whole circle in p, which are the largest `bounds` (n, _BOUNDS) of its
+    """Lower the bounds over the whole circle in p, which are the largest `bounds` (n, BOUNDS) of its
     pieces: those with more than half of the largest are divided by four, until no bound falls to less
     than half by that.
     """
     count, near = _count(p, SLOTS), False
     points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
-    known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(_BOUNDS)
+    known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(BOUNDS)
     narrowest = radii[0]
     while not near and len(radii) <= FINEST and narrowest > 1.01 * math.pi / FINEST:
         large, left = np.zeros(len(radii), np.bool_), len(radii)
         for i in range(len(radii)):
-            for k in range(_BOUNDS):
+            for k in range(BOUNDS):
                 large[i] |= not bounds[i, k] <= 0.5 * p[BOUND_F + k] or bounds[i, k] == math.inf
             left -= large[i]
         size = left + 4 * (len(radii) - left)
-        finer, narrower, lower = np.empty(size), np.empty(size), np.zeros((size, _BOUNDS))
+        finer, narrower, lower = np.empty(size), np.empty(size), np.zeros((size, BOUNDS))
         stays, part = 0, left  # what stays comes first
         for i in range(len(radii)):
             if large[i]:
@@ -504,7 +516,7 @@ def _bound_finely(p, numbers, middles, radii, bounds):
                 part += 4
             else:
                 finer[stays], narrower[stays] = middles[i], radii[i]
-                for k in range(_BOUNDS):
+                for k in range(BOUNDS):
                     lower[stays, k] = bounds[i, k]
                 stays += 1
         for first in range(left, size, LANES):
@@ -513,7 +525,7 @@ def _bound_finely(p, numbers, middles, radii, bounds):
             balls(p, numbers, known, phi, narrower[first : first + LANES], over)
             for q in range(len(phi)):
                 raised(p, points, over, q, lower[first + q])
-        for k in range(_BOUNDS):
+        for k in range(BOUNDS):
             out[k] = 0.0
             for i in range(size):
                 out[k] = max(out[k], lower[i, k])
@@ -633,7 +645,7 @@ def complete(rows, angles):
     at, radii, none = np.zeros(5 * LANES), np.zeros(5 * LANES), np.zeros(LANES)
     lanes = np.array([1, 2 * many, LANES, LANES, pieces - 2 * LANES])
     points, over = np.zeros((5, count * 2 * LANES)), np.zeros((5, count * 6 * LANES))
-    numbers, out = np.zeros((2 * count, LANES)), np.empty(_BOUNDS)
+    numbers, out = np.zeros((2 * count, LANES)), np.empty(BOUNDS)
     known, last = np.zeros(count, np.bool_), np.full(rows.shape[1], math.nan)
     for k in range(many):
         at[LANES + k], at[LANES + many + k] = angles[k], angles[k] + 2.0 * math.pi
@@ -666,14 +678,14 @@ def complete(rows, angles):
                     raised(p, points[k], over[k], q % LANES, out)
                 near = _agree(p, out, first == 0)
             if not near:
-                bounds = np.zeros((pieces - COARSEST, _BOUNDS))
+                bounds = np.zeros((pieces - COARSEST, BOUNDS))
                 for q in range(COARSEST, pieces):
                     k = 2 + q // LANES
                     raised(p, points[k], over[k], q % LANES, bounds[q - COARSEST])
                 first = 2 * LANES + COARSEST
                 place = slice(first, first + len(bounds))
                 _bound_finely(p, numbers.ravel(), at[place], radii[place], bounds)
-            for k in range(_BOUNDS):
+            for k in range(BOUNDS):
                 good &= math.isfinite(p[BOUND_F + k])
             good = good and _periodic(p, points[1], 0, many)
         if not good:
@@ -741,9 +753,9 @@ def _all_shown(f, more_f, g, more_g, weak_f, weak_g):
 
 
 @inline
-def wider(hidden):
-    """By what factor the radius may change where so much is hidden: see `bounded`."""
-    return min(max((0.5 / (hidden + 1e-300)) ** (1.0 / DERIVATIVES), 0.25), 2.0)
+def wider(left_out):
+    """By what factor the radius may change where so much is left out: see `hidden`."""
+    return min(max((0.1 / (left_out + 1e-300)) ** (1.0 / DERIVATIVES), 0.25), 2.0)
 
 
 @kernel
@@ -751,25 +763,25 @@ def bound_near(p, phi, w):
     """Write bounds near phi into p, and how near: p[RADIUS], twice the last one, or less where they
     do not show f w + g.
     """
-    count, out = _count(p, SLOTS), np.empty(_BOUNDS)
+    count, out = _count(p, SLOTS), np.empty(KNOWN)
     numbers, known = np.empty((2 * count, LANES)), np.zeros(count, np.bool_)
     points = np.empty(count * 2 * LANES)
     over = np.empty(len(points) * (DERIVATIVES + 1))
     note(p, numbers, 0, 1)
     N, radius = numbers.ravel(), min(4.0 * p[RADIUS], 2.0 * (1.0 + abs(phi)))
     balls_of_one(p, N, known, phi, 0.0, points)
-    hidden = math.inf
-    while hidden > 1.0:
+    left_out = math.inf
+    while left_out > 1.0:
         radius *= 0.5
         balls_of_one(p, N, known, phi, radius, over)
-        hidden = bounded(p, points, over, 0, radius, w, out)
+        left_out = bounded(p, points, over, 0, radius, w, out)
     p[RADIUS] = radius
-    for k in range(_BOUNDS):
+    for k in range(BOUNDS):
         p[BOUND_F + k] = out[k]
 
 
 @inline
-def _leaving(factor, most_f, most_g, radius, w):
+def leaving_at_most(factor, most_f, most_g, radius, w):
     root = math.sqrt(radius * most_g) + 1e-300
     most = factor * w + root
     return max(most / radius, (most_f * most + most_g) / ((factor - 1.0) * w + root))
@@ -780,7 +792,10 @@ def leaving(most_f, most_g, radius, w):
     """A rate: for the time 1 / rate, phi stays within the radius where |f| and |g| are below these
     bounds, since |w| stays below a multiple of its first value and of sqrt(radius g).
     """
-    return min(_leaving(1.25, most_f, most_g, radius, w), _leaving(2.0, most_f, most_g, radius, w))
+    return min(
+        leaving_at_most(1.25, most_f, most_g, radius, w),
+        leaving_at_most(2.0, most_f, most_g, radius, w),
+    )
 
 
 @kernel
