@@ -2,10 +2,9 @@
 
 import inspect
 import os
-import warnings
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from survey.file import disk, reading
 from survey.file.labels import count, layout
 from survey.file.labels import describe as labelled
 from survey.grid import Grid, fixed, lines
-from survey.request import earlier, physical, trust, user_scene
+from survey.request import arrays, earlier, physical, trust, user_scene
 from survey.request.checks import (
     check_options,
     check_parameters,
@@ -34,7 +33,7 @@ from survey.scene import Option, Output, Parameter, Request, condition, exists
 from survey.sweep import announce, engine, solve
 from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.progress import Progress, watched
-from survey.wording import counted, html_table, short, shown, summary
+from survey.wording import counted, html_table, shown, summary
 
 
 def run(
@@ -176,7 +175,8 @@ def evaluate(
     known = {p.name for p in module.PARAMETERS}
     resolved = physical.resolved(module, named)
     given = {
-        key: _labelled(key, value) if key in known else value for key, value in resolved.items()
+        key: arrays.as_labelled(key, value) if key in known else value
+        for key, value in resolved.items()
     }
     options = check_options(
         module, {key: parameters[key] for key in parameters if key in names}, given
@@ -186,12 +186,12 @@ def evaluate(
         variables = _as_list(variables)
     request = check_request(module, options, method, rtol, variables)
     given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
-    _check_domains(used, given, request, named)
-    _check_dimensions(module, given)
-    if any(map(_is_lazy, given.values())):
+    arrays.check_domains(used, given, request, named)
+    arrays.check_dimensions(module, given)
+    if any(map(arrays.is_lazy, given.values())):
         user_scene.check(module)
         return _lazy(module, scene, request, given)
-    grid = _grid(used, given)
+    grid = arrays.grid_of(used, given)
     try:
         with compiling_ahead(module, request):
             user_scene.check(module, grid)
@@ -205,7 +205,7 @@ def evaluate(
             f"evaluate: {counted(grid.points, 'point')} do not fit in memory; use survey.run, which writes a file, or "
             "dask arrays (DataArray.chunk), or fewer points or variables"
         ) from None
-    own = _own_coordinates(given)
+    own = arrays.own_coordinates(given)
     return ds.assign_coords(own) if own else ds
 
 
@@ -239,146 +239,10 @@ def _as_list(variables: Any) -> list[Any]:
         return [variables]
 
 
-@cache
-def _a_number() -> xr.DataArray:
-    """A DataArray of one number: to copy it takes less time than to make another."""
-    # not where this module is loaded: xarray imports dask.array here, 0.3 s
-    return xr.DataArray(0.0)
-
-
-def _labelled(key: str, value: Any) -> xr.DataArray:
-    """The parameter as a float64 DataArray."""
-    given = value
-    if isinstance(value, xr.Variable):
-        value = xr.DataArray(value)
-    unnamed = not isinstance(value, xr.DataArray)
-    array = _array(key, value) if unnamed and not hasattr(value, "dask") else value
-    if unnamed and array.ndim > 1:
-        raise BadInput(
-            f"{short(key, 40)}: an array of {array.ndim} dimensions needs names for them; give a DataArray"
-        )
-    if array.dtype.kind not in "iuf":  # xarray itself may fail on whole numbers beyond floats
-        raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
-    if array.size == 0:
-        raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    if unnamed and array.ndim == 0 and isinstance(array, np.ndarray):
-        return _a_number().copy(data=np.array(array, dtype=float))
-    if unnamed:
-        value = xr.DataArray(array, dims=(key,) if array.ndim else ())
-    return (
-        value.astype(float)
-        if _is_lazy(value)
-        else value.copy(data=np.array(value.values, dtype=float))
-    )
-
-
-def _is_lazy(array: xr.DataArray) -> bool:
-    """Is it a dask array? (`chunks` alone is slow where it is not.)"""
-    return not isinstance(array.data, np.ndarray) and bool(array.chunks)
-
-
-def _array(key: str, value: Any) -> npt.NDArray[Any]:
-    """The parameter as an array; masked values are NaN, which affects only their points."""
-    try:
-        if np.ma.isMaskedArray(value):
-            return np.ma.filled(value.astype(float), np.nan)
-        return np.asarray(value)
-    except Exception:  # a list of lists of unequal lengths; an object of any kind
-        raise _not_real(key, value) from None
-
-
-def _not_real(key: str, value: Any) -> BadInput:
-    return BadInput(
-        f"{short(key, 40)} = {shown(value)}: it must be a real number or an array of real numbers"
-    )
-
-
-def _check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
-    """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name
-    of an output.
-    """
-    wide = [array for array in given.values() if array.dims]
-    if not wide:
-        return
-    try:
-        if len(wide) > 1:
-            xr.align(*wide, join="exact", copy=False)
-    except ValueError as error:
-        raise BadInput(
-            f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
-        ) from None
-    outputs = {output.name for output in module.OUTPUTS} | {
-        "status",
-        *getattr(module, "DIMENSIONS", ()),
-    }
-    for key, array in given.items():
-        for dim in set(array.dims) & (
-            outputs | {name for name, other in given.items() if not other.ndim}
-        ) - {key}:
-            what = (
-                "an output or its dimension"
-                if dim in outputs
-                else "a parameter that is a single number"
-            )
-            raise BadInput(f"{key}: its dimension {dim!r} clashes with {what}; rename it")
-
-
-def _check_domains(
-    used: dict[str, Parameter],
-    given: dict[str, xr.DataArray],
-    request: Request,
-    named: Iterable[str],
-) -> None:
-    """Raise BadInput for a single value outside its domain; warn of arrays with such that look like
-    degrees.
-    """
-    for key, array in given.items():
-        if _is_lazy(array) or (array.ndim and used[key].units != "rad"):
-            continue
-        outside = ~used[key].holds(array.values, request.variables)
-        if not outside.any():
-            continue
-        value = float(array.values[outside][0])
-        hint = physical.hint(used[key], value, named)
-        if array.ndim == 0:
-            raise BadInput(
-                f"{key} = {value:g} is outside its domain; allowed: {used[key].domain}{hint}"
-            )
-        if hint and f"{key}{physical.DEGREES}" not in named:
-            what = f"{counted(outside.sum(), 'value')} outside the domain, such as {value:g}"
-            warnings.warn(f"evaluate: {key} has {what}{hint}", stacklevel=3)
-
-
 def _seconds(module: Any, request: Request, grid: Grid) -> float:
     """Rough seconds on one thread."""
     sizes = {name: values.size for name, (_, values) in grid.parameters.items()}
     return float(module.cost(request.options, sizes) * grid.points)
-
-
-def _grid(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
-    sizes: dict[Hashable, int] = {}
-    for key, array in given.items():
-        for dim, size in array.sizes.items():
-            if sizes.setdefault(dim, size) != size:
-                here = counted(size, "value")
-                raise BadInput(
-                    f"{key}: dimension {dim!r} has {here} here and {sizes[dim]:,} in another parameter"
-                )
-    return Grid(
-        sizes=sizes,
-        parameters={key: (array.dims, array.values) for key, array in given.items()},
-        uncut=frozenset(
-            dim for key, array in given.items() if used[key].uncut for dim in array.dims
-        ),
-    )
-
-
-def _own_coordinates(given: dict[str, xr.DataArray]) -> dict[Hashable, xr.Variable]:
-    """Coordinates that the caller's DataArrays bring along, without what these bring along in turn."""
-    own: dict[Hashable, xr.Variable] = {}
-    for array in given.values():
-        own |= {name: coord.variable for name, coord in array.coords.items() if name not in given}
-    return own
 
 
 def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArray]) -> xr.Dataset:
@@ -388,9 +252,9 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
     axes = {name: (array.dims, array) for name, array in given.items()}
     request = replace(request, lines=lines(axes), fixed=fixed(axes))
 
-    def solve_arrays(*arrays: Any) -> tuple[Any, ...]:
-        shape = np.broadcast_shapes(*(array.shape for array in arrays))
-        wide = [array.reshape((1,) * (len(shape) - array.ndim) + array.shape) for array in arrays]
+    def solve_arrays(*parts: Any) -> tuple[Any, ...]:
+        shape = np.broadcast_shapes(*(part.shape for part in parts))
+        wide = [part.reshape((1,) * (len(shape) - part.ndim) + part.shape) for part in parts]
         solved = solve.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
         return tuple(solved[name] for name in table)
 
@@ -406,12 +270,12 @@ def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArr
             "output_sizes": {d: len(module.DIMENSIONS[d]) for o in extra if o for d in o.dims}
         },
     )
-    arrays = dict(zip(table, results, strict=True))
+    lazy = dict(zip(table, results, strict=True))
     sizes = dict(zip(results[-1].dims, results[-1].shape, strict=True))
     values = {key: (array.dims, array.data) for key, array in given.items()}
-    data = {name: array.data for name, array in arrays.items()}
+    data = {name: array.data for name, array in lazy.items()}
     return labelled(Grid(sizes, values), module, scene, request, data).assign_coords(
-        _own_coordinates(given)
+        arrays.own_coordinates(given)
     )
 
 

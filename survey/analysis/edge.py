@@ -14,6 +14,7 @@ from survey.analysis.given import check_names, options_at, parameters
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes, variable
 from survey.request import physical, user_scene
+from survey.request.arrays import as_labelled, check_dimensions, grid_of, own_coordinates
 from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
@@ -135,7 +136,7 @@ def _of_rows(name, module, measure, options, used, along, ends, near, given):
         )
     ends = _range(used[along], ends, None, rows=True)
     others = {key: p for key, p in used.items() if key != along}
-    arrays = {key: api._labelled(key, given.get(key, p.default)) for key, p in others.items()}
+    arrays = {key: as_labelled(key, given.get(key, p.default)) for key, p in others.items()}
     for key, array in arrays.items():
         outside = ~others[key].holds(array.values)
         if along in array.dims:
@@ -147,8 +148,8 @@ def _of_rows(name, module, measure, options, used, along, ends, near, given):
             raise BadInput(
                 f"{key} = {value:g} is outside its domain; allowed: {_domain(others[key])}"
             )
-    api._check_dimensions(module, arrays)
-    grid = api._grid(others, arrays)
+    check_dimensions(module, arrays)
+    grid = grid_of(others, arrays)
     user_scene.check(module)
     with watched(name, module, grid.points, lambda: np.inf, "rows") as progress:
         report = progress and (lambda done, total, *_: progress(done, total))
@@ -157,7 +158,7 @@ def _of_rows(name, module, measure, options, used, along, ends, near, given):
     ds = _described(module, measure, used, along, fixed, replace(found, complete=None), ends)
     about = {key: {"long_name": p.long_name, "units": p.units} for key, p in others.items()}
     named = {key: array.variable for key, array in arrays.items() if array.ndim}
-    for key, values in (named | api._own_coordinates(arrays)).items():
+    for key, values in (named | own_coordinates(arrays)).items():
         every = values.set_dims(dict(grid.sizes)).values.ravel()
         ds.coords[key] = "place", every[row], about.get(key, values.attrs)
     ds.attrs["rows"] = grid.points
