@@ -18,7 +18,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder import program
+from survey.kernels.cylinder import bounds, program
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.records import GIVEN, PHI0, SIX, START_PHI, START_W, W0
 from survey.kernels.jit import for_constants, inline, kernel
@@ -109,7 +109,7 @@ def _no_bounds_needed(p, phi, w):
 def bound_start(p, phi, w):
     """On a line, write bounds near phi into p, where a solution starts with w."""
     if not on_circle(p):
-        program.bound_near(p, phi, w)
+        bounds.bound_near(p, phi, w)
 
 
 @inline
@@ -172,7 +172,7 @@ def series(p, phi, w, T, order):
         _series_of_gyrostat(p, phi, w, T, order)
         return
     if not on_circle(p):
-        program.bound_near(p, phi, w)
+        bounds.bound_near(p, phi, w)
     program.in_time(p, phi, w, order, T[:, PHI], T[:, W], T[:, E], T[:, Y])
 
 
@@ -275,4 +275,4 @@ def longest_step(p, w):
     """
     step = _longest_step_of_gyrostat(p, w)
     limited = len(p) > COLUMNS and p[program.RADIUS] < program.UNLIMITED
-    return min(step, program.longest_step(p, w)) if limited else step
+    return min(step, bounds.longest_step(p, w)) if limited else step

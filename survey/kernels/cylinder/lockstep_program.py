@@ -14,10 +14,11 @@ import math
 
 import numpy as np
 
-from survey.kernels.cylinder import lockstep, program
+from survey.kernels.cylinder import balls, bounds, lockstep, program
 from survey.kernels.cylinder import lockstep_abel as near
 from survey.kernels.cylinder import lockstep_phi as far
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.balls import VECTOR
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, TWO_PI_LOW, reduced
 from survey.kernels.cylinder.lockstep import (
     DG,
@@ -72,7 +73,6 @@ from survey.kernels.cylinder.program import (
     SUBTRACT,
     TIMES,
     UNLIMITED,
-    VECTOR,
     WIDTH,
     function,
 )
@@ -107,13 +107,13 @@ from survey.kernels.unroll import summed, unroll
 GOING = -1  # what has not ended
 SERIES = ORDER + 1  # coefficients of a value
 # Bounds that a lane holds: what they leave out, the middle of the angles, their half width, and what
-# `program.bounded` says of these.
+# `bounds.bounded` says of these.
 LEFT_OUT, CENTRE, REACH, HELD = range(4)
-HOLD = HELD + program.KNOWN
+HOLD = HELD + bounds.KNOWN
 # of the half width: how far ahead the middle is, and the least way ahead that serves another step
 AHEAD, ENOUGH = 0.85, 0.9
 # w keeps its sign for a way r if w^2 is so many times as large as r |g|: it falls to 0.75 w - sqrt(r |g|)
-# at least (see `program.leaving_at_most`)
+# at least (see `bounds.leaving_at_most`)
 ONE_WAY = 2.0
 FREE = (
     4.0  # |phi| up to which the rounding of phi is counted in every step (see `lockstep.ellipse`)
@@ -259,13 +259,9 @@ def _tables(p, of_angle):
 def _ball_tables(p):
     """The `tables` (points, over, known, out, numbers, centres, radii, lanes) and `hold` of `_bound`."""
     slots = max(1, int(p[SLOTS]))
-    points, known, out = (
-        np.zeros(slots * 2 * LANES),
-        np.zeros(slots, np.bool_),
-        np.empty(program.KNOWN),
-    )
-    over = np.zeros(len(points) * (program.DERIVATIVES + 1))
-    numbers, lanes = np.zeros(slots * 2 * LANES), np.zeros(LANES, np.int64)
+    points, numbers = np.zeros(slots * 2 * LANES), np.zeros(slots * 2 * LANES)
+    over = np.zeros(len(points) * (bounds.DERIVATIVES + 1))
+    known, out, lanes = np.zeros(slots, np.bool_), np.empty(bounds.KNOWN), np.zeros(LANES, np.int64)
     tables = points, over, known, out, numbers, np.zeros(LANES), np.zeros(LANES), lanes
     return tables, np.zeros((HOLD, LANES))
 
@@ -341,9 +337,9 @@ def _rate(hold, q, phi, w):
     room, one_way = _room(hold, q, phi, w)
     most_f, most_g, room = hold[HELD, q], hold[HELD + 1, q], max(room, 1e-300)
     if not one_way:
-        return program.leaving(most_f, most_g, room, abs(w))
-    slow = program.leaving_at_most(1.05, most_f, most_g, room, abs(w))
-    return min(slow, program.leaving_at_most(1.25, most_f, most_g, room, abs(w)))
+        return bounds.leaving(most_f, most_g, room, abs(w))
+    slow = bounds.leaving_at_most(1.05, most_f, most_g, room, abs(w))
+    return min(slow, bounds.leaving_at_most(1.25, most_f, most_g, room, abs(w)))
 
 
 @inline
@@ -353,22 +349,22 @@ def _serves(hold, q, phi, w):
     if not abs(phi - hold[CENTRE, q]) <= reach:
         return False
     room, _one_way = _room(hold, q, phi, w)
-    f, more_f = hold[HELD + program.SHOWN_F, q], hold[HELD + program.MORE_F, q]
-    g, more_g = hold[HELD + program.SHOWN_G, q], hold[HELD + program.MORE_G, q]
-    return room > ENOUGH * reach and program.hidden(f, more_f, g, more_g, reach, w) <= 1.0
+    f, more_f = hold[HELD + bounds.SHOWN_F, q], hold[HELD + bounds.MORE_F, q]
+    g, more_g = hold[HELD + bounds.SHOWN_G, q], hold[HELD + bounds.MORE_G, q]
+    return room > ENOUGH * reach and bounds.hidden(f, more_f, g, more_g, reach, w) <= 1.0
 
 
 @splice
 def _bound(p, N, phi, w, row, tables, hold):
     """Have all lanes that are not free `hold` bounds of f, g, g', g'' about phi or an angle ahead of it,
-    within a radius that changes as what the last one left out lets it: see `program.bounded`. Those of
+    within a radius that changes as what the last one left out lets it: see `bounds.bounded`. Those of
     earlier steps are kept as long as they serve.
     """
     points, over, known, out, numbers, centres, radii, lanes = tables
     none, count = np.zeros(LANES), 0
     for q in range(LANES):
         if row[q] >= 0 and not _serves(hold, q, phi[q], w[q]):
-            radius = hold[REACH, q] * program.wider(hold[LEFT_OUT, q])
+            radius = hold[REACH, q] * bounds.wider(hold[LEFT_OUT, q])
             hold[REACH, q], lanes[count] = min(radius, 1.0 + abs(phi[q])), q
             count += 1
     while count > 0:
@@ -380,17 +376,17 @@ def _bound(p, N, phi, w, row, tables, hold):
             centres[j], radii[j], hold[CENTRE, q] = phi[q] + shift, radius, phi[q] + shift
             for k in range(0, len(N), LANES):
                 numbers[k + j] = N[k + q]
-        program.balls(p, numbers, known, centres[:count], none, points)
-        program.balls(p, numbers, known, centres[:count], radii, over)
+        balls.balls(p, numbers, known, centres[:count], none, points)
+        balls.balls(p, numbers, known, centres[:count], radii, over)
         left = 0
         for j in range(count):
             q = lanes[j]
-            left_out = program.bounded(p, points, over, j, radii[j], w[q], out)
+            left_out = bounds.bounded(p, points, over, j, radii[j], w[q], out)
             hold[LEFT_OUT, q] = left_out
             for k in range(len(out)):
                 hold[HELD + k, q] = out[k]
             if left_out > 1.0:
-                hold[REACH, q] *= min(program.wider(left_out), 0.9)
+                hold[REACH, q] *= min(bounds.wider(left_out), 0.9)
                 lanes[left], left = q, left + 1
         count = left
 
@@ -885,7 +881,7 @@ def _enter_near(
             if p[ON_CIRCLE] > 0.0:
                 phi, turns = reduced(phi0)
             elif w0 == 0.0:
-                program.bound_near(p, phi0, w0)
+                bounds.bound_near(p, phi0, w0)
             at, rows, codes = row_of(targets, r)[:size], planes[:, r, :size].T, status[r, :size]
             if not begun and at_rest(p, phi, phi0, w0, at, rows, codes):
                 continue
@@ -954,7 +950,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
             own = P[r]
             if not circle:  # where the last step holds
                 own[RADIUS] = hold[REACH, i]
-                for k in range(program.BOUNDS):
+                for k in range(bounds.BOUNDS):
                     own[BOUND_F + k] = hold[HELD + k, i]
             column[i], doubt[i], started[i], ending = _pass(
                 own, T, state, before, fixed, delay[i], i, block, row_of(targets, r)[:size], column[i], doubt[i],

@@ -12,6 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from survey.kernels.cylinder import bounds
 from survey.kernels.cylinder import program as pg
 from survey.kernels.cylinder.lockstep_program import grouped
 from survey.kernels.math import chebyshev
@@ -415,7 +416,7 @@ def limit(rows):
         own = spiky[leads == lead]
         some = rows[own]
         _limit(some)
-        pg.limit_to_shown(some)
+        bounds.limit_to_shown(some)
         rows[own] = some
 
 
@@ -470,6 +471,6 @@ def flows(f, g, points, on_circle):
     longest = max((rows.shape[1] for _, rows in found), default=pg.OPERATIONS)
     out = np.full((len(own), longest), np.nan)
     for served, rows in found:
-        pg.complete(rows, SAMPLES)
+        bounds.complete(rows, SAMPLES)
         out[served] = np.pad(rows, ((0, 0), (0, longest - rows.shape[1])))
     return out[where.reshape(-1)]

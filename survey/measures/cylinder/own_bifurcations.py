@@ -21,7 +21,9 @@ import numpy as np
 
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import program as pg
+from survey.kernels.cylinder.balls import ball
 from survey.kernels.cylinder.flow import TWO_PI
+from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.measures import contours, tracks
 from survey.measures.cylinder import bifurcations, connections, cycle_folds, ends
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
@@ -63,7 +65,7 @@ def _flow(flows, position):
 def series(row, phi):
     """f and g in powers of the angle about phi (7, 2): F0 to G3, each a middle and a radius."""
     balls = np.zeros((int(row[pg.SLOTS]), 4, 2))
-    pg.ball(row, float(phi), 0.0, 4, balls)
+    ball(row, float(phi), 0.0, 4, balls)
     f, g = balls[int(row[pg.F_AT])], balls[int(row[pg.G_AT])]
     return np.concatenate([f[:3], g])
 
@@ -146,7 +148,7 @@ def bend(s):
     pairs = (F2, G1), (F1, G2)
     one, two = (s[i, 0] * s[j, 0] for i, j in pairs)
     bars = [abs(s[i, 0]) * s[j, 1] + abs(s[j, 0]) * s[i, 1] + s[i, 1] * s[j, 1] for i, j in pairs]
-    return one - two, sum(bars) + 4.0 * pg.ROUNDOFF_UP * (abs(one) + abs(two))
+    return one - two, sum(bars) + 4.0 * ROUNDOFF_UP * (abs(one) + abs(two))
 
 
 def _hopfs(plane, part):

@@ -7,8 +7,8 @@ import numba
 import numpy as np
 import pytest
 
+from survey.kernels.cylinder import bounds, flow, program, steps
 from survey.kernels.cylinder import equilibria as eq
-from survey.kernels.cylinder import flow, program, steps
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
 from survey.methods import taylor
@@ -138,8 +138,8 @@ def test_kernels_of_the_gyrostat_compile_no_program():
         program.values,
         program.in_time,
         program.along,
-        program.bound_near,
-        program.longest_step,
+        bounds.bound_near,
+        bounds.longest_step,
     ):
         assert {signature[0].mutable for signature in kernel.signatures} == {True}
 

@@ -8,7 +8,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from survey.kernels.cylinder import bounds
 from survey.kernels.cylinder import program as pg
+from survey.kernels.cylinder.balls import ball
 from survey.kernels.cylinder.steps import OK, TURNING
 from survey.measures.cylinder import equation, solution
 from survey.measures.hill.multiprecision import Unsupported
@@ -20,7 +22,7 @@ RNG = np.random.default_rng(20)
 def ball_of_g(row, phi):
     """What is computed for g at phi, and the bound of its rounding error."""
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
-    pg.ball(row, phi, 0.0, 1, out)
+    ball(row, phi, 0.0, 1, out)
     return out[int(row[pg.G_AT]), 0]
 
 
@@ -108,7 +110,7 @@ def test_series_and_balls_hold_mpmaths(x):
         middle, radius = ball_of_g(row, x)
         assert abs(middle - wanted[0]) <= radius < 1e-13
         row[pg.RADIUS] = 0.1
-        pg.bound_near(row, x, 1.0)
+        bounds.bound_near(row, x, 1.0)
         out, radius = row[pg.BOUND_F :], row[pg.RADIUS]
         assert 1e-3 < radius
         for y in np.linspace(x - radius, x + radius, 5):
@@ -129,7 +131,7 @@ def test_series_and_balls_hold_mpmaths(x):
 def test_balls_beyond_the_domain_of_a_function_have_no_bound(g, x, radius):
     row = equation.program(plain, g, (1.0,), False)
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
-    pg.ball(row, x, radius, 1, out)
+    ball(row, x, radius, 1, out)
     assert out[int(row[pg.G_AT]), 0, 1] == np.inf
 
 
@@ -208,7 +210,7 @@ def test_balls_of_squares_hold_them_and_are_not_negative():
     row = equation.program(plain, lambda x, p: x * x, (1.0,), False)
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
     for x, radius in ((0.3, 1.0), (-2.0, 0.5), (0.0, 3.0)):
-        pg.ball(row, x, radius, 1, out)
+        ball(row, x, radius, 1, out)
         middle, wide = out[int(row[pg.G_AT]), 0]
         low = max(abs(x) - radius, 0.0) ** 2
         assert 0.0 <= low - (middle - wide) < 1e-14
@@ -219,7 +221,7 @@ def test_what_cancels_is_counted_as_rounding():
     row = equation.program(plain, lambda x, p: (x + 1e8) - 1e8, (1.0,), False)
     middle, radius = ball_of_g(row, 0.1)
     assert 1e-9 < abs(middle - 0.1) <= radius < 1e-7
-    pg.bound_near(row, 0.1, 1.0)
+    bounds.bound_near(row, 0.1, 1.0)
     assert row[pg.BOUND_G] > 1e7  # the size of the terms
 
 
