@@ -40,8 +40,11 @@ def as_labelled(key: str, value: Any) -> xr.DataArray:
         raise _not_real(key, value.values if isinstance(given, xr.DataArray) else given)
     if array.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
-    if unnamed and array.ndim == 0 and isinstance(array, np.ndarray):
-        return _a_number().copy(data=np.array(array, dtype=float))
+    if unnamed and isinstance(array, np.ndarray):
+        numbers = np.array(array, dtype=float)
+        return (
+            _a_number().copy(data=numbers) if not array.ndim else xr.DataArray(numbers, dims=(key,))
+        )
     if unnamed:
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
     return (
