@@ -34,8 +34,8 @@ def compiling_ahead(scene, request):
     if not (
         ahead
         and request.method == "auto"
-        and cpus() > 1
         and jit.is_first(_work(ahead, request.options))
+        and cpus() > 1
     ):
         yield
         return

@@ -25,6 +25,7 @@ import threading
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
+from math import log
 
 import numpy as np
 
@@ -49,6 +50,8 @@ from survey.measures.hill.answers import Answers, Asked
 DEGREES = np.array(
     [16, 20, 24, 28, 32, 40, 48, 56, 64, 80, 96, 112, 128, 160, 192, 224, 256, 320, 384]
 )
+# what `_enough` adds to n log(kind)
+_OF_DEGREES = DEGREES * np.log(0.5 * np.e / DEGREES) - 0.5 * np.log(2 * np.pi * DEGREES)
 # A proxy pays if there are this many points, and rows, for each that it solves.
 POINTS_PER_NODE = 3
 ROWS_PER_NODE = 3
@@ -584,10 +587,8 @@ def _enough(kind, rtol):
     |J_n(x)| <= (x/2)^n / n! (DLMF 10.14.4).
     """
     with np.errstate(divide="ignore"):
-        size = DEGREES * np.log(0.5 * np.e / DEGREES * kind[:, None]) - 0.5 * np.log(
-            2 * np.pi * DEGREES
-        )
-    enough = size < np.log(0.01 * rtol)
+        size = DEGREES * np.log(kind)[:, None] + _OF_DEGREES
+    enough = size < log(0.01 * rtol)
     return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
 
 
