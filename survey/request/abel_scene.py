@@ -93,7 +93,7 @@ class AbelScene(FunctionScene):
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
         flows = self._flows(given[:, :-2])
-        if request.method not in ("auto", "taylor"):  # whose kernels bound f and g for every step
+        if not getattr(method, "FLOW_BOUNDS", False):
             self._limit(flows)
         rows = solution.rows(flows, given[:, -2], given[:, -1])
         if question == "trajectory":

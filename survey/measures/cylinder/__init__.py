@@ -17,6 +17,11 @@ from survey.contract import Function, Value
 METHODS = {
     "cylinder": {
         "FLOW_FINEST": Value("the least tolerance of one step that is of use", float, needed=True),
+        "FLOW_BOUNDS": Value(
+            "do `flow_trajectories` and `flow_abels` bound a user's f and g as they go, so that no step passes a "
+            "spike? False if not given",
+            bool,
+        ),
         "FLOW_WORK": Value(
             "how many steps it takes where Taylor's method of order 20 takes one", int, needed=True
         ),
