@@ -212,7 +212,7 @@ def inline(function):
 
 
 def part(function):
-    """As `inline`, but for what a kernel calls in several places: there it is once, and called."""
+    """As `inline`, but left to be called: for what a kernel calls in several places."""
     return _of_callers(function)
 
 

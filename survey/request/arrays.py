@@ -1,5 +1,5 @@
-"""Parameters given from Python, as numbers and arrays: with names for their dimensions, checked, and
-as a grid.
+"""Parameters given as numbers and arrays: their dimensions are named, they are checked, and a grid
+is made of them.
 """
 
 import warnings
@@ -132,6 +132,7 @@ def check_domains(
 
 
 def grid_of(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
+    """The Grid of the parameters; raises BadInput where sizes of a dimension differ."""
     sizes: dict[Hashable, int] = {}
     for key, array in given.items():
         for dim, size in array.sizes.items():

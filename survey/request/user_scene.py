@@ -73,9 +73,9 @@ f and g are run as Python, once for each path that they take at the parameters, 
 operations on phi; the record gives their Taylor series, bounds of them and of their rounding. So
 what depends on phi must be analytic: + - * / ** and functions of math or numpy (sin to atanh, exp
 to log10, sqrt, erf, hypot); what depends on p alone may branch and loop. Numbers in the code are
-taken as exact binary64 numbers. Without a period, every step is checked for what its series leave
-out, and spikes are seen however narrow; with a period they are if they are T/128 wide at half their
-height, and a narrower one may go unseen.
+taken as exact binary64 numbers. Taylor's method checks every step for what its series leave out:
+spikes are seen however narrow. With a period, fates, portraits and other methods take steps no
+longer than the narrowest piece that shows f and g; a spike of 1e-9 of the largest may go unseen.
 
 Where float64 cannot decide a verdict of a Hill equation, the point is solved again in
 double-double, as in built-in scenes: z is run once more, as Python, with mpmath's functions in

@@ -146,7 +146,7 @@ def _extend_balls(p, numbers, known, lanes, width, orders, B, n):
     for i in range(1, number_of(p, FORCES)):
         if known[i]:
             continue
-        code, a, b, number = operation(p, i)
+        code, a, b, _number = operation(p, i)
         x, o, step = 2 * LANES * i, 2 * LANES * (orders * i + n), 2 * LANES
         one, two = step * orders * a, step * orders * b  # of order 0
         if code == CONSTANT:
@@ -175,7 +175,7 @@ def _extend_balls(p, numbers, known, lanes, width, orders, B, n):
         else:
             for q in range(lanes):
                 B[o + q], B[o + LANES + q] = _function_ball(
-                    code, B[one + q], B[one + LANES + q], number
+                    code, B[one + q], B[one + LANES + q], numbers[x + q]
                 )
         if code == DIVIDE or code == OVER:
             for k in range(1, n + 1):
@@ -226,7 +226,8 @@ def _angles(p, phi, radius, orders, B, q):
 @kernel
 def balls(p, numbers, known, phi, radius, B):
     """Fill B, flat (SLOTS, orders, 2, LANES), middles and radii of the Taylor coefficients of every
-    value over the angles within `radius` (lanes) of phi (lanes); `known` ones stand there already.
+    value that f and g need, over the angles within `radius` (lanes) of phi (lanes); those `known`
+    stand there already.
     """
     lanes, orders = len(phi), len(B) // (2 * LANES * number_of(p, SLOTS))
     # a short loop of known length would be unrolled, not vector code
@@ -248,12 +249,12 @@ def balls_of_one(p, numbers, known, phi, radius, B):
 
 @kernel
 def ball(p, phi, radius, orders, B):
-    """As `balls`, of one lane: B (SLOTS, orders, 2)."""
+    """As `balls`, of one lane: B (SLOTS, orders, 2), of which the first FORCES are filled."""
     count = number_of(p, SLOTS)
     numbers, flat = np.empty((2 * count, LANES)), np.empty(count * orders * 2 * LANES)
     note(p, numbers, 0, 1)
     balls_of_one(p, numbers.ravel(), np.zeros(count, np.bool_), phi, radius, flat)
-    for i in range(count):
+    for i in range(number_of(p, FORCES)):
         for n in range(orders):
             at = 2 * LANES * (orders * i + n)
             B[i, n, 0], B[i, n, 1] = flat[at], flat[at + LANES]

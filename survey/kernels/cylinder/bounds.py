@@ -28,11 +28,11 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 # Bounds of |f| and |f'|, of |g|, of |g'|, of |g''|, as they stand in p from BOUND_F on; then the sizes
 # of the series of f and of g, each before what it leaves out.
-_ON_F, _ON_G, _ON_DG, _ON_DDG, SHOWN_F, MORE_F, SHOWN_G, MORE_G = range(8)
+ON_F, ON_G, ON_DG, ON_DDG, SHOWN_F, MORE_F, SHOWN_G, MORE_G = range(8)
 BOUNDS, KNOWN = 4, 8
 LEAST_RADIUS = 1e-9
-# On a line, f and g are bounded over an interval with as many of their derivatives. What their series
-# leave out, as these bound it, is to be at most HIDDEN of them, unless the interval is as narrow as FINE.
+# f and g are bounded over an interval with DERIVATIVES of their derivatives; what their series leave
+# out, as these bound it, may be HIDDEN of them, unless the interval is narrower than FINE.
 DERIVATIVES, HIDDEN, FINE = 6, 1e-3, 1e-6
 NEGLIGIBLE = 1e-18  # what changes w by such a share may be left out
 WEAK = 1e-9  # of the largest on the circle, where steps have the same limit all round it
@@ -52,17 +52,17 @@ def raised(p, points, over, q, out):
     orders = len(over) // len(points)
     at_f, at_g = orders * step * f + q, orders * step * g + q
     most_f = 1.0001 * max(largest(over, at_f), largest(over, at_f + step))
-    out[_ON_F] = max(out[_ON_F], rounded_f / ROUNDOFF_UP, most_f)
-    out[_ON_G] = max(out[_ON_G], rounded_g / ROUNDOFF_UP, 1.0001 * largest(over, at_g))
-    out[_ON_DG] = max(out[_ON_DG], 1.0001 * largest(over, at_g + step))
-    out[_ON_DDG] = max(out[_ON_DDG], 2.0001 * largest(over, at_g + 2 * step))
+    out[ON_F] = max(out[ON_F], rounded_f / ROUNDOFF_UP, most_f)
+    out[ON_G] = max(out[ON_G], rounded_g / ROUNDOFF_UP, 1.0001 * largest(over, at_g))
+    out[ON_DG] = max(out[ON_DG], 1.0001 * largest(over, at_g + step))
+    out[ON_DDG] = max(out[ON_DDG], 2.0001 * largest(over, at_g + 2 * step))
 
 
 @kernel
 def bounded(p, points, over, q, radius, w, out):
     """Fill `out` (KNOWN) with the bounds that hold within `radius` in lane q, see `raised`, and the
-    sizes of the series of f and of g, the middles of `over`, each before what it leaves out at most.
-    Returns `hidden`.
+    size of the series of f and of g, the middles of `over`, each before what it leaves out at most;
+    returns `hidden`.
     """
     for k in range(KNOWN):
         out[k] = 0.0
@@ -77,8 +77,8 @@ def bounded(p, points, over, q, radius, w, out):
 
 @inline
 def hidden(f, more_f, g, more_g, radius, w):
-    """How much of f w + g series of these sizes leave out at most, within the radius, by these
-    bounds: up to 1, little enough.
+    """What series of these sizes leave out of f w + g within the radius, relative to what is
+    allowed: up to 1 is little enough.
     """
     w = abs(w) + math.sqrt(radius * g)
     enough = HIDDEN * (f * w + g) + NEGLIGIBLE * w * w / radius + 1e-300
@@ -246,7 +246,7 @@ def complete(rows, angles):
 @kernel
 def limit_to_shown(rows):
     """Limit RADIUS of programs on the circle, all of one length, to the half-width of pieces that show all
-    that f and g have in them, where their bounds are finite: pieces of LONGEST, or shorter ones where
+    that f and g have in them, where their bounds are finite: 128 equal pieces, or shorter ones where
     these leave out more than HIDDEN, and than WEAK of the largest.
     """
     if len(rows) == 0:
@@ -305,7 +305,9 @@ def _all_shown(f, more_f, g, more_g, weak_f, weak_g):
 
 @inline
 def wider(left_out):
-    """By what factor the radius may change where so much is left out: see `hidden`."""
+    """The factor by which the radius may change after a share `left_out` (see `hidden`): 0.1 is
+    aimed at.
+    """
     return min(max((0.1 / (left_out + 1e-300)) ** (1.0 / DERIVATIVES), 0.25), 2.0)
 
 
@@ -333,6 +335,9 @@ def bound_near(p, phi, w):
 
 @inline
 def leaving_at_most(factor, most_f, most_g, radius, w):
+    """As `leaving`, where |w| grows to at most `factor` |w| + sqrt(radius g), and changes by at most
+    (`factor` - 1) |w| + sqrt(radius g).
+    """
     root = math.sqrt(radius * most_g) + 1e-300
     most = factor * w + root
     return max(most / radius, (most_f * most + most_g) / ((factor - 1.0) * w + root))

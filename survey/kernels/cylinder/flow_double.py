@@ -474,7 +474,7 @@ def passed(p, start, turns, origin, first, targets, floats, status):
         if started and not w[0] > 2.0 * bar_w:
             ending = SEPARATRIX
             break
-        if j < size and runs_into_node(p, phi[0], w[0], unturned(targets[j], turns)):
+        if j < size and runs_into_node(p, phi[0], w[0], unturned(targets[j], turns), 0.0):
             ending = EQUILIBRIUM
             break
     conclude(ending, doubt, j, floats, status)

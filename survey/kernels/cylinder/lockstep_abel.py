@@ -297,7 +297,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     if started and not v1 > 2.0 * bar_w:
         return j, doubt, started, SEPARATRIX
     started = started or v1 > 2.0 * bar_w
-    if j < size and runs_into_node(constant(q), x1, v1, unturned(targets[j], turns) - angle):
+    if j < size and runs_into_node(constant(q), x1, v1, unturned(targets[j], turns) - angle, 0.0):
         return j, doubt, started, EQUILIBRIUM
     return j, doubt, started, (_GOING if j < size or doubt >= 0 else OK)
 

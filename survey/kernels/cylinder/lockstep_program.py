@@ -4,8 +4,8 @@ points, and in time.
 All lanes run one program, each with its own numbers, operation by operation (see `program`): series
 S[value, order, lane]. Steps, error bounds and what is noted at angles and times are those of
 `lockstep_phi` and `lockstep`, which see only the series of f, g, g' and bounds of them. Those hold
-on the whole circle where f and g are simple; else steps stay where bounds hold that are found, as
-they go, for some way ahead. On a line phi is counted from its value at the start of the step.
+on the whole circle where f and g are simple; elsewhere bounds are found for some way ahead, and
+steps stay where they hold. On a line phi is counted from its value at the start of the step.
 
 A value that is a polynomial in phi has no orders above its degree, and these are not computed.
 """
@@ -19,6 +19,7 @@ from survey.kernels.cylinder import lockstep_abel as near
 from survey.kernels.cylinder import lockstep_phi as far
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.balls import VECTOR
+from survey.kernels.cylinder.bounds import ON_DG, ON_F, ON_G
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, TWO_PI_LOW, reduced
 from survey.kernels.cylinder.lockstep import (
     DG,
@@ -112,8 +113,8 @@ LEFT_OUT, CENTRE, REACH, HELD = range(4)
 HOLD = HELD + bounds.KNOWN
 # of the half width: how far ahead the middle is, and the least way ahead that serves another step
 AHEAD, ENOUGH = 0.85, 0.9
-# w keeps its sign for a way r if w^2 is so many times as large as r |g|: it falls to 0.75 w - sqrt(r |g|)
-# at least (see `bounds.leaving_at_most`)
+# w keeps its sign over a way r if w^2 > ONE_WAY r |g|: it stays above 0.75 w - sqrt(r |g|) > 0 (see
+# `bounds.leaving_at_most`)
 ONE_WAY = 2.0
 FREE = (
     4.0  # |phi| up to which the rounding of phi is counted in every step (see `lockstep.ellipse`)
@@ -327,7 +328,7 @@ def _room(hold, q, phi, w):
     """(how far phi of lane q may move until its bounds end, does w keep its sign on that way?)."""
     away, reach = phi - hold[CENTRE, q], hold[REACH, q]
     ahead = reach - (away if w > 0.0 else -away)
-    one_way = w * w > ONE_WAY * ahead * hold[HELD + 1, q]
+    one_way = w * w > ONE_WAY * ahead * hold[HELD + ON_G, q]
     return (ahead if one_way else reach - abs(away)), one_way
 
 
@@ -335,7 +336,7 @@ def _room(hold, q, phi, w):
 def _rate(hold, q, phi, w):
     """A rate: for the time 1 / rate the angle of lane q stays where its bounds hold."""
     room, one_way = _room(hold, q, phi, w)
-    most_f, most_g, room = hold[HELD, q], hold[HELD + 1, q], max(room, 1e-300)
+    most_f, most_g, room = hold[HELD + ON_F, q], hold[HELD + ON_G, q], max(room, 1e-300)
     if not one_way:
         return bounds.leaving(most_f, most_g, room, abs(w))
     slow = bounds.leaving_at_most(1.05, most_f, most_g, room, abs(w))
@@ -356,9 +357,9 @@ def _serves(hold, q, phi, w):
 
 @splice
 def _bound(p, N, phi, w, row, tables, hold):
-    """Have all lanes that are not free `hold` bounds of f, g, g', g'' about phi or an angle ahead of it,
-    within a radius that changes as what the last one left out lets it: see `bounds.bounded`. Those of
-    earlier steps are kept as long as they serve.
+    """Find bounds of f, g, g', g'' for the busy lanes whose last ones no longer serve, about phi or an
+    angle ahead of it, and keep them in `hold`; the radius follows from what the last ones left out (see
+    `bounds.bounded`).
     """
     points, over, known, out, numbers, centres, radii, lanes = tables
     none, count = np.zeros(LANES), 0
@@ -371,7 +372,7 @@ def _bound(p, N, phi, w, row, tables, hold):
         for j in range(count):
             q = lanes[j]
             radius, speed = hold[REACH, q], abs(w[q])
-            one_way = speed * speed > ONE_WAY * 2.0 * radius * hold[HELD + 1, q]
+            one_way = speed * speed > ONE_WAY * 2.0 * radius * hold[HELD + ON_G, q]
             shift = (AHEAD if w[q] > 0.0 else -AHEAD) * radius if one_way else 0.0
             centres[j], radii[j], hold[CENTRE, q] = phi[q] + shift, radius, phi[q] + shift
             for k in range(0, len(N), LANES):
@@ -451,11 +452,11 @@ def _begin(circle, state, fixed, phi):
 
 @splice
 def _stay(state, fixed, phi, hold):
-    """Note the bounds, and those that keep `lockstep.advance` where they hold."""
+    """Note the bounds, that of g' raised so that `lockstep.advance` stays where they hold."""
     for i in range(LANES):
         rate = _rate(hold, i, phi[i], state[V, i])
-        fixed[PF, i], fixed[PG, i] = hold[HELD, i], hold[HELD + 1, i]
-        fixed[PDG, i] = max(hold[HELD + 2, i], rate * rate)
+        fixed[PF, i], fixed[PG, i] = hold[HELD + ON_F, i], hold[HELD + ON_G, i]
+        fixed[PDG, i] = max(hold[HELD + ON_DG, i], rate * rate)
 
 
 @splice
@@ -646,8 +647,8 @@ def abels(P, leads, lead, starts, targets, tolerance, limit, ahead, planes, stat
             for i in range(LANES):
                 # a step of at most 0.8 of what is left, on which series fall: see `lockstep_phi._advance`
                 left = hold[CENTRE, i] + hold[REACH, i] - state[far.AT, i]
-                fixed[BOUND_F, i] = max(hold[HELD, i], 0.625 * state[far.W, i] / left)
-                fixed[BOUND_G, i] = hold[HELD + 1, i]
+                fixed[BOUND_F, i] = max(hold[HELD + ON_F, i], 0.625 * state[far.W, i] / left)
+                fixed[BOUND_G, i] = hold[HELD + ON_G, i]
         _in_angle(p, operations, N, degree, S, K, state[far.AT], state[far.W], forms, width)
         for n in range(far.ORDER):
             for i in range(LANES):
@@ -832,7 +833,7 @@ def _pass(p, T, state, before, fixed, delay, i, block, targets, j, doubt, starte
     if started and not v1 > 2.0 * bar_w:
         return j, doubt, started, SEPARATRIX
     started = started or v1 > 2.0 * bar_w
-    if j < size and runs_into_node(p, x1 + angle, v1, unturned(targets[j], turns)):
+    if j < size and runs_into_node(p, x1 + angle, v1, unturned(targets[j], turns), 0.0):
         return j, doubt, started, EQUILIBRIUM
     return j, doubt, started, (GOING if j < size or doubt >= 0 else OK)
 
@@ -948,8 +949,9 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
                 continue
             r, size = row[i], sizes[i]
             own = P[r]
-            if not circle:  # where the last step holds
-                own[RADIUS] = hold[REACH, i]
+            if not circle:  # how far ahead the bounds hold, and these
+                end = state[PSI, i] + fixed[TURN, i]
+                own[RADIUS] = max(hold[CENTRE, i] + hold[REACH, i] - end, 0.0)
                 for k in range(bounds.BOUNDS):
                     own[BOUND_F + k] = hold[HELD + k, i]
             column[i], doubt[i], started[i], ending = _pass(

@@ -305,9 +305,9 @@ def node_possible(f, g, dg, bend):
 
 
 @kernel
-def node_ahead(p, phi, w):
+def node_ahead(p, phi, w, moved):
     """Distance to a stable node ahead that the solution at (phi, w > 0) certainly runs into without
-    turning, or -1.
+    turning, or -1. It has `moved` so far since bounds were found that hold within p[RADIUS].
     """
     f, g, dg = values(p, phi)
     if not node_possible(f, g, dg, p[BOUND_F] + p[BOUND_DDG]):
@@ -324,17 +324,19 @@ def node_ahead(p, phi, w):
     gap = x - phi
     if not (dg < 0.0 and f < 0.0 and abs(g) < 1e-13 * p[BOUND_G] and 1e-11 < gap < 0.3):
         return -1.0
-    if not on_circle(p) and gap > p[RADIUS]:
+    if not on_circle(p) and gap > p[RADIUS] - moved:
         return -1.0
     return gap if settled(p, f, dg, -gap, w) else -1.0
 
 
 @inline
-def runs_into_node(p, phi, w, target):
-    """Does the solution at (phi, w > 0) certainly end in a stable node that it meets before the target?"""
+def runs_into_node(p, phi, w, target, moved):
+    """Does the solution at (phi, w > 0) certainly end in a stable node that it meets before the target?
+    `moved` as in `node_ahead`.
+    """
     if not w < 0.3 * p[BOUND_G] / (p[BOUND_F] + 1e-300):
         return False
-    gap = node_ahead(p, phi, w)
+    gap = node_ahead(p, phi, w, moved)
     return gap > 0.0 and target >= phi + gap
 
 
@@ -439,7 +441,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
                     floats[i, rc.VALUE_BAR] = edge + 4e-16 * abs(floats[i, rc.VALUE])
                     floats[i, rc.TIME_BAR] = bar_t * 1.2
             return
-        phi, w = x1, v1
+        moved, phi, w = x1 - phi, x1, v1
         t, t_low = later(t, t_low, h)
         if on_circle(p):
             phi, k = wrapped(phi)
@@ -451,7 +453,7 @@ def abel(setting, begin, at, p, phi0, w0, targets, tolerance, limit, floats, sta
         if started and not w > 2.0 * bar_w:
             ending = SEPARATRIX
             break
-        if j < size and runs_into_node(p, phi, w, unturned(targets[j], turns)):
+        if j < size and runs_into_node(p, phi, w, unturned(targets[j], turns), moved):
             ending = EQUILIBRIUM
             break
     conclude(ending, doubt, j, floats, status)

@@ -1,8 +1,9 @@
 """What a process of its own compiles at the first use of a question (see
 `survey.sweep.compile_ahead`).
 
-The kernels are called on nothing. They are those that come with and after the cycles of fates and
-portraits, one of the two of Abel's equation, or the trajectories of a user's f and g.
+The kernels are called on no rows, and `crept` on a program of zeros. They are those that come with
+and after the cycles of fates and portraits, one of the two of Abel's equation, or the trajectories
+of a user's f and g.
 """
 
 import numpy as np
@@ -12,7 +13,7 @@ from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.equilibria import EQUILIBRIUM_SIZE
 from survey.kernels.cylinder.flow import coefficients
-from survey.kernels.cylinder.program import COLUMNS
+from survey.kernels.cylinder.program import OPERATIONS, WIDTH
 from survey.kernels.cylinder.returns import CYCLE_SIZE
 from survey.methods import taylor
 
@@ -24,7 +25,7 @@ def compile_ahead(variables, options):
 
 def of_functions(variables, options):
     """For a user's f and g."""
-    yield from _compile(np.zeros(COLUMNS + 1), options, own=True)
+    yield from _compile(np.zeros(OPERATIONS + WIDTH), options, own=True)
 
 
 def _compile(p, options, own):
@@ -37,7 +38,7 @@ def _compile(p, options, own):
     eqs = np.empty((0, EQUILIBRIUM_SIZE))
     fates = question in ("fate", "portrait") and "separatrix" not in options
     if fates and own:
-        # cycles need it, too: the other process finds it when it comes to them
+        # first, as the main process needs it for cycles as well
         creeping.crept(p, eqs, 0, 0.0, 0.0, 0.0, 0.0, True, 0.0, np.empty(creeping.PASSAGE))
     if question == "portrait":
         planes, status = np.empty((rc.STATE, 0, 2)), np.empty((0, 2), np.int8)

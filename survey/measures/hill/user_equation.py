@@ -49,7 +49,7 @@ BY_PHASE = 0.15
 # spike unseen.
 STRIDE = 0.5
 CALL_SAMPLES = 4_000_000
-MOST = np.finfo(float).max
+LARGEST = np.finfo(float).max  # for infinity
 # So few points are asked one by one whether z may have spikes.
 FEW = 8
 # The most steps in double-double: 20 ms a hundred.
@@ -282,8 +282,8 @@ def unprobed(z, points, edges, slack, size):
 
 
 def _largest(values):
-    """The largest size of the known values (N, n) of each column, a list of finite numbers."""
-    return np.fmin(np.fmax.reduce(abs(values), axis=0, initial=0.0), MOST).tolist()
+    """The largest |value| of each column of (N, n): NaN left out, infinity as the largest number."""
+    return np.fmin(np.fmax.reduce(abs(values), axis=0, initial=0.0), LARGEST).tolist()
 
 
 class Measured(NamedTuple):
@@ -356,8 +356,8 @@ def measured(z, points, edges, period, slack, probes=PROBES):
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
             if number == SIZES[0]:
                 own = own[smooth]
-                known_so = unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])
-                smooth = smooth[~known_so]
+                spikeless = unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])
+                smooth = smooth[~spikeless]
             some = some[smooth]
             if not some.size:
                 continue

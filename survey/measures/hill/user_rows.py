@@ -17,6 +17,9 @@ import numpy as np
 from survey.measures.hill import monodromy, user_equation
 from survey.measures.hill.user_equation import Steps, at, measured
 
+# What the rounding of z is relative to, as a multiple of max |z|, where z is a mean: five roundings more.
+MEAN = 1.7
+
 
 @dataclass(frozen=True)
 class Axes:
@@ -56,7 +59,8 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, corners=None)
         return monodromy.RowSizes(np.where(bad, np.nan, own.end), bound, own.rates)
 
     def sample(rows, nodes, number):
-        if corners and edges.shape[1] == 2:  # the same steps in all rows
+        # one piece, whose ends depend on neither axis: all rows have the same steps
+        if corners and edges.shape[1] == 2:
             u = steps().at_nodes(rows[:1], nodes, number)
             low, high = corners.sampled(points[rows], u)
         else:
@@ -107,8 +111,8 @@ def _measured(z, axes, points, ranges, even):
 
 @dataclass(frozen=True)
 class _Corners:
-    """The corners of a map of whose two axes z is a linear function: of it, and of what steps need
-    of it, all rows have means of what both `ends` (2, n) of the axis across them have.
+    """A map on whose two axes z depends linearly: z in a row, and what its steps need of it, is a
+    mean of what it is at the two `ends` (2, n) of the axis across the rows.
     """
 
     z: Callable
@@ -121,8 +125,9 @@ class _Corners:
     def _between(self, points):
         """The weights (2, R) of both ends across the rows."""
         low, high = self.ends[:, self.axes.across]
-        share = (points[:, self.axes.across] - low) / (high - low)
-        return np.stack([1.0 - share, share])
+        x = np.clip(points[:, self.axes.across], low, high)
+        # no 1 - share: next to an end where z is small by far its rounding would count
+        return np.stack([high - x, x - low]) / (high - low)
 
     def measured(self, points):
         """What `_measured` says of rows of `points` (R, n)."""
@@ -131,7 +136,7 @@ class _Corners:
         return (
             np.einsum("ekp,kr->erp", self.size, between),
             np.repeat(self.rate.max(axis=0)[None], len(points), axis=0),
-            np.where(known, self.scale @ between, np.nan),
+            np.where(known, MEAN * (self.scale @ between), np.nan),
             np.zeros(len(points), bool),
         )
 
@@ -164,9 +169,9 @@ def _row_axis(z, key, axes, points, ranges, even, corners):
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
         lanes = np.zeros((positions.size, 0))
-        return problem(z, key, Axes(axes.lane, axes.line), own, lanes, ranges, even, None, corners)[
-            0
-        ]
+        along = Axes(axes.lane, axes.line)
+        own, _rough, _bad = problem(z, key, along, own, lanes, ranges, even, None, corners)
+        return own
 
     return monodromy.RowAxis((key, axes, others), *axes.row_line, at=rows_at)
 

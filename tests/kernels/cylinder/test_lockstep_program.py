@@ -105,3 +105,23 @@ def test_rounding_far_out_on_a_line_is_counted():
     rows = solution.rows(row[None], [1000.1], [1.0])
     (found,), _turnings, _status = solution.trajectories(taylor, rows, np.array([[500.0]]), 1e-9)
     assert abs(found[0, 0] - (1000.1 + 500.0)) <= found[0, 2] and found[0, 2] > 1e-13
+
+
+def test_bounds_take_the_exponent_of_their_own_row():
+    def power(x, p):
+        return -x * (2.0 + 0.5 * x * x) ** p[0]
+
+    def answers(exponents):
+        points = np.stack([exponents, np.ones_like(exponents)], axis=1)
+        starts = np.full(len(points), -1.0), np.full(len(points), 2.0)
+        rows = solution.rows(equation.flows(lambda x, p: -0.1, power, points, False), *starts)
+        floats, _turnings, status = solution.trajectories(
+            taylor, rows, np.full((len(points), 1), 3.0), 1e-9
+        )
+        assert (status == OK).all()
+        return floats
+
+    exponents = np.array([-3.7, 4.7, 0.37, 2.3])
+    together = answers(exponents)
+    for i in range(len(exponents)):
+        assert (together[i] == answers(exponents[i : i + 1])[0]).all()

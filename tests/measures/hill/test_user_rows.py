@@ -2,6 +2,7 @@
 
 from math import cos, exp, pi, sin
 
+import mpmath
 import numpy as np
 import pytest
 import xarray as xr
@@ -164,3 +165,26 @@ def test_a_row_that_is_rough_leaves_the_others():
         abs(ds.discriminant - free).drop_sel(c=0.25)
         <= ds.discriminant_error.drop_sel(c=0.25) + 1e-14
     ).all()
+
+
+def test_bars_hold_where_z_is_smaller_by_far_than_in_other_corners_of_the_map():
+    scene = survey.hill(
+        lambda u, p: p[0] - 2 * p[1] * cos(2 * u), period=pi, parameters=("a", "q"), even=True
+    )
+    a, q = np.append(-np.geomspace(300.0, 1e-6, 100), 0.0), np.linspace(0.0, 1e-6, 101)
+    dense = survey.evaluate(scene, a=a, q=q, variables=["discriminant", "exponent", "verdict"])
+    known = dense.isel(q=0)
+    with mpmath.workdps(30):
+        right = [2 * mpmath.cosh(mpmath.pi * mpmath.sqrt(-mpmath.mpf(float(x)))) for x in a]
+        off = [
+            abs(mpmath.mpf(float(d)) - r) for d, r in zip(known.discriminant, right, strict=True)
+        ]
+    assert (np.array(off, float) <= known.discriminant_error.values).all()
+    assert (known.discriminant_error <= 1e-10 * (1 + abs(known.discriminant))).all()
+    some = np.arange(0, 101, 5)
+    alone = survey.evaluate(
+        scene, a=xr.DataArray(a[some], dims="i"), q=0.0, variables=["exponent"], method="dop853"
+    )
+    apart = abs(known.exponent.values[some] - alone.exponent.values)
+    bars = known.exponent_error.values[some] + alone.exponent_error.values
+    assert (apart <= bars).all()
