@@ -8,7 +8,6 @@ four corners of the map, and what steps need is measured there. All depends on t
 axes, never on the block.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,9 +15,6 @@ import numpy as np
 
 from survey.measures.hill import monodromy, user_equation
 from survey.measures.hill.user_equation import Steps, at, measured
-
-# What the rounding of z is relative to, as a multiple of max |z|, where z is a mean: five roundings more.
-MEAN = 1.7
 
 
 @dataclass(frozen=True)
@@ -34,18 +30,17 @@ class Axes:
     linear: bool = False
 
 
-def problem(z, key, axes, points, lanes, ranges, even, exact=None, corners=None):
+def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
     """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), where a row is `rough` (R),
     and where its span is NaN, as z is rough or not finite (R).
 
     `ranges(points)` gives periods, edges and slack as `user_equation` takes them; what it gives,
-    and z, is named by the hashable `key`. `corners` are those of their map, if known.
+    and z, is named by the hashable `key`. `known`: what `_from_corners` gave for their map.
     """
     _, edges, slack = ranges(points)
-    corners = corners or _corners(z, axes, points, ranges, even)
-    sizes, rate, scale, rough = (
-        corners.measured(points) if corners else _measured(z, axes, points, ranges, even)
-    )
+    ends = [_with(points, axes.lane, end) for end in axes.line[1:]]
+    known = known or _from_corners(z, axes, points, ranges, even)
+    sizes, rate, scale, rough = known(points) if known else _measured(z, axes, points, ranges, even)
     bad = rough | np.isnan(scale)
 
     @cache
@@ -59,17 +54,8 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, corners=None)
         return monodromy.RowSizes(np.where(bad, np.nan, own.end), bound, own.rates)
 
     def sample(rows, nodes, number):
-        # one piece, whose ends depend on neither axis: all rows have the same steps
-        if corners and edges.shape[1] == 2:
-            u = steps().at_nodes(rows[:1], nodes, number)
-            low, high = corners.sampled(points[rows], u)
-        else:
-            u = steps().at_nodes(rows, nodes, number)
-            low, high = (
-                at(z, _with(points[rows], axes.lane, end), u.reshape(rows.size, -1))
-                for end in axes.line[1:]
-            )
-        low, high = (values.reshape(-1, *u.shape[1:]) for values in (low, high))
+        u = steps().at_nodes(rows, nodes, number)
+        low, high = (at(z, end[rows], u.reshape(rows.size, -1)).reshape(u.shape) for end in ends)
         out = np.zeros((rows.size, number, 2, nodes.size + 1))
         out[:, :, 1, :-1] = (high - low) / (axes.line[2] - axes.line[1])
         out[:, :, 0, :-1] = low - axes.line[1] * out[:, :, 1, :-1]
@@ -89,7 +75,7 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, corners=None)
         p=lanes, sizes=sizes_of_rows, c2=0.0,
         sample=sample, walk=walk, cut=lambda rows, number: steps().of(rows, number)[1], full_period=not even,
         exact=exactly if exact else None, line=axes.line,
-        row_axis=_row_axis(z, key, axes, points, ranges, even, corners) if axes.across is not None else None,
+        row_axis=_row_axis(z, key, axes, points, ranges, even, known) if axes.across is not None else None,
         positions=points[:, axes.across] if axes.across is not None else None,
     )  # fmt: skip
     return own, rough, bad
@@ -109,59 +95,33 @@ def _measured(z, axes, points, ranges, even):
     return size, rate.max(axis=0), scale.max(axis=0), rough.any(axis=0)
 
 
-@dataclass(frozen=True)
-class _Corners:
-    """A map on whose two axes z depends linearly: z in a row, and what its steps need of it, is a
-    mean of what it is at the two `ends` (2, n) of the axis across the rows.
+def _from_corners(z, axes, points, ranges, even):
+    """The function of points (R, n) that gives what `_measured` does, bounds from the corners of their
+    map; None where z has to be measured row by row.
     """
-
-    z: Callable
-    axes: Axes
-    ends: np.ndarray
-    size: np.ndarray
-    rate: np.ndarray
-    scale: np.ndarray
-
-    def _between(self, points):
-        """The weights (2, R) of both ends across the rows."""
-        low, high = self.ends[:, self.axes.across]
-        x = np.clip(points[:, self.axes.across], low, high)
-        # no 1 - share: next to an end where z is small by far its rounding would count
-        return np.stack([high - x, x - low]) / (high - low)
-
-    def measured(self, points):
-        """What `_measured` says of rows of `points` (R, n)."""
-        between = self._between(points)
-        known = np.isfinite(points).all(axis=1)
-        return (
-            np.einsum("ekp,kr->erp", self.size, between),
-            np.repeat(self.rate.max(axis=0)[None], len(points), axis=0),
-            np.where(known, MEAN * (self.scale @ between), np.nan),
-            np.zeros(len(points), bool),
-        )
-
-    def sampled(self, points, u):
-        """z (R, M) at both ends of the rows of `points` (R, n), at M positions u."""
-        first, last = self._between(points)[:, :, None]
-        for end in self.axes.line[1:]:
-            known = at(
-                self.z, _with(self.ends, self.axes.lane, end), np.tile(u.reshape(-1), (2, 1))
-            )
-            yield first * known[0] + last * known[1]
-
-
-def _corners(z, axes, points, ranges, even):
-    """The _Corners of the map of `points` (R, n); None where z has to be measured row by row."""
     if not axes.linear:
         return None
-    ends = _with(np.repeat(points[:1], 2, axis=0), axes.across, axes.row_line[1:])
+    low, high = axes.row_line[1:]
+    ends = np.concatenate([_with(points[:1], axes.across, end) for end in (low, high)])
     size, rate, scale, rough = _measured(z, axes, ends, ranges, even)
     if rough.any() or np.isnan(scale).any():
         return None
-    return _Corners(z, axes, ends, size, rate, scale)
+
+    def at_rows(points):
+        x = np.clip(points[:, axes.across], low, high)
+        between = np.stack([high - x, x - low]) / (high - low)
+        known = np.isfinite(points).all(axis=1)
+        return (
+            np.einsum("ekp,kr->erp", size, between),
+            np.repeat(rate.max(axis=0)[None], len(points), axis=0),
+            np.where(known, scale @ between, np.nan),
+            np.zeros(len(points), bool),
+        )
+
+    return at_rows
 
 
-def _row_axis(z, key, axes, points, ranges, even, corners):
+def _row_axis(z, key, axes, points, ranges, even, known):
     """The axis across the rows; all other parameters are the same in these `points`."""
     same = points[:1]
     others = tuple(np.delete(same[0], [axes.lane, axes.across]).tolist())
@@ -169,9 +129,7 @@ def _row_axis(z, key, axes, points, ranges, even, corners):
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
         lanes = np.zeros((positions.size, 0))
-        along = Axes(axes.lane, axes.line)
-        own, _rough, _bad = problem(z, key, along, own, lanes, ranges, even, None, corners)
-        return own
+        return problem(z, key, Axes(axes.lane, axes.line), own, lanes, ranges, even, None, known)[0]
 
     return monodromy.RowAxis((key, axes, others), *axes.row_line, at=rows_at)
 
@@ -181,8 +139,8 @@ def box(z, key, axes, point, ranges, even):
     of a `point`.
     """
     point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
-    corners = _corners(z, axes, point, ranges, even)
-    row_axis = _row_axis(z, key, axes, point, ranges, even, corners)
+    known = _from_corners(z, axes, point, ranges, even)
+    row_axis = _row_axis(z, key, axes, point, ranges, even, known)
     return monodromy.Box(row_axis, axes.line, full_period=not even)
 
 
