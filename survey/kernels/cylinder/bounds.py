@@ -210,8 +210,6 @@ def complete(rows, angles):
         if good:
             known[0] = True
             unchanged(p, last, known)
-            for k in range(len(p)):
-                last[k] = p[k]
             note(p, numbers, 0, LANES)
             for k in range(batches):
                 phi = at[k * LANES : k * LANES + lanes[k]]
@@ -263,8 +261,6 @@ def limit_to_shown(rows):
             continue
         known[0] = True
         unchanged(p, last, known)
-        for k in range(len(p)):
-            last[k] = p[k]
         note(p, numbers, 0, LANES)
         f, g, N = int(p[F_AT]), int(p[G_AT]), numbers.ravel()
         for k in range(4):

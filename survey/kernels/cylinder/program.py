@@ -173,7 +173,9 @@ def note(p, numbers, first, end):
 
 @kernel
 def unchanged(p, last, known):
-    """Fill `known` with which values of the program p are those of the program in `last`."""
+    """Fill `known` with which values of the program p are those of the program in `last`, which then
+    becomes p.
+    """
     count = number_of(p, SLOTS)
     for i in range(1, count):
         known[i] = True
@@ -188,6 +190,8 @@ def unchanged(p, last, known):
             of_two = code == CONSTANT or code == PLUS or code == FROM or code == TIMES or known[b]
             if known[i] and not (of_one and of_two):
                 known[i], found = False, True
+    for k in range(len(p)):
+        last[k] = p[k]
 
 
 @kernel
@@ -208,8 +212,6 @@ def sampled(rows, out):
         known[0] = p[MIRRORED] == signed
         unchanged(p, last, known)
         signed = p[MIRRORED]
-        for k in range(len(p)):
-            last[k] = p[k]
         for j in range(n if not known[0] else 0):
             S[0, j] = signed * (j * (2.0 * math.pi / n))
         for i in range(1, count):
