@@ -59,7 +59,7 @@ from survey.kernels.unroll import (
 )
 
 ORDER = 16
-VARIED = 4  # order of the integral of g / w^2
+VARIED = 6  # order of the integral of g / w^2
 # Rows of the series: f / w0 and g / w0^2, or what they are made of; omega, q, r, and the integral of r.
 F_, G_, OMEGA = 0, ORDER, 2 * ORDER
 Q, R = OMEGA + ORDER + 1, OMEGA + 2 * ORDER + 1
@@ -230,15 +230,22 @@ def _elapsed(integral, s):
 
 @unroll
 def _contracted(q, r, h):
-    """What dw has been multiplied by at h: exp(-integral of g / w^2), to 1 %."""
+    """What dw has been multiplied by at h, exp(-integral of g / w^2), and a bound of its relative error."""
     rates = [
         summed(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)
     ]
-    half = 0.0625 * h * polynomial(rates, h)  # of an eighth of the exponent
+    exponent = h * polynomial(rates, h)
+    half = 0.0625 * exponent  # of an eighth of it
     part = (1.0 - half) / (1.0 + half)
     part *= part
     part *= part
-    return part * part
+    power = h
+    for _ in range(VARIED - 2):
+        power = power * h
+    # the last terms, of which some may be small by accident
+    last, previous, third = (abs(rates[VARIED - n]) for n in range(3))
+    left = ((last * h + previous) * h + 0.1 * third) * power
+    return part * part, left + abs(exponent) * exponent * exponent * (1.0 / 700.0) + 1e-14
 
 
 @inline
@@ -283,7 +290,9 @@ def _advance(T, state, before, step, fixed, tolerance):
         bound, most = state[W_BOUND, i], 1.0 / (lowest * lowest)
         grown = h * most_g * most
         within = bound * (1.0 + grown + grown * grown) + local  # grown < 1
-        now = 1.02 * _contracted(_low_q(T, i), r, h) * bound + local
+        contracted, doubt = _contracted(_low_q(T, i), r, h)
+        doubt += 2.0 * grown * bound * inverse  # the square of the error
+        now = contracted * (1.0 + doubt) * bound + local
         step[W_WITHIN, i], step[LOWEST, i], step[STEEPEST, i] = within, lowest, slope
         high = state[TIME, i] + spent
         state[TIME_LOW, i] += spent - (high - state[TIME, i])

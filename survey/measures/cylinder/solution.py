@@ -10,7 +10,7 @@ import numpy as np
 from survey import waiting
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.accuracy import all_within
-from survey.kernels.cylinder.flow import spread, spread_programs
+from survey.kernels.cylinder.flow import BOUND_F, BOUND_G, spread, spread_programs
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
 from survey.measures.cylinder import equation
@@ -21,6 +21,7 @@ SHARE = 1e-3  # of the requested accuracy, for the truncation error of one step
 ABEL_SHARE = 1e-4  # the same over phi: errors grow as 1 / w before a turning point
 # the same for trajectories: most of what misses the accuracy misses it by little
 ATTEMPTS = (3e-4, 1e-5, 1e-7)
+LONG = 30.0  # from about twice this time on, in units of f and g, trajectories take finer steps
 FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
@@ -51,9 +52,10 @@ def tolerances(method, rtol, share=SHARE):
     return first, min(max(1e-7 * rtol, method.FLOW_FINEST), 1e-10)
 
 
-def attempts(method, rtol):
-    """Truncation per step of trajectories, ever finer."""
-    tolerances = [min(max(share * rtol, FINEST, method.FLOW_FINEST), 1e-6) for share in ATTEMPTS]
+def attempts(method, rtol, decades=0):
+    """Truncation per step of trajectories, ever finer; `decades` finer still, from `_decades`."""
+    asked, least = rtol * 10.0**-decades, max(FINEST, method.FLOW_FINEST)
+    tolerances = [min(max(share * asked, least), 1e-6) for share in ATTEMPTS]
     return [
         first
         for first, finer in zip(tolerances, [*tolerances[1:], 0.0], strict=True)
@@ -109,7 +111,38 @@ def _nothing(shape):
 
 def _in_time(method, rows, times, rtol):
     times, back = _sorted(times)
+    decades = _decades(rows, times)
+    kinds = np.unique(decades)
+    if len(kinds) < 2:
+        return back(_in_order(method, rows, times, rtol, decades.max(initial=0)))
+    results = _nothing(times.shape)
+    for kind in kinds:
+        mine = decades == kind
+        parts = _in_order(method, rows[mine], times[mine], rtol, kind)
+        for result, part in zip(results, parts, strict=True):
+            result[mine] = part
+    return back(results)
+
+
+def _decades(rows, times):
+    """How many decades finer than for short ones the steps of each motion are: error bars grow as the
+    square of the time, and a second attempt costs more than finer steps.
+
+    Time is measured by the bounds of f and g, which a motion on a line has only as it goes.
+    """
+    if rows.shape[1] > rc.GIVEN and not rows[0, ON_CIRCLE] > 0.0:
+        return np.zeros(len(rows), dtype=int)
+    last = times.max(axis=1, initial=0.0)
+    if not np.isfinite(last).all():
+        last = np.where(np.isfinite(times), times, 0.0).max(axis=1, initial=0.0)
+    P, _starts = split(rows)
+    turned = last * (P[:, BOUND_F] + np.sqrt(P[:, BOUND_G]))
+    return np.rint(2.0 * np.log10(np.fmax(turned / LONG, 1.0))).astype(int)
+
+
+def _in_order(method, rows, times, rtol, decades):
     budget = STEPS * min(method.FLOW_WORK, 10)
+    ladder = attempts(method, rtol, decades)
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
@@ -125,10 +158,10 @@ def _in_time(method, rows, times, rtol):
         return floats, turnings, status
 
     asked = np.isfinite(times)
-    results, _met = _repeated(run, asked, attempts(method, rtol), rtol)
+    results, _met = _repeated(run, asked, ladder, rtol)
     if hasattr(method, "flow_turnings") and (rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0):
-        _count(method, rows, times, attempts(method, rtol)[-1], asked, results)
-    return back(results)
+        _count(method, rows, times, ladder[-1], asked, results)
+    return results
 
 
 def _count(method, rows, times, tolerance, asked, results):
@@ -168,31 +201,32 @@ def abel_and_met(method, rows, targets, rtol, before=False, by_row=False, timed=
     least = distinct(targets).min(axis=1, keepdims=True, initial=np.inf)
     if targets.size and (past == past[0]).all() and (least >= phi0).all():  # as a rule
         return _branch(method, rows, targets, rtol, 1.0, past[0], by_row, timed)
-    floats = np.full((*targets.shape, rc.STATE), np.nan)
+    planes = np.full((rc.STATE, *targets.shape), np.nan)
     status = np.zeros(targets.shape, dtype=np.int8)
+    good = not np.isnan(least).any()
     for side in (1.0, -1.0):
         onward = targets >= phi0 if side > 0 else targets < phi0
         for past in (False, True):
             picked = onward.any(axis=1) & (((rows[:, rc.W0] * side < 0) | back) == past)
             if not picked.any():
                 continue
-            mine = onward[picked]
+            some = slice(None) if picked.all() else np.flatnonzero(picked)
+            mine = onward[some]
             same = np.flatnonzero(mine[0])
-            # picking costs more than solving
             if (mine == mine[0]).all() and same[-1] - same[0] < same.size:
-                at = slice(same[0], same[-1] + 1)
-                some = slice(None) if picked.all() else picked
-                (floats[some, at], status[some, at]), _met = _branch(
-                    method, rows[some], targets[some, at], rtol, side, past, by_row, timed
-                )
-                continue
-            at = np.where(mine, targets[picked], side * np.inf)
-            found, _met = _branch(method, rows[picked], at, rtol, side, past, by_row, timed)
-            for result, new in zip((floats, status), found, strict=True):
-                held = result[picked]
-                held[mine] = new[mine]
-                result[picked] = held
-    return (floats, status), False
+                mine, columns = True, slice(same[0], same[-1] + 1)
+                at = targets[some, columns]
+            else:  # the start stands for the angles on the other side
+                columns, at = slice(None), np.where(mine, targets[some], phi0[some])
+            found, met = _branch(method, rows[some], at, rtol, side, past, by_row, timed)
+            good &= met
+            for result, new in zip(
+                (*planes, status), (*found[0].transpose(2, 0, 1), found[1]), strict=True
+            ):
+                held = result[some, columns]  # a copy where rows are picked
+                np.copyto(held, new, where=mine)
+                result[some, columns] = held
+    return (planes.transpose(1, 2, 0), status), good
 
 
 def _branch(method, rows, targets, rtol, side, past, by_row, timed):

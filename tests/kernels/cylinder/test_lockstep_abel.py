@@ -6,7 +6,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.cylinder import lockstep, lockstep_abel, lockstep_phi, steps
+from survey.kernels.cylinder import flow, lockstep, lockstep_abel, lockstep_phi, steps
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
 from survey.methods import closed, taylor
@@ -80,6 +80,79 @@ def test_bars_hold_on_hard_systems(scale):
 
 
 @pytest.mark.slow
+def test_bars_hold_and_stay_narrow_over_many_turns():
+    """100 turns; with b = 0 by the energy, w^2 = w0^2 + 2 (G(phi) - G(phi0)), where errors do not grow."""
+    turns = np.linspace(0.0, 200.0 * np.pi, 41)
+    rows = drawn(200, 5, (0.3, 0.3, 1, 1, 1, 1, 3, 6))
+    theirs, both = agree(rows, turns)
+    assert theirs > 0.6 and both > theirs - 0.01
+    rows[:, :2], rows[:, 7] = 0.0, np.abs(rows[:, 7]) + 4.0
+    found, status = solved(rows, turns)
+
+    def potential(phi):
+        d, c23, s2, s3 = rows.T[2:6, :, None]
+        return (
+            0.25 * d * np.cos(2 * phi)
+            - 0.5 * c23 * np.sin(2 * phi)
+            + s2 * np.sin(phi)
+            + s3 * np.cos(phi)
+        )
+
+    start = rows[:, 6:7]
+    square = rows[:, 7:] ** 2 + 2.0 * (potential(start + turns) - potential(start))
+    w = np.sqrt(np.maximum(square, 0.0))
+    clear = (square > 1.0).all(axis=1)
+    assert clear.sum() > 100 and (status[clear] == steps.OK).all()
+    error, bar = np.abs(found[clear, :, 0] - w[clear]), found[clear, :, 2]
+    assert (error <= bar + 1e-13 * w[clear]).all() and (bar < 1e-8 * w[clear]).all()
+
+
+def test_what_an_error_has_been_multiplied_by_is_bounded_at_every_step():
+    """With b = 0, w dw is constant: an error of w changes as 1 / w."""
+    rows = drawn(lockstep.LANES * 50, 8, (0, 0, 1, 1, 1, 1, 3, 1))
+    rows[:, 2:6] *= 10.0 ** np.random.default_rng(1).uniform(-2, 1, (len(rows), 1))
+    P, starts = solution.split(rows)
+    starts[:, 1] += 1.5 * np.sqrt(P[:, flow.BOUND_G])
+    for tolerance in (1e-11, 1e-13, 1e-16):
+        factors = np.empty((len(rows), 2))
+        one_step(P, starts, tolerance, factors)
+        exact, bound = factors.T
+        excess = bound / exact - 1.0
+        assert (excess >= -1e-14).all() and (excess < 1e-3).all()
+        assert (abs(exact - 1.0) > 1e-3).sum() > 100  # something to bound
+        assert np.median(excess) < 1e-4
+
+
+@fresh
+def one_step(P, starts, tolerance, factors):
+    """What an error of w is multiplied by in the first step: w before over w after, and its bound."""
+    work = np.zeros((lockstep_phi.ROWS, lockstep.LANES))
+    T, state, before = (
+        work[: lockstep_phi.AFTER],
+        work[lockstep_phi.AFTER : lockstep_phi.BEFORE],
+        work[lockstep_phi.BEFORE : lockstep_phi.OF_STEP],
+    )
+    step = work[lockstep_phi.OF_STEP : lockstep_phi.WHAT_STAYS]
+    fixed = work[lockstep_phi.WHAT_STAYS :]
+    for first in range(0, len(P), lockstep.LANES):
+        for i in range(lockstep.LANES):
+            p, (phi, w) = P[first + i], starts[first + i]
+            for k in range(lockstep_phi.FIXED):
+                fixed[k, i] = p[k]
+            for k in range(lockstep_phi.STATE):
+                state[k, i] = 0.0
+            state[lockstep_phi.AT, i], state[lockstep_phi.W, i] = phi, w
+            state[lockstep_phi.RATE, i] = 2.0 + p[flow.BOUND_G] / (w * w)
+        lockstep_phi._series(T, state, fixed)
+        lockstep_phi._advance(T, state, before, step, fixed, tolerance)
+        for i in range(lockstep.LANES):
+            h = state[lockstep_phi.AT, i] - before[lockstep_phi.AT, i]
+            low_q, r = lockstep_phi._low_q(T, i), lockstep_phi._r(T, i)
+            contracted, doubt = lockstep_phi._contracted(low_q, r, h)
+            factors[first + i, 0] = before[lockstep_phi.W, i] / state[lockstep_phi.W, i]
+            factors[first + i, 1] = contracted * (1.0 + doubt)
+
+
 def test_phi_is_the_variable_far_from_turning_points():
     """No solution is left to steps in time, and values of three are within their bars of mpmath's."""
     rows = drawn(lockstep.LANES, 9, (0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 3, 0))

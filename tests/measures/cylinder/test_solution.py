@@ -395,3 +395,36 @@ def test_rows_that_no_closed_form_serves_have_the_same_bits_among_those_that_one
                 among, measure(taylor, rows[i : i + 1], columns[i : i + 1], 1e-10), strict=True
             ):
                 np.testing.assert_array_equal(part[i], alone[0])
+
+
+def test_long_motions_take_finer_steps_and_have_the_same_bits_among_others():
+    rng = np.random.default_rng(4)
+    rows = np.column_stack([rng.normal(size=(40, 6)) * rng.uniform(0.05, 1, (40, 1)),
+                            rng.uniform(0, 6, 40), rng.uniform(-2, 2, 40)])  # fmt: skip
+    times = np.where(np.arange(40)[:, None] % 3, 250.0, 5.0) * np.array([[0.5, 1.0]])
+    decades = solution._decades(rows, times)
+    assert len(np.unique(decades)) > 2 and (decades[::3] <= 1).all()
+    floats, turnings, status = solution.trajectories(taylor, rows, times, 1e-7)
+    assert (status == OK).mean() > 0.9
+    exact, _n, _status = solution.trajectories(dop853, rows, times, 1e-12)
+    good = status == OK
+    error = np.abs(floats - exact)[..., :2]
+    assert (error <= floats[..., 2:] + exact[..., 2:])[good].all()
+    for i in range(40):
+        alone = solution.trajectories(taylor, rows[i : i + 1], times[i : i + 1], 1e-7)
+        for one, many in zip(alone, (floats, turnings, status), strict=True):
+            np.testing.assert_array_equal(one[0], many[i])
+
+
+def test_angles_on_both_sides_of_the_start_are_served_as_those_of_either():
+    rng = np.random.default_rng(6)
+    rows = np.column_stack(
+        [rng.uniform(-0.5, 0.5, (30, 6)), rng.uniform(1, 5, 30), rng.uniform(-4, 4, 30)]
+    )
+    angles = np.broadcast_to(np.linspace(0.0, 6.0, 25), (30, 25))
+    floats, status = solution.abel(taylor, rows, angles, 1e-9)
+    for row, found, codes in zip(rows, floats, status, strict=True):
+        for mine in (angles[0] >= row[6], angles[0] < row[6]):
+            own, own_codes = solution.abel(taylor, row[None], angles[:1, mine], 1e-9)
+            np.testing.assert_array_equal(own[0], found[mine])
+            np.testing.assert_array_equal(own_codes[0], codes[mine])
