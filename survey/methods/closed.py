@@ -164,7 +164,7 @@ def _trigonometric(data, w0, x, out):
     s = math.sin(0.5 * x)
     F, f = data[closed.F0], data[closed.SLOPE]
     w = w0 - 2.0 * s * (F * s - f * math.cos(0.5 * x))
-    moved = closed.deviating(data, t, w)
+    moved = closed.deviating(data, x, t, w)
     bar = closed.MARGIN * (
         2.0 * data[closed.NOISE] + moved + 4.0 * ROUNDOFF_UP * (w0 + abs(x) * math.hypot(F, f))
     )

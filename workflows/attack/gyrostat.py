@@ -75,10 +75,19 @@ def system(random, number):
     return kind, p
 
 
-def _starts(random, p, number):
+def _starts(random, p, number, curved):
     """(region, phi0, w0)."""
     k = p.pop("k", np.ones(number))
-    kind = str(random.choice(["", "slow", "fast", "turning", "saddle", "far"]))
+    kinds = [
+        "",
+        "slow",
+        "fast",
+        "turning",
+        "saddle",
+        "far",
+        *(["curve", "curve"] if curved else []),
+    ]
+    kind = str(random.choice(kinds))
     phi, w = random.uniform(-7, 7, number), random.normal(size=number) * 2
     if kind == "slow":
         w = random.choice([-1, 1], number) * 10 ** -random.uniform(1, 17, number)
@@ -88,6 +97,9 @@ def _starts(random, p, number):
         w = np.zeros(number)
     elif kind == "far":
         phi = random.choice([-1, 1], number) * 10 ** random.uniform(1, 8, number)
+    elif kind == "curve":
+        for i in range(number):
+            phi[i], w[i] = _next_to_rest({name: values[i] for name, values in p.items()}, random)
     elif kind == "saddle":
         for i in range(number):
             found = _separatrix({name: values[i] for name, values in p.items()}, random)
@@ -123,6 +135,24 @@ def _separatrix(p, random):
     return a + side, rate * side * (1 + random.choice([-1, 1]) * away)
 
 
+def _next_to_rest(p, random):
+    """A point of an invariant curve w = mu F + n of (61), or of g = 0, as a rule next to where it rests."""
+    b12, b31 = p["b12"], p["b31"]
+    b = np.hypot(b12, b31)
+    if b == 0.0:
+        return random.uniform(-7, 7), random.normal()
+    # along b
+    delta = (p["d"] * (b12**2 - b31**2) + 4 * p["c23"] * b12 * b31) / b**4
+    mu = 0.5 + random.choice([-1, 1]) * np.sqrt(max(0.25 - delta, 0.0))
+    n = (p["s2"] * b12 + p["s3"] * b31) / b**2 / (mu - 1.0) if mu != 1.0 else random.uniform(-b, b)
+    share, angle = -n / (mu * b) if mu else np.inf, np.arctan2(b31, b12)
+    phi = random.uniform(-7, 7)
+    if abs(share) < 1:
+        rest = random.choice([np.arcsin(share), np.pi - np.arcsin(share)]) - angle
+        phi = rest + random.choice([-1, 1]) * 10 ** -random.uniform(0, 12)
+    return phi, mu * (b12 * np.sin(phi) + b31 * np.cos(phi)) + n
+
+
 def force(p, x):
     c, s = np.cos(x), np.sin(x)
     return -p["d"] * c * s - p["c23"] * (c * c - s * s) + p["s2"] * c - p["s3"] * s
@@ -140,7 +170,7 @@ def chunk(random, size):
         method, rtol = str(random.choice(METHODS[question])), accuracy(random)
         number = int(random.choice([1, NUMBERS.get(method, 32)]))
         kind, p = system(random, number)
-        start, phi0, w0, k = _starts(random, p, number)
+        start, phi0, w0, k = _starts(random, p, number, kind in ("(61)", "g = 0"))
         region = f"{kind}{', ' + start if start else ''}"
         if question == "trajectory":
             long = random.random() < 0.08

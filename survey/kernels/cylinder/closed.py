@@ -205,10 +205,12 @@ def start_trigonometric(p, phi0, w0, side, mu, other, data):
 
 
 @inline
-def deviating(data, t, w):
-    """Bound of w - (mu F + n) until t, where w is reached: see `trigonometric.deviation`."""
-    return deviation(data[OFFSET], data[MISS], data[GAIN], data[MU], data[OTHER], data[W0], data[F0], data[SLOPE],
-                     data[SQUARE], w, t)  # fmt: skip
+def deviating(data, x, t, w):
+    """Bound of w - (mu F + n) until phi0 + x, which is reached at t with w: see `trigonometric.deviation`."""
+    F, f = data[F0], data[SLOPE]
+    slope = f * math.cos(x) - F * math.sin(x)
+    return deviation(data[OFFSET], data[MISS], data[GAIN], data[MU], data[OTHER], data[W0], F, f, data[SQUARE], w,
+                     slope, t)  # fmt: skip
 
 
 @inline
@@ -219,7 +221,7 @@ def trigonometric_reach(data, x):
     w0, f, square = data[W0], data[SLOPE], data[SQUARE]
     if data[F0] == 0.0 and f == 0.0:
         t = x / w0
-        return t, (2.0 * ROUNDOFF_UP + deviating(data, t, w0) / w0) * t
+        return t, (2.0 * ROUNDOFF_UP + deviating(data, x, t, w0) / w0) * t
     root = math.sqrt(abs(square))
     turns = math.floor(0.5 * x / math.pi + 0.5)
     rest = 0.5 * x - turns * math.pi
@@ -248,7 +250,7 @@ def trigonometric_reach(data, x):
         total = drift(w0, f, square, theta, s, math.cosh(root * theta), 1.0)
     t = 2.0 * theta
     # the formula is evaluated with rounded data, which moves Delta^2 as well
-    moved = deviating(data, t, near / w0)  # near = w0 w
+    moved = deviating(data, x, t, near / w0)  # near = w0 w
     bar = (data[NOISE] + moved) * total / w0 + 2.0 * abs(y1) * blur / near + 6.0 * ROUNDOFF_UP * t
     bar += 3.0 * ROUNDOFF_UP * (abs(x) + 1.0) * w0 / near * 2.0
     return t, MARGIN * bar

@@ -167,12 +167,13 @@ def _phase(T):
 
 @inline
 def drift(w0, f, square, half, s, c, low):
-    """Integral of w(0)/w over the time 2 half; divided by cosh^2 where low = 1/cosh^2, c = 1 and s
-    = tanh/Delta.
+    """Integral of w(0)/w over the time 2 half, or a little more than its terms may cancel to; divided by
+    cosh^2 where low = 1/cosh^2, c = 1 and s = tanh/Delta.
     """
     short = abs(square) * half * half < 1e-3
     third = 2.0 / 3.0 * half * half * half * low if short else (half * low - s * c) / square
-    return half * low + s * c - 2.0 * f * s * s + (w0 * w0 + f * f) * abs(third)
+    first, second, last = half * low + s * c, 2.0 * f * s * s, (w0 * w0 + f * f) * abs(third)
+    return first - second + last + 8.0 * ROUNDOFF_UP * (abs(first) + abs(second) + last)
 
 
 @inline
@@ -181,23 +182,23 @@ def _fourth(z):
 
 
 @inline
-def deviation(offset, miss, gain, mu, other, w0, F, f, square, w, t):
-    """Bound of e until t, where w is reached: of two bounds of its growth the lesser.
+def deviation(offset, miss, gain, mu, other, w0, F, f, square, w, slope, t):
+    """Bound of e until t, where w and dw/dx = `slope` are reached: of two bounds of its growth the lesser.
 
     The integral of f dt is at most b t, and |change of F|/least w; mu times it is ln w at the end less that at the
-    start; ln z <= (z - 1)/sqrt z, exp z <= 1/(1 - z).
+    start; ln z <= (z - 1)/sqrt z, exp z <= 1/(1 - z). On the way w may have been larger than at both ends.
     """
-    most = abs(w0 - F) + math.sqrt(F * F + f * f)
-    least = square / most if square > 0.0 else min(w, w0)
-    most = most if square > 0.0 else max(w, w0)
+    highest, passed = abs(w0 - F) + math.sqrt(F * F + f * f), f > 0.0 and slope < 0.0
+    most = highest if square > 0.0 or passed else max(w, w0)
+    least = square / highest if square > 0.0 else min(w, w0)
     root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(most / least))))))
     steep = (
         abs(other)
         / max(abs(mu), 1e-300)
         * (64.0 * ((root - 1.0) / math.sqrt(root)) + 16.0 * ROUNDOFF_UP)
     )
-    # e as w^((1 - mu)/mu), and w is monotone
-    shrinks = square <= 0.0 and (w < w0) == (mu * other > 0.0)
+    # e as w^((1 - mu)/mu), where w is monotone
+    shrinks = square <= 0.0 and not passed and (w < w0) == (mu * other > 0.0)
     steep = 0.0 if shrinks else steep
     growth = 1.0 / (1.0 - min(gain * min(t, 2.0 / least), min(steep, _WILDEST)) / 1024.0)
     growth = _fourth(_fourth(_fourth(_fourth(_fourth(growth)))))
@@ -220,16 +221,21 @@ def _formula(T):
         y1, y2 = w0 * s, c - f * s
         norm = y1 * y1 + y2 * y2
         x, w = 2.0 * arctangent(y1, y2) + turns * TWO_PI, w0 * low / norm
+        sx, cx = 2.0 * y1 * y2 / norm, (y2 - y1) * (y2 + y1) / norm
+        slope = f * cx - F * sx
         moved = deviation(
-            T[_OFFSET, i], T[_MISS, i], T[_GAIN, i], T[MU, i], other, w0, F, f, square, w, t
+            T[_OFFSET, i], T[_MISS, i], T[_GAIN, i], T[MU, i], other, w0, F, f, square, w, slope, t
         )
         bar = (noise + moved) * max(drift(w0, f, square, half, s, c, low), 0.0) / norm
         bar += 16.0 * ROUNDOFF_UP * (
             abs(y1) * (abs(c) + abs(f * s)) + abs(y1 * y2)
         ) / norm + 6.0 * ROUNDOFF_UP * (w * t + abs(x))
-        sx, cx = 2.0 * y1 * y2 / norm, (y2 - y1) * (y2 + y1) / norm
-        slope = abs(f * cx - F * sx) + math.sqrt(F * F + f * f) * bar
-        bar_w = MARGIN * (slope * bar + moved + 4.0 * noise + 4.0 * ROUNDOFF_UP * w)
+        steepest = abs(slope) + math.sqrt(F * F + f * f) * bar
+        bar_w = MARGIN * (steepest * bar + moved + 4.0 * noise + 4.0 * ROUNDOFF_UP * w)
+        # y1^2 + y2^2 may have lost more digits, next to the largest w, than x and the curve
+        lost = w * (abs(y2) * (abs(c) + abs(f * s)) + y1 * y1) / norm
+        on_curve = w0 + 2.0 * y1 * (f * y2 - F * y1) / norm
+        w = on_curve if lost > 0.125 * (w0 + abs(F) + abs(f)) else w
         # uniform rotation, and rest
         uniform, rests = F == 0.0 and f == 0.0, w0 == 0.0
         x, w = (w0 * t if uniform else x), (w0 if uniform else w)

@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.cylinder import trigonometric
+from survey.kernels.cylinder import taylor_double, trigonometric
 from survey.kernels.cylinder.steps import OK
 from survey.kernels.jit import fresh
 from survey.measures.cylinder import solution
@@ -115,6 +115,51 @@ def test_bars_hold_and_are_narrow_where_g_is_0(scale):
                     )
                     shares.append(float(abs(float(phi) - wanted[0]) / bar_phi))
     assert np.median(shares) > 1e-3
+
+
+def test_bars_hold_about_the_largest_w_of_a_motion_that_starts_slowly():
+    """There y1^2 + y2^2 has lost the digits of w, and w hardly depends on phi."""
+    rows = free(20, 3)
+    rows[:, 7] = np.logspace(-10, -3, 20) * np.where(np.arange(20) % 2, 1.0, -1.0)
+    times = np.tile(np.linspace(0.1, 40.0, 200), (20, 1))
+    for width in (0.2, 1e-3):
+        found, _turnings, _status = solution.trajectories(closed, rows, times, 1e-13)
+        largest = times[np.arange(20), np.nanargmax(np.abs(found[..., 1]), axis=1), None]
+        times = largest + np.linspace(0.0, width, 200)
+    times = largest + np.array([0.0, 1e-6, 1e-3])
+    floats, _turnings, status = solution.trajectories(closed, rows, times, 1e-13)
+    risen = np.abs(floats[:, 0, 1]) > 100 * np.abs(rows[:, 7])
+    assert (risen & (status[:, 0] == OK)).sum() > 10
+    with mp.workdps(60):
+        for i, j in zip(*np.nonzero(status == OK), strict=True):
+            phi, w, bar_phi, bar_w = floats[i, j]
+            wanted = exact(rows[i], times[i, j])
+            assert abs(float(phi) - wanted[0]) <= bar_phi and abs(float(w) - wanted[1]) <= bar_w
+
+
+@pytest.mark.parametrize("mu", [-1.0, 0.25, 0.5, 2.0])
+def test_bars_hold_where_a_motion_on_61_leaves_one_rest_for_another(mu):
+    """Between both w is large, and what leads away from the curve grows as a power of it (mu = 1/4: the third)."""
+    rows, random = curved(150, 6, mu), np.random.default_rng(7)
+    b12, b31 = rows.T[:2]
+    b, angle = np.hypot(b12, b31), np.arctan2(b31, b12)
+    n = mu * b * random.uniform(-0.95, 0.95, 150)
+    rows[:, 4], rows[:, 5] = (mu - 1.0) * n * b12, (mu - 1.0) * n * b31
+    rest = np.arcsin(-n / (mu * b))
+    rest = np.where(random.random(150) < 0.5, rest, np.pi - rest) - angle
+    rows[:, 6] = rest + random.choice([-1, 1], 150) * 10.0 ** random.uniform(-14, -1, 150)
+    rows[:, 7] = mu * b * np.sin(rows[:, 6] + angle) + n
+    floats, _turnings, status = solved(rows, np.linspace(0.5, 30.0, 8) / abs(mu), rtol=1e-8)
+    wanted, _turnings, known = solved(rows, np.linspace(0.5, 30.0, 8) / abs(mu), taylor_double)
+    both = (status == OK) & (known == OK)
+    assert both.mean() > 0.6
+    assert (np.abs(floats - wanted)[both][:, :2] <= (floats + wanted)[both][:, 2:]).all()
+    angles = rows[:, 6:7] + np.linspace(-6.0, 6.0, 12)
+    floats, status = solution.abel(closed, rows, angles, 1e-8)
+    wanted, known = solution.abel(taylor_double, rows, angles, 1e-8)
+    both = (status == OK) & (known == OK)
+    assert both.mean() > 0.02 and (known[status == OK] == OK).all()
+    assert (np.abs(floats - wanted)[both][:, :2] <= (floats + wanted)[both][:, 2:]).all()
 
 
 def series(row, t):
