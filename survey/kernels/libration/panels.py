@@ -11,11 +11,12 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
-from survey.kernels.libration.traces import INVARIANTS, NODES, coordinate
+from survey.kernels.libration.traces import INVARIANTS, NODES, TILE, coordinate
 from survey.kernels.math import double as dd
 from survey.kernels.math.roundoff import EPS
 
 TERMS = 26  # in y; NODES in 4 s - 3
+VECTOR = 8
 
 
 @kernel
@@ -69,11 +70,11 @@ def position(e, middle):
 
 
 @inline
-def cosines(x, out):
-    """T_n(x)."""
-    out[0], out[1] = 1.0, x
+def cosines(out, count):
+    """T_n of out[1] in row n, of the first `count` columns."""
     for n in range(2, len(out)):
-        out[n] = 2.0 * x * out[n - 1] - out[n - 2]
+        for i in range(count):
+            out[n, i] = 2.0 * out[1, i] * out[n - 1, i] - out[n - 2, i]
 
 
 @kernel
@@ -81,32 +82,6 @@ def panels(e, out):
     """Fill `out` (N) with the number of the panel of each e."""
     for i in range(len(e)):
         out[i] = int(artanh(e[i]))
-
-
-@kernel
-def rows(e, first, middle, coefficients, bars, series, row_bars):
-    """The series (N, 5, NODES) in 4 s - 3 of rows e, all of one panel, and bounds (N, 5) that hold
-    for the row.
-
-    `coefficients` (5, TERMS, NODES) and `bars` (5) are those of the panel, `first` is it the
-    first one? `middle` see `position`.
-    """
-    weights = np.empty(TERMS)
-    for i in range(len(e)):
-        growth = (1.0 + e[i]) / (1.0 - e[i])
-        growth = growth if first else growth * growth
-        cosines(position(e[i], middle), weights)
-        for j in range(INVARIANTS):
-            for m in range(NODES):
-                series[i, j, m] = 0.0
-            for k in range(TERMS):
-                for m in range(NODES):
-                    series[i, j, m] += weights[k] * coefficients[j, k, m]
-            size = 0.0
-            for m in range(NODES):
-                series[i, j, m] *= growth
-                size += abs(series[i, j, m])
-            row_bars[i, j] = growth * bars[j] + 4.0 * EPS * size
 
 
 @inline
@@ -131,43 +106,77 @@ def exact_position(e, middle):
 
 
 @kernel
-def row(e, first, middle, coefficients, bars, series, row_bars):
-    """As `rows`, of one row in double-double: series (5, 2, n) from coefficients (5, 2, n, n)."""
-    x, n = exact_position(e, middle), series.shape[2]
-    growth = dd.div(dd.two_sum(1.0, e), dd.two_sum(1.0, -e))
-    growth = growth if first else dd.square(growth)
-    for j in range(INVARIANTS):
-        for m in range(n):
-            one, two = (0.0, 0.0), (0.0, 0.0)
-            for k in range(n - 1, -1, -1):  # Clenshaw
-                twice = dd.scaled(dd.mul(x, one), 2.0 if k else 1.0)
-                last = dd.add(
-                    (coefficients[j, 0, k, m], coefficients[j, 1, k, m]), dd.sub(twice, two)
-                )
-                one, two = last, one
-            series[j, 0, m], series[j, 1, m] = dd.mul(growth, one)
-        row_bars[j] = 1.01 * growth[0] * bars[j]
+def rows(e, first, middle, coefficients, bars, series, row_bars):
+    """The series (N, 5, 2, n) in 4 s - 3 of rows e, all of one panel, pairs, and bounds (N, 5) that hold
+    for the row.
+
+    `coefficients` (5, 2, terms, n), pairs, and `bars` (5) are those of the panel, `first` is it the first
+    one? `middle` see `position`. Inner products as in `convolved`, of all orders in s at once.
+    """
+    terms, n = coefficients.shape[2:]
+    weights, sums = np.empty((terms, 2)), np.empty((2, n))
+    for i in range(len(e)):
+        x = exact_position(e[i], middle)
+        weights[0], weights[1] = (1.0, 0.0), x
+        for k in range(2, terms):
+            last, before = (
+                (weights[k - 1, 0], weights[k - 1, 1]),
+                (weights[k - 2, 0], weights[k - 2, 1]),
+            )
+            weights[k] = dd.sub(dd.scaled(dd.mul(x, last), 2.0), before)
+        growth = dd.div(dd.two_sum(1.0, e[i]), dd.two_sum(1.0, -e[i]))
+        growth = growth if first else dd.square(growth)
+        for j in range(INVARIANTS):
+            sums[:] = 0.0
+            for k in range(terms):
+                high, low = weights[k, 0], weights[k, 1]
+                for m in range(n):
+                    p, error = dd.two_prod(high, coefficients[j, 0, k, m])
+                    sums[0, m], rest = dd.two_sum(sums[0, m], p)
+                    sums[1, m] += rest + (
+                        error + (high * coefficients[j, 1, k, m] + low * coefficients[j, 0, k, m])
+                    )
+            for m in range(n):
+                value = dd.quick_two_sum(sums[0, m], sums[1, m])
+                series[i, j, 0, m], series[i, j, 1, m] = dd.mul(growth, value)
+            row_bars[i, j] = 1.01 * growth[0] * bars[j]
 
 
 @kernel
 def points(e, mu, first, middle, coefficients, lengths, bars, out):
-    """Fill `out` (N, RESULTS of `traces`) for points of one panel, as `rows`; order k in y has
-    `lengths`[k] terms.
+    """Fill `out` (N, RESULTS of `traces`) for points of one panel, whose series (5, TERMS, NODES) is in
+    float64; order k in y has `lengths`[k] terms, whole VECTORs.
+
+    A tile of points at once; what is small is added first.
     """
-    in_y, in_s, sums = np.empty(TERMS), np.empty(NODES), np.empty(NODES)
-    for i in range(len(e)):
-        growth = (1.0 + e[i]) / (1.0 - e[i])
-        growth = growth if first else growth * growth
-        cosines(position(e[i], middle), in_y)
-        cosines(coordinate(mu[i]), in_s)
+    growth, part, total = np.empty(TILE), np.empty(TILE), np.empty(TILE)
+    in_y, in_s = np.empty((TERMS, TILE)), np.empty((NODES, TILE))
+    for start in range(0, len(e), TILE):
+        count = min(TILE, len(e) - start)
+        for i in range(count):
+            x = e[start + i]
+            rate = (1.0 + x) / (1.0 - x)
+            growth[i] = rate if first else rate * rate
+            in_y[0, i], in_y[1, i] = 1.0, position(x, middle)
+        for i in range(count):
+            in_s[0, i], in_s[1, i] = 1.0, coordinate(mu[start + i])
+        cosines(in_y, count)
+        cosines(in_s, count)
         for j in range(INVARIANTS):
-            for m in range(NODES):
-                sums[m] = 0.0
-            for k in range(TERMS):
-                for m in range(lengths[k]):
-                    sums[m] += in_y[k] * coefficients[j, k, m]
-            total = 0.0
-            for m in range(lengths[0] - 1, -1, -1):
-                total += in_s[m] * sums[m]
-            out[i, j] = growth * total
-            out[i, INVARIANTS + j] = growth * bars[j] + 4.0 * EPS * abs(out[i, j])
+            for i in range(count):
+                total[i] = 0.0
+            for k in range(TERMS - 1, -1, -1):
+                for i in range(count):
+                    part[i] = 0.0
+                for m in range(lengths[k] - VECTOR, -1, -VECTOR):
+                    for i in range(count):
+                        s = part[i]
+                        for n in range(VECTOR - 1, -1, -1):  # a constant, so that it is unrolled
+                            s += coefficients[j, k, m + n] * in_s[m + n, i]
+                        part[i] = s
+                for i in range(count):
+                    total[i] += in_y[k, i] * part[i]
+            for i in range(count):
+                value = growth[i] * total[i]
+                out[start + i, j] = value
+                out[start + i, INVARIANTS + j] = growth[i] * bars[j] + 4.0 * EPS * abs(value)

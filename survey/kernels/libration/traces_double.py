@@ -16,6 +16,7 @@ from survey.kernels.libration.traces import (
     STABLE,
     SUM,
     SUM_BAR,
+    TILE,
     UNDECIDED,
     UNSTABLE,
     A,
@@ -148,16 +149,25 @@ def dense(series, bars, mu, rtol, overflow, floats, verdict, collision, missed, 
     """Answer all points mu (N) of a row from its series (5, 2, NODES) in 4 s - 3; the `bars` (5)
     hold for the row.
     """
-    r = np.empty(BARS + INVARIANTS)
-    for i in range(len(mu)):
-        square = dd.shifted(dd.times(dd.square(dd.two_sum(0.5, -mu[i])), 3.0), 0.25)
-        x = dd.shifted(dd.scaled(dd.sqrt(square), 4.0), -3.0)
+    r, here = np.empty(BARS + INVARIANTS), np.empty((INVARIANTS, 2, TILE))
+    x, one, two = np.empty((2, TILE)), np.empty((2, TILE)), np.empty((2, TILE))
+    for first in range(0, len(mu), TILE):
+        count = min(TILE, len(mu) - first)
+        for i in range(count):
+            half = dd.two_sum(0.5, -mu[first + i])
+            s = dd.positive_root(dd.shifted(dd.times(dd.square(half), 3.0), 0.25))
+            x[0, i], x[1, i] = dd.shifted(dd.scaled(s, 4.0), -3.0)
         for j in range(INVARIANTS):
-            one, two = (0.0, 0.0), (0.0, 0.0)
-            for n in range(NODES - 1, -1, -1):  # Clenshaw
-                twice = dd.scaled(dd.mul(x, one), 2.0 if n else 1.0)
-                last = dd.add((series[j, 0, n], series[j, 1, n]), dd.sub(twice, two))
-                one, two = last, one
-            r[j], r[LOW + j] = one
-            r[BARS + j] = bars[j]
-        _settle(r, i, rtol, overflow, floats, verdict, collision, missed, status)
+            one[:], two[:] = 0.0, 0.0
+            for n in range(NODES - 1, -1, -1):  # Clenshaw, of all points at once
+                factor, coefficient = (2.0 if n else 1.0), (series[j, 0, n], series[j, 1, n])
+                for i in range(count):
+                    last, before = (one[0, i], one[1, i]), (two[0, i], two[1, i])
+                    rest = dd.sub(dd.scaled(dd.mul((x[0, i], x[1, i]), last), factor), before)
+                    two[0, i], two[1, i] = last
+                    one[0, i], one[1, i] = dd.add(coefficient, rest)
+            here[j, 0, :count], here[j, 1, :count] = one[0, :count], one[1, :count]
+        for i in range(count):
+            for j in range(INVARIANTS):
+                r[j], r[LOW + j], r[BARS + j] = here[j, 0, i], here[j, 1, i], bars[j]
+            _settle(r, first + i, rtol, overflow, floats, verdict, collision, missed, status)

@@ -50,7 +50,7 @@ OUTPUTS = (
 LADDER = Ladder(2.0 ** np.arange(7), np.arange(7) + 1, slice(INVARIANTS, RESULTS), most=6)
 FIRST = 5000
 DENSE = 3 * NODES  # the least number of points in a row for which a series of its own pays
-CHUNK = 4096  # points of another method that are solved together: bounds the memory
+CHUNK = 4096  # points that are solved together: bounds the memory
 
 
 def solve(e, mu, method="auto", rtol=1e-10, dense=False):
@@ -71,7 +71,7 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
         points = np.flatnonzero(left)
         own, at = Answers(points.size), (e[points // mu.shape[1]], mu[left])
         if method == "auto":
-            own.assess(panels.points(*at), rtol)
+            _by_panels(*at, rtol, own)
         else:
             _by_steps(*at, method, rtol, own)
         answers.replace(points, own)
@@ -118,6 +118,19 @@ def rates(mu):
 def factors(e, mu):
     """A, B, C, D, t (N, 5) and their error bounds (N, 5), from series."""
     return np.split(panels.points(e, mu), 2, axis=1)
+
+
+def _by_panels(e, mu, rtol, answers):
+    """Answers of points (N each); those that miss `rtol` are solved again as rows of one point, whose
+    bounds are narrower.
+    """
+    answers.assess(panels.points(e, mu), rtol)
+    missed = np.flatnonzero(answers.missed)
+    for first in range(0, missed.size, CHUNK):
+        some = missed[first : first + CHUNK]
+        own = Answers(some.size)
+        _by_series(e[some], mu[some, None], rtol, own, np.ones((some.size, 1), bool))
+        answers.replace(some, own)
 
 
 def _by_series(e, mu, rtol, answers, left):

@@ -21,13 +21,9 @@ def solve(e, mu, rtol, answers, points, dense=False):
     first, if `dense`.
     """
     waiting.wait("double")
-    row_of = points // mu.shape[1]
     if dense:
-        for row in np.unique(row_of):
-            some = points[slice(*np.searchsorted(row_of, (row, row + 1)))]
-            _take(answers, some, _by_series(e[row], mu.reshape(-1)[some], rtol))
-        left = answers.unsettled[points]
-        points, row_of = points[left], row_of[left]
+        points = _by_series(e, mu, rtol, answers, points)
+    row_of = points // mu.shape[1]
     for first in range(0, points.size, POINTS):
         some = points[first : first + POINTS]
         own = Answers(some.size)
@@ -74,14 +70,15 @@ def _results(e, mu):
     return results
 
 
-def _by_series(e, mu, rtol):
-    """Answers of points mu of one row."""
-    series, bars = panels.row(e)
-    own = Answers(mu.size)
-    for first in range(0, mu.size, VALUES):
-        part = Answers(mu[first : first + VALUES].size)
-        traces_double.dense(
-            series, bars, mu[first : first + VALUES], rtol, status.OVERFLOW, *part.all
-        )
-        own.replace(slice(first, first + VALUES), part)
-    return own
+def _by_series(e, mu, rtol, answers, points):
+    """Answer the `points` from their rows' series; returns those that are left."""
+    row_of = points // mu.shape[1]
+    rows = np.unique(row_of)
+    for row, series, bars in zip(rows, *panels.pairs(e[rows]), strict=True):
+        some = points[slice(*np.searchsorted(row_of, (row, row + 1)))]
+        for first in range(0, some.size, VALUES):
+            part = some[first : first + VALUES]
+            own = Answers(part.size)
+            traces_double.dense(series, bars, mu.reshape(-1)[part], rtol, status.OVERFLOW, *own.all)
+            _take(answers, part, own)
+    return points[answers.unsettled[points]]

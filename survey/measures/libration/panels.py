@@ -28,7 +28,8 @@ PI = "3.14159265358979323846264338327950288419716939937510582097494"
 # EPS, and x, where T_n' <= n^2.
 IN_Y = np.arange(panels.TERMS)[:, None]
 IN_S = np.arange(traces.NODES)
-ROUNDING = EPS * (8.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
+ROUNDING = EPS * (5.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
+ROUNDING_IN_S = EPS * (2.0 + IN_S + 1.1 * IN_S**2)
 # In double-double n rounds |c_n| up to n + 1 times, each with a weight up to n + 1.
 PAIR_ROUNDING = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, NODES + 1) ** 3
 
@@ -38,7 +39,9 @@ class TracePanel(NamedTuple):
 
     middle: np.ndarray  # see `kernels.libration.panels.position` (4)
     pairs: np.ndarray  # (5, 2, NODES, NODES)
-    pair_bars: np.ndarray
+    pairs_bars: np.ndarray
+    trimmed: np.ndarray  # those that count in float64 (5, 2, TERMS, NODES of `traces`)
+    trimmed_bars: np.ndarray
     series: np.ndarray  # in float64 (5, TERMS, NODES of `traces`)
     lengths: np.ndarray  # how many terms each order in y has that count at a single point (TERMS)
     bars: np.ndarray
@@ -60,14 +63,18 @@ def panel(number):
     in_y, in_s = magnitudes.sum(axis=2), magnitudes.sum(axis=1)
     bars = lebesgue(NODES - 1) ** 2 * (bars + PAIR_SUM_ROUNDOFF * NODES * sizes)
     bars += (PAIR_ROUNDING * (in_y + in_s)).sum(axis=1) + tail(in_y) + tail(in_s)
-    short = np.ascontiguousarray(series[:, 0, : panels.TERMS, : traces.NODES])
+    trimmed = np.ascontiguousarray(series[:, :, : panels.TERMS, : traces.NODES])
+    beyond = magnitudes.copy()
+    beyond[:, : panels.TERMS, : traces.NODES] = 0.0
+    trimmed_bars = bars + beyond.sum(axis=(1, 2))
+    short = np.ascontiguousarray(trimmed[:, 0])
     counts = (abs(short) > LEAST * abs(short).max(axis=(1, 2), keepdims=True)).any(axis=0)
-    lengths = (np.where(counts, IN_S + 1, 0).max(axis=1) + 7) // 8 * 8  # whole vectors
+    lengths = -(-np.where(counts, IN_S + 1, 0).max(axis=1) // panels.VECTOR) * panels.VECTOR
     lengths[0] = lengths.max()
     left_out = magnitudes.copy()
     left_out[:, : panels.TERMS, : traces.NODES][:, IN_S < lengths[:, None]] = 0.0
     short_bars = bars + left_out.sum(axis=(1, 2)) + (ROUNDING * abs(short)).sum(axis=(1, 2))
-    return TracePanel(middle, series, bars, short, lengths, short_bars)
+    return TracePanel(middle, series, bars, trimmed, trimmed_bars, short, lengths, short_bars)
 
 
 def _compile_others():
@@ -86,7 +93,7 @@ def _compile_others():
         *np.zeros((2, INVARIANTS)),
     )
     none, of_rows = np.empty(0), np.empty((0, INVARIANTS, traces.NODES))
-    panels.rows(none, True, middle, short, bars, of_rows, np.empty((0, INVARIANTS)))
+    panels.rows(none, True, middle, series, bars, series[None, :0], np.empty((0, INVARIANTS)))
     panels.points(none, none, True, middle, short, lengths, bars, results)
     given = np.empty(0, np.int64), np.empty((0, 0)), 0.0, status.OVERFLOW
     traces.dense(of_rows, np.empty((0, INVARIANTS)), *given, *answers.all)
@@ -94,28 +101,30 @@ def _compile_others():
 
 
 def rows(e):
-    """The series (R, 5, NODES of `traces`) in 4 s - 3 of rows e (R), and bounds of their errors (R, 5)."""
+    """The series (R, 5, NODES of `traces`) in 4 s - 3 of rows e (R), and bounds of their errors (R, 5).
+
+    They are sums of pairs, rounded: what is left to round is a point's.
+    """
+    sums, bars = _rows(e, "trimmed", traces.NODES)
+    series = np.ascontiguousarray(sums[:, :, 0])
+    return series, bars + (ROUNDING_IN_S * np.abs(series)).sum(axis=2)
+
+
+def pairs(e):
+    """As `rows`, with all digits: series (R, 5, 2, NODES)."""
+    return _rows(e, "pairs", NODES)
+
+
+def _rows(e, which, size):
     number = np.empty(e.size, dtype=np.int64)
     panels.panels(e, number)
-    series, bars = np.empty((e.size, INVARIANTS, traces.NODES)), np.empty((e.size, INVARIANTS))
+    series, bars = np.empty((e.size, INVARIANTS, 2, size)), np.empty((e.size, INVARIANTS))
     for one in np.unique(number):
-        mine = np.flatnonzero(number == one)
-        found = np.empty((mine.size, INVARIANTS, traces.NODES))
-        found_bars = np.empty((mine.size, INVARIANTS))
-        own = panel(int(one))
-        panels.rows(e[mine], one == 0, own.middle, own.series, own.bars, found, found_bars)
+        mine, own = np.flatnonzero(number == one), panel(int(one))
+        found, found_bars = (np.empty((mine.size, *whole.shape[1:])) for whole in (series, bars))
+        given = getattr(own, which), getattr(own, which + "_bars")
+        panels.rows(e[mine], one == 0, own.middle, *given, found, found_bars)
         series[mine], bars[mine] = found, found_bars
-    return series, bars
-
-
-def row(e):
-    """As `rows`, of one row as pairs (5, 2, NODES), and the bounds (5)."""
-    number = np.empty(1, dtype=np.int64)
-    series = np.empty((INVARIANTS, 2, NODES))
-    bars = np.empty(INVARIANTS)
-    panels.panels(np.array([e]), number)
-    own = panel(int(number[0]))
-    panels.row(e, number[0] == 0, own.middle, own.pairs, own.pair_bars, series, bars)
     return series, bars
 
 

@@ -44,7 +44,7 @@ def test_rows_lie_within_narrow_bars_of_their_points(low, high):
 
 @pytest.mark.parametrize("e", [1e-9, 0.31, 0.7615941559557649, 0.95, 1 - 1e-7])
 def test_rows_of_many_digits_lie_within_their_bars(e):
-    series, bars = panels.row(e)
+    (series,), (bars,) = panels.pairs(np.array([e]))
     truth = danby_double._results(np.full(MU.size, e), MU)
     with mp.workdps(45):
         for i, mu in enumerate(MU):
