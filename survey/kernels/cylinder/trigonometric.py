@@ -191,7 +191,8 @@ def deviation(offset, miss, gain, mu, other, w0, F, f, square, w, slope, t):
     highest, passed = abs(w0 - F) + math.sqrt(F * F + f * f), f > 0.0 and slope < 0.0
     most = highest if square > 0.0 or passed else max(w, w0)
     least = square / highest if square > 0.0 else min(w, w0)
-    root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(most / least))))))
+    ratio = max(most / least, 1.0)  # not less, by a rounding
+    root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(ratio))))))
     steep = (
         abs(other)
         / max(abs(mu), 1e-300)

@@ -162,6 +162,23 @@ def test_bars_hold_where_a_motion_on_61_leaves_one_rest_for_another(mu):
     assert (np.abs(floats - wanted)[both][:, :2] <= (floats + wanted)[both][:, 2:]).all()
 
 
+def test_what_leads_away_from_a_uniform_rotation_is_in_the_bar():
+    """mu = 0: w = n = 3/4 rotates uniformly, and what w0 is off by grows by up to e^(2 b / n) on the way."""
+    rows = np.array([[-0.5, 1.0, 0.0, 0.0, 0.375, -0.75, 3.25, w0]
+                     for w0 in 0.75 + np.arange(-4, 5) * 2.0**-53 for _ in range(3)])  # fmt: skip
+    rows[:, 6] += np.linspace(0, 6, len(rows))
+    angles = rows[:, 6:7] + np.array([-11.0, -4.0, 3.0, 14.0])
+    floats, status = solution.abel(closed, rows, angles, 1e-12)
+    exact, _status = solution.abel(taylor_double, rows, angles, 1e-12)
+    assert (status == OK).all()
+    assert (np.abs(floats - exact)[..., :2] <= (floats + exact)[..., 2:]).all()
+    times = np.abs(exact[..., 1])
+    floats, _turnings, status = solution.trajectories(closed, rows, np.sort(times), 1e-12)
+    exact, _turnings, _status = solution.trajectories(taylor_double, rows, np.sort(times), 1e-12)
+    assert (status == OK).all()
+    assert (np.abs(floats - exact)[..., :2] <= (floats + exact)[..., 2:]).all()
+
+
 def series(row, t):
     """phi and w of (57) at t by Taylor series of order 30 with 34 digits."""
     b12, b31, d, c23, s2, s3, phi, w = map(mp.mpf, map(float, row))
