@@ -8,7 +8,7 @@ double and triple roots (separatrices, folds) it serves 38 % of the plane, the s
 from conservative to stiff, 87 % and 100 %. The error bounds show where: so `method`, the Taylor
 series, is asked where no closed form answers or its bound misses rtol, and its answer is taken
 where its bound is no wider. dop853, rk4 or full alone serve 5 points of 4776. Points that still
-miss rtol are solved in double-double arithmetic.
+miss rtol are solved with more digits.
 """
 
 from functools import partial
@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from survey.kernels.cylinder import closed as forms
-from survey.kernels.cylinder import taylor_double
+from survey.kernels.cylinder import lockstep_pairs, taylor_double
 from survey.kernels.cylinder.steps import (
     EQUILIBRIUM,
     NO_CONVERGENCE,
@@ -30,6 +30,8 @@ from survey.methods import closed
 
 SAMPLE = 64  # rows that are looked at first: as a rule, a closed form serves all or none
 FINEST = 3e-16  # no float64 can be known better
+# For what float64 leaves open: many motions at once, to 23 digits, and one by one, to 30.
+IN_TIME, IN_PHI = (lockstep_pairs, taylor_double), (taylor_double,)
 
 
 def trajectories(method, rows, times, rtol):
@@ -74,9 +76,7 @@ def _trajectories(method, rtol, rows, times, served):
     solve = partial(solution.trajectories, rtol=rtol)
     if not served:
         results = solve(method, rows, times)
-        return _completed(
-            results, _left_open(results, rtol), partial(solve, taylor_double), rows, times
-        )
+        return _with_more_digits(results, solve, IN_TIME, rtol, rows, times)
     results = solve(closed, rows, times)
     missed = solution.missed(results, rtol)
     floats, turnings, status = results
@@ -85,7 +85,7 @@ def _trajectories(method, rtol, rows, times, served):
         missed |= uncounted
         floats[uncounted] = np.nan
         status[uncounted & (status == OK)] = closed.NO_CONVERGENCE
-    return _further(solve, method, rtol, results, missed, rows, times)
+    return _further(solve, method, IN_TIME, rtol, results, missed, rows, times)
 
 
 def _abel(method, rtol, before, timed, rows, targets, served):
@@ -95,26 +95,30 @@ def _abel(method, rtol, before, timed, rows, targets, served):
         results, met = solution.abel_and_met(method, rows, targets, rtol, before, timed=timed)
         if met and rtol >= FINEST:
             return results
-        return _completed(
-            results, _left_open(results, rtol, timed), partial(solve, taylor_double), rows, targets
-        )
+        return _with_more_digits(results, solve, IN_PHI, rtol, rows, targets, timed)
     results = solve(closed, rows, targets)
     missed = solution.missed(results, rtol) & (results[-1] != EQUILIBRIUM)
-    return _further(solve, method, rtol, results, missed, rows, targets)
+    return _further(solve, method, IN_PHI, rtol, results, missed, rows, targets)
 
 
-def _further(solve, method, rtol, results, missed, rows, columns):
-    """`results` of closed forms; where they are missed those of `method`, and then of double-double
-    arithmetic.
-    """
+def _further(solve, method, finer, rtol, results, missed, rows, columns):
+    """`results` of closed forms; where they are missed those of `method`, and then of more digits."""
     some = missed.any(axis=1)
     if not some.any():
         return results
     rows, columns, own = rows[some], columns[some], tuple(result[some] for result in results)
     own = _completed(own, missed[some], partial(solve, method), rows, columns)
-    own = _completed(own, _left_open(own, rtol), partial(solve, taylor_double), rows, columns)
+    own = _with_more_digits(own, solve, finer, rtol, rows, columns)
     for result, new in zip(results, own, strict=True):
         result[some] = new
+    return results
+
+
+def _with_more_digits(results, solve, finer, rtol, rows, columns, timed=True):
+    """`results`, with those of one method of more digits after the other where they are left open."""
+    for method in finer:
+        left = _left_open(results, rtol, timed)
+        results = _completed(results, left, partial(solve, method), rows, columns)
     return results
 
 

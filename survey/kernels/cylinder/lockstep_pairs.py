@@ -1,0 +1,414 @@
+"""Many trajectories of the gyrostat in lock step to some 23 digits: for what float64 leaves open, where
+all of double-double arithmetic (`flow_double`) takes thirty times as long.
+
+Taylor series of order 32 as in `lockstep`, in the axes of the parameters. The first PAIRS coefficients of
+S, C and w are double-doubles, and so are phi, w and t. A later one counts for less than 1e-6 of w within a
+step, so that float64 knows it to 1e-22:
+
+    phi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S - c23 (1 - 2 S S) + s2 C - s3 S      (57)
+
+Error bounds are carried in float64, as there.
+
+Sources: those of `kernels.math.double` and `kernels.cylinder.flow_double`.
+"""
+
+import math
+
+import numpy as np
+
+from survey.kernels.cylinder import lockstep
+from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.flow import (
+    B12,
+    B31,
+    BOUND_DG,
+    BOUND_F,
+    BOUND_G,
+    C23,
+    S2,
+    S3,
+    SIX,
+    TWO_PI,
+    D,
+)
+from survey.kernels.cylinder.lockstep import (
+    AFTER,
+    BLOCK,
+    COUNT,
+    DG,
+    DUE,
+    F_,
+    FALL,
+    HIGH_AT,
+    LANES,
+    LOW,
+    NARROW,
+    NEAREST,
+    NEXT,
+    PDG,
+    PF,
+    PG,
+    PHI_AT,
+    PSI,
+    RATE,
+    SAA,
+    SAB,
+    SBB,
+    SIGN,
+    STATE,
+    STEPS,
+    TIME,
+    TIME_LOW,
+    TURNINGS_AT,
+    TURNS,
+    UNSURE,
+    V_AT,
+    WIDE_AT,
+    V,
+    busy,
+    varied,
+    vary,
+)
+from survey.kernels.cylinder.steps import OK, TRUST, UNDETERMINED, bar, finite, start_sign
+from survey.kernels.jit import inline, kernel
+from survey.kernels.math import double as dd
+from survey.kernels.math.angles_double import centred, radians
+from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
+from survey.kernels.unroll import unroll
+
+ORDER = 32
+PAIRS = 10  # orders 0 to 9
+VECTOR = 8  # as many lanes as that cost no more than one
+SERVES = ()  # a last resort but one, never a user's choice
+FLOW_FINEST = 1.0  # nothing to refine
+FLOW_WORK = 1
+TOLERANCE = 1e-24  # truncation of one step, relative to 1 + |w|
+# Of what float64 rounds in the later coefficients, relative to w' times the step: the first of them counts for at most
+# TOLERANCE^(9/32) of it, and so on; 16 roundings each, and as much again
+# of a sum or a product of pairs in a step, with room
+ROUGH = 16.0 * PAIR_ROUNDOFF
+LATER = 64.0 * ROUNDOFF_UP * TOLERANCE ** (9.0 / 32.0)
+LOWER = ORDER + 1  # where the second parts begin
+TERMS = 13  # of sin and cos of an eighth of a turn
+EXACT = 6  # of them pairs
+
+
+def _pair(numerator, denominator):
+    """A fraction as a double-double."""
+    from fractions import Fraction
+
+    exact = Fraction(numerator, denominator)
+    high = float(exact)
+    return high, float(exact - Fraction(high))
+
+
+# 1 / (n + 1); coefficients of sin x / x and of cos x in x^2
+PARTS = np.array([_pair(1, n + 1) for n in range(ORDER + 1)])
+SINE = np.array([_pair((-1) ** n, math.factorial(2 * n + 1)) for n in range(TERMS)])
+COSINE = np.array([_pair((-1) ** n, math.factorial(2 * n)) for n in range(TERMS)])
+
+
+@inline
+def _clear(rows):
+    """Zeros, number by number: an assignment to a slice would take a second to compile."""
+    for k in range(rows.shape[0]):
+        for i in range(rows.shape[1]):
+            rows[k, i] = 0.0
+
+
+@inline
+def _begin(S, C, W, state, low, sums, lanes):
+    """Take whole turns out of phi; the first coefficients."""
+    z, rest, quarter = sums[0:2], sums[2:4], sums[4]
+    sine, cosine = sums[5:7], sums[7:9]
+    for i in range(lanes):
+        k = (state[PSI, i] * (1.0 / TWO_PI) + NEAREST) - NEAREST
+        state[PSI, i], low[0, i] = dd.add((state[PSI, i], low[0, i]), dd.neg(radians(k)))
+        state[TURNS, i] += k
+        W[0, i], W[LOWER, i] = state[V, i], low[1, i]
+    for i in range(lanes):
+        quarter[i] = (state[PSI, i] * (2.0 / math.pi) + NEAREST) - NEAREST
+        x = dd.add((state[PSI, i], low[0, i]), dd.neg(radians(0.25 * quarter[i])))
+        rest[0, i], rest[1, i] = x
+        z[0, i], z[1, i] = dd.square(x)
+    _clear(sums[5:9])
+    for n in range(TERMS - 1, -1, -1):
+        one, two = SINE[n], COSINE[n]
+        if n >= EXACT:
+            for i in range(lanes):
+                sine[0, i] = sine[0, i] * z[0, i] + one[0]
+                cosine[0, i] = cosine[0, i] * z[0, i] + two[0]
+        else:
+            _horner(sine, z, one, lanes)
+            _horner(cosine, z, two, lanes)
+    for i in range(lanes):
+        q = quarter[i]
+        one, two = (
+            dd.mul((sine[0, i], sine[1, i]), (rest[0, i], rest[1, i])),
+            (cosine[0, i], cosine[1, i]),
+        )
+        swapped = abs(q) == 1.0
+        back = -1.0 if (q > 1.5) | ((-2.5 < q) & (q < -0.5)) else 1.0
+        under = -1.0 if (q > 0.5) | (q < -1.5) else 1.0
+        S[0, i], S[LOWER, i] = (
+            back * (two[0] if swapped else one[0]),
+            back * (two[1] if swapped else one[1]),
+        )
+        C[0, i], C[LOWER, i] = (
+            under * (one[0] if swapped else two[0]),
+            under * (one[1] if swapped else two[1]),
+        )
+
+
+@inline
+def _horner(total, x, term, lanes):
+    for i in range(lanes):
+        product = dd.mul((total[0, i], total[1, i]), (x[0, i], x[1, i]))
+        total[0, i], total[1, i] = dd.loose(product, (term[0], term[1]))
+
+
+@kernel
+def _product_of_pairs(total, A, B, n, lanes):
+    """Coefficient n of the product of two series, pairs, in `total` (2, LANES): see `double.convolved`."""
+    for i in range(lanes):
+        total[0, i] = total[1, i] = 0.0
+    for k in range(n + 1):
+        for i in range(lanes):
+            a, b = A[k, i], B[n - k, i]
+            p, e = dd.two_prod(a, b)
+            total[0, i], q = dd.two_sum(total[0, i], p)
+            total[1, i] += q + (e + (a * B[LOWER + n - k, i] + A[LOWER + k, i] * b))
+
+
+@kernel
+def _product(total, A, B, n, lanes):
+    """Coefficient n >= 3 of the product of two series in row 0 of `total`, four terms at once."""
+    for i in range(lanes):
+        total[0, i] = 0.0
+    for k in range(0, n - 2, 4):
+        for i in range(lanes):
+            total[0, i] += (A[k, i] * B[n - k, i] + A[k + 1, i] * B[n - k - 1, i]) + (
+                A[k + 2, i] * B[n - k - 2, i] + A[k + 3, i] * B[n - k - 3, i]
+            )
+    for k in range((n + 1) // 4 * 4, n + 1):
+        for i in range(lanes):
+            total[0, i] += A[k, i] * B[n - k, i]
+
+
+@inline
+def _expand(S, C, W, T, six, sums, lanes):
+    """All coefficients of all lanes, and those of f and g' to order LOW in T."""
+    cw, sw, cs, ss = sums[0:2], sums[2:4], sums[4:6], sums[6:8]
+    for n in range(ORDER):
+        if n < PAIRS - 1:
+            _product_of_pairs(cw, C, W, n, lanes)
+            _product_of_pairs(sw, S, W, n, lanes)
+            _product_of_pairs(cs, C, S, n, lanes)
+            _product_of_pairs(ss, S, S, n, lanes)
+            _onward(S, C, W, six, sums, n, lanes)
+        else:
+            _product(cw, C, W, n, lanes)
+            _product(sw, S, W, n, lanes)
+            _product(cs, C, S, n, lanes)
+            _product(ss, S, S, n, lanes)
+            r = PARTS[n, 0]
+            for i in range(lanes):
+                g = (six[S2, i] * C[n, i] - six[S3, i] * S[n, i]) - (
+                    six[D, i] * cs[0, i] - 2.0 * six[C23, i] * ss[0, i]
+                )
+                W[n + 1, i] = (six[B12, i] * cw[0, i] - six[B31, i] * sw[0, i] + g) * r
+                S[n + 1, i], C[n + 1, i] = cw[0, i] * r, -sw[0, i] * r
+        if n <= LOW:
+            one = 1.0 if n == 0 else 0.0
+            for i in range(lanes):
+                T[F_ + n, i] = six[B12, i] * C[n, i] - six[B31, i] * S[n, i]
+                T[DG + n, i] = (
+                    4.0 * six[C23, i] * cs[0, i]
+                    - six[D, i] * (one - 2.0 * ss[0, i])
+                    - (six[S2, i] * S[n, i] + six[S3, i] * C[n, i])
+                )
+
+
+@kernel
+def _onward(S, C, W, six, sums, n, lanes):
+    """The next coefficients, pairs, from the products of order n."""
+    part, one, m = (PARTS[n, 0], PARTS[n, 1]), 1.0 if n == 0 else 0.0, LOWER + n
+    for i in range(lanes):
+        cw, sw = dd.quick_two_sum(sums[0, i], sums[1, i]), dd.quick_two_sum(sums[2, i], sums[3, i])
+        sums[0, i], sums[1, i] = dd.mul(cw, part)
+        sums[2, i], sums[3, i] = dd.mul(dd.neg(sw), part)
+        total = dd.loose(dd.times(cw, six[B12, i]), dd.times(sw, -six[B31, i]))
+        total = dd.loose(total, dd.times((C[n, i], C[m, i]), six[S2, i]))
+        total = dd.loose(total, dd.times((S[n, i], S[m, i]), -six[S3, i]))
+        cs, ss = dd.quick_two_sum(sums[4, i], sums[5, i]), dd.quick_two_sum(sums[6, i], sums[7, i])
+        total = dd.loose(total, dd.times(cs, -six[D, i]))
+        total = dd.loose(total, dd.times(dd.shifted(dd.scaled(ss, -2.0), one), -six[C23, i]))
+        W[n + 1, i], W[m + 1, i] = dd.mul(total, part)
+    for i in range(lanes):
+        S[n + 1, i], S[m + 1, i] = sums[0, i], sums[1, i]
+        C[n + 1, i], C[m + 1, i] = sums[2, i], sums[3, i]
+
+
+@unroll
+def _vary(T, i):
+    vary(T, *([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG)), i)
+
+
+@inline
+def _move(W, dt, x, v, first, last):
+    """phi less that at the start, and w, in x and v (2, LANES), at dt of a step, of the lanes `first` to `last` - 1."""
+    for i in range(first, last):
+        x[0, i] = x[1, i] = v[0, i] = v[1, i] = 0.0
+    for n in range(ORDER, PAIRS - 1, -1):
+        for i in range(first, last):
+            v[0, i] = v[0, i] * dt[i] + W[n, i]
+            x[0, i] = x[0, i] * dt[i] + W[n, i] * PARTS[n, 0]
+    for n in range(PAIRS - 1, -1, -1):
+        for i in range(first, last):
+            term = W[n, i], W[LOWER + n, i]
+            v[0, i], v[1, i] = dd.loose(dd.times((v[0, i], v[1, i]), dt[i]), term)
+            rise = dd.mul(term, (PARTS[n, 0], PARTS[n, 1]))
+            x[0, i], x[1, i] = dd.loose(dd.times((x[0, i], x[1, i]), dt[i]), rise)
+    for i in range(first, last):
+        x[0, i], x[1, i] = dd.times((x[0, i], x[1, i]), dt[i])
+
+
+@inline
+def _ellipse(W, fixed, i, carried, jacobian, dt, v):
+    """The error ellipse at dt in a step, where w = v, from the one at its start: as `lockstep.ellipse`."""
+    saa, sab, sbb = carried
+    u1, u2, z1, z2 = jacobian
+    fourth = (dt * dt) * (dt * dt)
+    power = (fourth * fourth) * (fourth * fourth)  # 16
+    power *= (fourth * fourth) * fourth * dt  # ORDER - 3
+    high = (abs(W[ORDER, i]) * dt + abs(W[ORDER - 1, i])) * dt * dt
+    low = FALL * max(abs(W[ORDER - 2, i]) * dt, abs(W[ORDER - 3, i]))
+    reach = abs(v) + dt * (fixed[PF, i] * abs(v) + fixed[PG, i])
+    change = dt * (fixed[PF, i] * reach + fixed[PG, i])
+    g = 2.0 * power * (high + low) + LATER * change + ROUGH * (1.0 + abs(v) + change)
+    e = g * dt + ROUGH * (4.0 + dt * reach)
+    return (
+        u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e,
+        u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb,
+        z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g,
+    )
+
+
+@inline
+def _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes):
+    """One step of every lane; `before` and `low_before` keep the state before it."""
+    dt, x, v = sums[0], sums[1:3], sums[3:5]
+    for i in range(lanes):
+        for k in range(STATE):
+            before[k, i] = state[k, i]
+        low_before[0, i], low_before[1, i] = low[0, i], low[1, i]
+    for i in range(lanes):
+        w, guess = state[V, i], state[RATE, i]
+        last, previous = abs(W[ORDER, i]), abs(W[ORDER - 1, i])
+        fall = FALL * guess * guess
+        size = max(last, fall * abs(W[ORDER - 2, i]))
+        size = max(size, max(previous, fall * abs(W[ORDER - 3, i])) * guess)
+        size = size * max(1.0, lockstep._SHORT * guess) / (TOLERANCE * (1.0 + abs(w)))
+        root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(size))))
+        square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
+        state[RATE, i] = math.sqrt(max(root, square) + 1e-300)
+        dt[i] = 1.0 / state[RATE, i]
+    _move(W, dt, x, v, 0, lanes)
+    for i in range(lanes):
+        h, w = dt[i], v[0, i]
+        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] < h
+        carried = state[SAA, i], state[SAB, i], state[SBB, i]
+        state[SAA, i], state[SAB, i], state[SBB, i] = _ellipse(
+            W, fixed, i, carried, varied(lockstep.variations(T, i), h), h, w
+        )
+        good = state[SAA, i] < TRUST and state[SBB, i] < (1.0 + abs(w)) * (1.0 + abs(w))
+        fate[i] = (lockstep._PASSED if passed else 0.0) + (0.0 if good else lockstep._LOST)
+    for i in range(lanes):
+        time = dd.shifted((state[TIME, i], state[TIME_LOW, i]), dt[i])
+        phi = dd.add((state[PSI, i], low[0, i]), (x[0, i], x[1, i]))
+        state[TIME, i], state[TIME_LOW, i] = time
+        state[PSI, i], low[0, i] = phi
+        state[V, i], low[1, i] = v[0, i], v[1, i]
+        state[STEPS, i] += 1.0
+
+
+@kernel
+def _evaluate(W, T, state, before, low_before, fixed, found, i, sums):
+    """Find what there is AFTER the start of the step in lane i: as `lockstep._evaluate`."""
+    dt, x, v = found[AFTER], sums[1:3], sums[3:5]
+    _move(W, dt, x, v, i, i + 1)
+    h, w = dt[i], v[0, i]
+    carried = before[SAA, i], before[SAB, i], before[SBB, i]
+    saa, _sab, sbb = _ellipse(W, fixed, i, carried, varied(lockstep.variations(T, i), h), h, w)
+    n, count, sign = state[STEPS, i], before[COUNT, i], before[SIGN, i]
+    phi = dd.add((before[PSI, i], low_before[0, i]), (x[0, i], x[1, i]))
+    phi = dd.add(phi, radians(before[TURNS, i]))[0]
+    late = 4.0 * ROUNDOFF_UP * h  # the time in the step is float64's
+    wide = bar(n, saa) + late * abs(w) + ROUNDOFF_UP * abs(phi)
+    high = bar(n, sbb) + late * (fixed[PF, i] * abs(w) + fixed[PG, i]) + ROUNDOFF_UP * abs(w)
+    from_rest = (before[STEPS, i] == 0.0) & (before[V, i] == 0.0)
+    sure = (before[UNSURE, i] < 3.0) & (count >= 0.0) & ((abs(w) > high) | from_rest)
+    passed = (sign * w < 0.0) & (not from_rest)
+    found[PHI_AT, i], found[V_AT, i], found[WIDE_AT, i], found[HIGH_AT, i] = phi, w, wide, high
+    found[NARROW, i] = 1.0 if (wide < TRUST) & (high < TRUST * (1.0 + abs(w))) else 0.0
+    found[TURNINGS_AT, i] = count + (1.0 if passed else 0.0) if sure else float(UNDETERMINED)
+
+
+@kernel
+def _refill(P, starts, times, waiting, state, low, fixed, six, row, column, status):
+    """Give free lanes the rows that wait; returns the first that still waits."""
+    for i in range(LANES):
+        while waiting < len(P) and row[i] < 0:
+            if finite(times[waiting]) == 0:
+                status[waiting] = OK
+            else:
+                p, w0 = P[waiting], starts[waiting, rc.START_W]
+                phi, turns = centred((starts[waiting, rc.START_PHI], 0.0))
+                for k in range(STATE):
+                    state[k, i] = 0.0
+                for k in range(SIX):
+                    six[k, i] = p[k]
+                state[PSI, i], low[0, i] = phi
+                state[TURNS, i], state[V, i], low[1, i] = turns, w0, 0.0
+                fixed[PF, i], fixed[PG, i], fixed[PDG, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG]
+                square = p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F])
+                state[RATE, i] = abs(w0) + math.sqrt(square)
+                state[SIGN, i] = start_sign(p, phi[0], w0)
+                fixed[NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
+            waiting += 1
+    return waiting
+
+
+@kernel
+def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
+    """As `lockstep.trajectories`; `tolerance` has no meaning here."""
+    work = np.zeros((lockstep.ROWS, LANES))
+    T, state, before, fixed, found, fate = lockstep.split(work)
+    S, C, W = (
+        np.zeros((LOWER + PAIRS, LANES)),
+        np.zeros((LOWER + PAIRS, LANES)),
+        np.zeros((LOWER + PAIRS, LANES)),
+    )
+    low, low_before = np.zeros((2, LANES)), np.zeros((2, LANES))
+    six, sums = np.zeros((SIX, LANES)), np.zeros((9, LANES))
+    fixed[NEXT, :] = math.inf  # of lanes that stay free, too
+    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    waiting, lanes = np.int64(0), min(LANES, (len(P) + VECTOR - 1) // VECTOR * VECTOR)
+    waiting = _refill(P, starts, times, waiting, state, low, fixed, six, row, column, status)
+    while busy(row):
+        _begin(S, C, W, state, low, sums, lanes)
+        _expand(S, C, W, T, six, sums, lanes)
+        for i in range(LANES):
+            _vary(T, i)
+        _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes)
+        lockstep._turnings(state)
+        for first in range(0, LANES, BLOCK):
+            while lockstep._due(state, before, fixed, found, fate, first):
+                for i in range(first, first + BLOCK):
+                    if found[DUE, i] != 0.0:
+                        _evaluate(W, T, state, before, low_before, fixed, found, i, sums)
+                lockstep._note(times, fixed, found, fate, row, column, first, planes, turnings)
+        if lockstep._free(limit, state, fixed, fate, row, status):
+            waiting = _refill(
+                P, starts, times, waiting, state, low, fixed, six, row, column, status
+            )
