@@ -256,21 +256,23 @@ def _cycles(p, answer, i, cycles, slack):
             continue
         step = 1e-7 * abs(w)
         goal = section + np.copysign(2 * np.pi, w)
-        rows = np.array([[*p.values(), section, w + s * step, goal] for s in (-1, 0, 1)])
-        out = np.full((3, gf.COLUMNS), np.nan)
+        shifts = (-1, -0.5, 0, 0.5, 1)
+        rows = np.array([[*p.values(), section, w + s * step, goal] for s in shifts])
+        out = np.full((len(shifts), gf.COLUMNS), np.nan)
         gf.along(rows, 1e-28, out)
         if not (out[:, gf.TURNED] == 0).all():
             continue
         speeds, times = out[:, gf.VALUE], out[:, gf.TIME]
-        slope = (speeds[2] - speeds[0]) / (2 * step)
-        defect = (speeds[1] - w) + out[1, gf.VALUE + 1]
+        coarse, slope = (speeds[4] - speeds[0]) / (2 * step), (speeds[3] - speeds[1]) / step
+        curved = abs(slope - coarse)
+        defect = (speeds[2] - w) + out[2, gf.VALUE + 1]
         cycles["cycle_w"][i, j] = w + defect / (1 - slope)
         slack["cycle_w"][i, j] = 1e-13 * (1 + abs(w)) / abs(1 - slope) + 1e-3 * abs(
             defect / (1 - slope)
         )
         cycles["cycle_multiplier"][i, j] = slope
-        slack["cycle_multiplier"][i, j] = 1e-6 * (1 + slope) / min(1, abs(w))
-        cycles["cycle_period"][i, j] = times[1] + (times[2] - times[0]) / (2 * step) * (
+        slack["cycle_multiplier"][i, j] = 1e-6 * (1 + slope) / min(1, abs(w)) + curved
+        cycles["cycle_period"][i, j] = times[2] + (times[3] - times[1]) / step * (
             cycles["cycle_w"][i, j] - w
         )
-        slack["cycle_period"][i, j] = 1e-13 * (1 + times[1]) * (1 + 1 / abs(w)) / abs(1 - slope)
+        slack["cycle_period"][i, j] = 1e-13 * (1 + times[2]) * (1 + 1 / abs(w)) / abs(1 - slope)
