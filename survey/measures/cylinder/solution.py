@@ -158,7 +158,7 @@ def _in_order(method, rows, times, rtol, decades):
         return floats, turnings, status
 
     asked = np.isfinite(times)
-    results, _met = _repeated(run, asked, ladder, rtol)
+    results, _met = _repeated(run, lambda: asked, ladder, rtol)
     if hasattr(method, "flow_turnings") and (rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0):
         _count(method, rows, times, ladder[-1], asked, results)
     return results
@@ -265,14 +265,16 @@ def _in_phi(method, rows, targets, rtol, by_row, timed):
         solve(P, starts, at, tolerance, budget, planes, status)
         return planes.transpose(1, 2, 0), status
 
-    asked = np.isfinite(distinct(targets))
+    def asked():
+        return np.isfinite(targets) & (targets != rows[:, rc.PHI0, None])  # the start is known
+
     results, done = _repeated(run, asked, tolerances(method, rtol, ABEL_SHARE), rtol, timed)
     return back(results), done
 
 
 def _repeated(run, asked, ladder, rtol, timed=True):
-    """Solve all rows, then again, finer, those that miss the requested accuracy; keep the better of
-    two. With whether every point is known to meet it.
+    """Solve all rows, then again, finer, those that miss the requested accuracy where they are `asked()`;
+    keep the better of two. With whether every point is known to meet it.
     """
     first, *others = ladder
 
@@ -286,7 +288,7 @@ def _repeated(run, asked, ladder, rtol, timed=True):
         if met(results, rtol, timed):
             return results, True
         without_times(results)
-        coarse = (missed(results, rtol) & asked).any(axis=1)
+        coarse = (missed(results, rtol) & asked()).any(axis=1)
         if not coarse.any() or tolerance >= first:
             break
         finer = without_times(run(coarse, tolerance))

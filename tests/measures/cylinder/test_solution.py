@@ -421,6 +421,7 @@ def test_angles_on_both_sides_of_the_start_are_served_as_those_of_either():
     rows = np.column_stack(
         [rng.uniform(-0.5, 0.5, (30, 6)), rng.uniform(1, 5, 30), rng.uniform(-4, 4, 30)]
     )
+    rows[:6, 7], rows[6:15, 7] = 0.0, rng.choice([-1, 1], 9) * 10.0 ** rng.uniform(-13, -2, 9)
     angles = np.broadcast_to(np.linspace(0.0, 6.0, 25), (30, 25))
     floats, status = solution.abel(taylor, rows, angles, 1e-9)
     for row, found, codes in zip(rows, floats, status, strict=True):
