@@ -57,9 +57,9 @@ An Abel solution has status `ok` where it certainly reaches phi, `turning` where
 or so near to it that phi lies within `phi_turning_error` of `phi_turning`.
 
 `auto` takes trajectories and Abel solutions in closed form where one applies and keeps its digits
-(method `closed`), else by Taylor series. Where these miss `rtol`, trajectories have series to 23 digits
-(ten times the time), and what is still left open, like fates next to separatrices, is solved in
-double-double arithmetic (some 1e-3 s each). `survey failures gyrostat` maps where each method fails.
+(method `closed`), else by Taylor series. Where these miss `rtol`, trajectories are computed again by
+series of 23 digits, at ten times the cost; what is still open, and fates next to separatrices, are
+solved in double-double arithmetic (some 1e-3 s each). `survey failures gyrostat` maps where each method fails.
 
 `turnings` counts the zeros of w between 0 and t, its ends not among them; it is unknown where a
 zero lies so near to t that the error bar of w leaves it open on which side.

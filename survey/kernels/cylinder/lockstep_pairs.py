@@ -1,5 +1,5 @@
 """Many trajectories of the gyrostat in lock step to some 23 digits: for what float64 leaves open, where
-all of double-double arithmetic (`flow_double`) takes thirty times as long.
+double-double arithmetic (`flow_double`), one by one, takes ten times as long.
 
 Taylor series of order 32 as in `lockstep`, in the axes of the parameters. The first PAIRS coefficients of
 S, C and w are double-doubles, and so are phi, w and t. A later one counts for less than 1e-6 of w within a
@@ -7,7 +7,9 @@ step, so that float64 knows it to 1e-22:
 
     phi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S - c23 (1 - 2 S S) + s2 C - s3 S      (57)
 
-Error bounds are carried in float64, as there.
+Error bounds are carried in float64, as there. S, C and W below are tables (LOWER + PAIRS, LANES) of
+the coefficients and, from row LOWER on, of the second parts of the pairs; `six` (SIX, LANES) holds the
+parameters, `low` (2, LANES) the second parts of phi and w, `sums` (9, LANES) anything.
 
 Sources: those of `kernels.math.double` and `kernels.cylinder.flow_double`.
 """
@@ -79,15 +81,17 @@ from survey.kernels.unroll import unroll
 ORDER = 32
 PAIRS = 10  # orders 0 to 9
 VECTOR = 8  # as many lanes as that cost no more than one
-SERVES = ()  # a last resort but one, never a user's choice
+SERVES = ()  # used before `taylor_double`; users cannot choose it
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
 TOLERANCE = 1e-24  # truncation of one step, relative to 1 + |w|
-# Of what float64 rounds in the later coefficients, relative to w' times the step: the first of them counts for at most
-# TOLERANCE^(9/32) of it, and so on; 16 roundings each, and as much again
-# of a sum or a product of pairs in a step, with room
-ROUGH = 16.0 * PAIR_ROUNDOFF
-LATER = 64.0 * ROUNDOFF_UP * TOLERANCE ** (9.0 / 32.0)
+ROUGH = (
+    16.0 * PAIR_ROUNDOFF
+)  # relative rounding of one step in double-double: 16 operations, with room
+LATER = (
+    64.0 * ROUNDOFF_UP
+)  # what float64 loses of a coefficient from PAIRS on: a few roundings, with room
+LEAST = 1e-21  # of w' times the step: the same, should these coefficients happen to be small
 LOWER = ORDER + 1  # where the second parts begin
 TERMS = 13  # of sin and cos of an eighth of a turn
 EXACT = 6  # of them pairs
@@ -285,7 +289,10 @@ def _ellipse(W, fixed, i, carried, jacobian, dt, v):
     low = FALL * max(abs(W[ORDER - 2, i]) * dt, abs(W[ORDER - 3, i]))
     reach = abs(v) + dt * (fixed[PF, i] * abs(v) + fixed[PG, i])
     change = dt * (fixed[PF, i] * reach + fixed[PG, i])
-    g = 2.0 * power * (high + low) + LATER * change + ROUGH * (1.0 + abs(v) + change)
+    later = ((abs(W[PAIRS + 3, i]) * dt + abs(W[PAIRS + 2, i])) * dt + abs(W[PAIRS + 1, i])) * dt
+    later = (later + abs(W[PAIRS, i])) * (fourth * fourth) * dt * dt  # of order PAIRS
+    g = 2.0 * power * (high + low) + LATER * later + LEAST * change
+    g += ROUGH * (1.0 + abs(v) + change)
     e = g * dt + ROUGH * (4.0 + dt * reach)
     return (
         u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e,

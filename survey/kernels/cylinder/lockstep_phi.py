@@ -59,7 +59,7 @@ from survey.kernels.unroll import (
 )
 
 ORDER = 16
-VARIED = 6  # order of the integral of g / w^2
+VARIED = 6  # order of the series of g / w^2, which is integrated
 # Rows of the series: f / w0 and g / w0^2, or what they are made of; omega, q, r, and the integral of r.
 F_, G_, OMEGA = 0, ORDER, 2 * ORDER
 Q, R = OMEGA + ORDER + 1, OMEGA + 2 * ORDER + 1
@@ -242,7 +242,7 @@ def _contracted(q, r, h):
     power = h
     for _ in range(VARIED - 2):
         power = power * h
-    # the last terms, of which some may be small by accident
+    # any one of the last terms may happen to be small
     last, previous, third = (abs(rates[VARIED - n]) for n in range(3))
     left = ((last * h + previous) * h + 0.1 * third) * power
     return part * part, left + abs(exponent) * exponent * exponent * (1.0 / 700.0) + 1e-14
@@ -291,7 +291,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         grown = h * most_g * most
         within = bound * (1.0 + grown + grown * grown) + local  # grown < 1
         contracted, doubt = _contracted(_low_q(T, i), r, h)
-        doubt += 2.0 * grown * bound * inverse  # the square of the error
+        doubt += 4.0 * grown * within * inverse  # the square of the error
         now = contracted * (1.0 + doubt) * bound + local
         step[W_WITHIN, i], step[LOWEST, i], step[STEEPEST, i] = within, lowest, slope
         high = state[TIME, i] + spent

@@ -167,8 +167,8 @@ def _phase(T):
 
 @inline
 def drift(w0, f, square, half, s, c, low):
-    """Integral of w(0)/w over the time 2 half, or a little more than its terms may cancel to; divided by
-    cosh^2 where low = 1/cosh^2, c = 1 and s = tanh/Delta.
+    """Integral of w(0)/w over the time 2 half, plus a bound of what cancellation of its terms may lose;
+    divided by cosh^2 where low = 1/cosh^2, c = 1 and s = tanh/Delta.
     """
     short = abs(square) * half * half < 1e-3
     third = 2.0 / 3.0 * half * half * half * low if short else (half * low - s * c) / square
@@ -186,18 +186,20 @@ def deviation(offset, miss, gain, mu, other, w0, F, f, square, w, slope, t):
     """Bound of e until t, where w and dw/dx = `slope` are reached: of two bounds of its growth the lesser.
 
     The integral of f dt is at most b t, and |change of F|/least w; mu times it is ln w at the end less that at the
-    start; ln z <= (z - 1)/sqrt z, exp z <= 1/(1 - z). On the way w may have been larger than at both ends.
+    start; ln z <= (z - 1)/sqrt z, exp z <= 1/(1 - z). Where w has passed its maximum, that counts.
     """
     highest, passed = abs(w0 - F) + math.sqrt(F * F + f * f), f > 0.0 and slope < 0.0
     most = highest if square > 0.0 or passed else max(w, w0)
     least = square / highest if square > 0.0 else min(w, w0)
-    ratio = max(most / least, 1.0)  # not less, by a rounding
+    ratio = most / least
+    ratio = 1.0 if (ratio < 1.0) & (ratio > 0.0) else ratio  # by a rounding; NaN stays NaN
     root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(math.sqrt(ratio))))))
-    steep = (
-        abs(other)
-        / max(abs(mu), 1e-300)
-        * (64.0 * ((root - 1.0) / math.sqrt(root)) + 16.0 * ROUNDOFF_UP)
+    # six roots lose what is small beside 1, of which ln z <= z - 1 keeps all
+    logarithm = min(
+        64.0 * ((root - 1.0) / math.sqrt(root)) + 160.0 * ROUNDOFF_UP,
+        (ratio - 1.0) + 8.0 * ROUNDOFF_UP,
     )
+    steep = abs(other) / max(abs(mu), 1e-300) * logarithm
     # e as w^((1 - mu)/mu), where w is monotone
     shrinks = square <= 0.0 and not passed and (w < w0) == (mu * other > 0.0)
     steep = 0.0 if shrinks else steep
@@ -233,7 +235,7 @@ def _formula(T):
         ) / norm + 6.0 * ROUNDOFF_UP * (w * t + abs(x))
         steepest = abs(slope) + math.sqrt(F * F + f * f) * bar
         bar_w = MARGIN * (steepest * bar + moved + 4.0 * noise + 4.0 * ROUNDOFF_UP * w)
-        # y1^2 + y2^2 may have lost more digits, next to the largest w, than x and the curve
+        # near the largest w, y1^2 + y2^2 loses more digits than w(x) on the curve does
         lost = w * (abs(y2) * (abs(c) + abs(f * s)) + y1 * y1) / norm
         on_curve = w0 + 2.0 * y1 * (f * y2 - F * y1) / norm
         w = on_curve if lost > 0.125 * (w0 + abs(F) + abs(f)) else w

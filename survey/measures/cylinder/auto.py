@@ -30,7 +30,7 @@ from survey.methods import closed
 
 SAMPLE = 64  # rows that are looked at first: as a rule, a closed form serves all or none
 FINEST = 3e-16  # no float64 can be known better
-# For what float64 leaves open: many motions at once, to 23 digits, and one by one, to 30.
+# Methods for what float64 leaves open, in order: many motions at once to 23 digits, then one by one to 30.
 IN_TIME, IN_PHI = (lockstep_pairs, taylor_double), (taylor_double,)
 
 
@@ -118,12 +118,13 @@ def _with_more_digits(results, solve, finer, rtol, rows, columns, timed=True):
     """`results`, with those of one method of more digits after the other where they are left open."""
     for method in finer:
         left = _left_open(results, rtol, timed)
-        results = _completed(results, left, partial(solve, method), rows, columns)
+        last = method is finer[-1]
+        results = _completed(results, left, partial(solve, method), rows, columns, last)
     return results
 
 
 def _left_open(results, rtol, timed=True):
-    """The points that double-double arithmetic may still answer: those that miss rtol, unless by
+    """The points that more digits may still answer: those that miss rtol, unless by
     too many steps or an overflow, and those that have turned an undetermined number of times.
     """
     status = results[-1]
@@ -143,14 +144,17 @@ def _left_open(results, rtol, timed=True):
     return missed
 
 
-def _completed(results, missed, solve, rows, columns):
-    """`results`, with those of `solve` where they are `missed` and `solve` does no worse."""
+def _completed(results, missed, solve, rows, columns, last=True):
+    """`results`, with those of `solve` where they are `missed` and `solve` does no worse; unless it is
+    the `last`, only where it has an answer.
+    """
     if not missed.any():
         return results
     some = missed.any(axis=1)
     others = solve(rows[some], np.where(missed[some], columns[some], np.inf))
     old = [result[some] for result in results]
-    take = missed[some] & (solution.badness(others) <= solution.badness(old))
+    badness = solution.badness(others)
+    take = missed[some] & (badness <= solution.badness(old)) & (last | (badness < 1e300))
     if len(others) == 3:  # turnings that either knows are certain
         (_floats, known, _status), (_others, turnings, _other_status) = old, others
         np.copyto(turnings, known, where=turnings == UNDETERMINED)

@@ -21,7 +21,7 @@ SHARE = 1e-3  # of the requested accuracy, for the truncation error of one step
 ABEL_SHARE = 1e-4  # the same over phi: errors grow as 1 / w before a turning point
 # the same for trajectories: most of what misses the accuracy misses it by little
 ATTEMPTS = (3e-4, 1e-5, 1e-7)
-LONG = 30.0  # from about twice this time on, in units of f and g, trajectories take finer steps
+LONG = 30.0  # from about twice this time on (see `_decades`) trajectories take finer steps
 FINEST = 2e-16  # of a step: below, the truncation is lost in the rounding
 
 
@@ -128,7 +128,8 @@ def _decades(rows, times):
     """How many decades finer than for short ones the steps of each motion are: error bars grow as the
     square of the time, and a second attempt costs more than finer steps.
 
-    Time is measured by the bounds of f and g, which a motion on a line has only as it goes.
+    The unit of time is 1 / (|f| + sqrt |g|), from bounds of f and g; on a line these are known only as
+    the motion proceeds.
     """
     if rows.shape[1] > rc.GIVEN and not rows[0, ON_CIRCLE] > 0.0:
         return np.zeros(len(rows), dtype=int)
@@ -136,8 +137,9 @@ def _decades(rows, times):
     if not np.isfinite(last).all():
         last = np.where(np.isfinite(times), times, 0.0).max(axis=1, initial=0.0)
     P, _starts = split(rows)
-    turned = last * (P[:, BOUND_F] + np.sqrt(P[:, BOUND_G]))
-    return np.rint(2.0 * np.log10(np.fmax(turned / LONG, 1.0))).astype(int)
+    with np.errstate(over="ignore"):
+        turned = last * (P[:, BOUND_F] + np.sqrt(P[:, BOUND_G]))
+    return np.rint(2.0 * np.log10(np.clip(np.nan_to_num(turned) / LONG, 1.0, 1e15))).astype(int)
 
 
 def _in_order(method, rows, times, rtol, decades):

@@ -3,7 +3,7 @@ and point.
 
 See `survey.kernels.libration.panels`. The values at the nodes are double-doubles, so what a series
 leaves out and the roundings of its sum are all of its bar, whatever accuracy is asked: about 1e-14 of
-the factors where all is float64's, 1e-15 where only a row's sum is.
+the factors where every step is in float64, 1e-15 where only the sum over s is.
 """
 
 from decimal import Decimal, localcontext
@@ -103,7 +103,7 @@ def _compile_others():
 def rows(e):
     """The series (R, 5, NODES of `traces`) in 4 s - 3 of rows e (R), and bounds of their errors (R, 5).
 
-    They are sums of pairs, rounded: what is left to round is a point's.
+    They are sums of pairs, rounded: only the sum at each point is left to round.
     """
     sums, bars = _rows(e, "trimmed", traces.NODES)
     series = np.ascontiguousarray(sums[:, :, 0])

@@ -79,7 +79,6 @@ def test_bars_hold_on_hard_systems(scale):
     assert both > theirs - 0.02
 
 
-@pytest.mark.slow
 def test_bars_hold_and_stay_narrow_over_many_turns():
     """100 turns; with b = 0 by the energy, w^2 = w0^2 + 2 (G(phi) - G(phi0)), where errors do not grow."""
     turns = np.linspace(0.0, 200.0 * np.pi, 41)
@@ -153,6 +152,7 @@ def one_step(P, starts, tolerance, factors):
             factors[first + i, 1] = contracted * (1.0 + doubt)
 
 
+@pytest.mark.slow
 def test_phi_is_the_variable_far_from_turning_points():
     """No solution is left to steps in time, and values of three are within their bars of mpmath's."""
     rows = drawn(lockstep.LANES, 9, (0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 3, 0))

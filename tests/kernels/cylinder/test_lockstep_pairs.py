@@ -1,14 +1,17 @@
 """Trajectories to 23 digits in lock step against double-double arithmetic, mpmath, and bits whatever the lane."""
 
+from functools import partial
+
 import mpmath as mp
 import numpy as np
 import pytest
 
-from survey.kernels.cylinder import lockstep_pairs, taylor_double
-from survey.kernels.cylinder.lockstep import LANES, PSI, STATE, TURNS, V
+from survey.kernels.cylinder import lockstep, lockstep_pairs, taylor_double
+from survey.kernels.cylinder.flow import BOUND_G
+from survey.kernels.cylinder.lockstep import LANES, PSI, SAA, SBB, STATE, TURNS, V
 from survey.kernels.cylinder.steps import NO_CONVERGENCE, OK, STEP_LIMIT, UNDETERMINED
 from survey.kernels.jit import fresh
-from survey.measures.cylinder import solution
+from survey.measures.cylinder import auto, solution
 
 
 def solved(rows, times, method=lockstep_pairs):
@@ -84,7 +87,7 @@ def test_agrees_with_double_double_to_the_last_digit_of_float64(scale, t):
 
 
 def test_bars_hold_where_errors_grow_by_many_orders():
-    """Bars are those of float64's rounding elsewhere, and show nothing of the method's own."""
+    """Elsewhere the bars are only float64's rounding, and do not test the method's own error."""
     rows, c = beside_saddles(120, 7)
     times = np.linspace(2.0, 80.0, 8) / np.sqrt(c)[:, None]
     floats, turnings, status = solved(rows, times)
@@ -96,6 +99,57 @@ def test_bars_hold_where_errors_grow_by_many_orders():
     assert (bars[both] > 1e-13).sum() > 50
     sure = both & (turnings != UNDETERMINED) & (counted != UNDETERMINED)
     assert np.array_equal(turnings[sure], counted[sure])
+
+
+@fresh
+def stepped(P, starts, steps, state, low):
+    work = np.zeros((lockstep.ROWS, LANES))
+    T, own, before, fixed, _found, fate = lockstep.split(work)
+    size = lockstep_pairs.LOWER + lockstep_pairs.PAIRS
+    S, C, W = np.zeros((size, LANES)), np.zeros((size, LANES)), np.zeros((size, LANES))
+    here, there = np.zeros((2, LANES)), np.zeros((2, LANES))
+    six, sums = np.zeros((6, LANES)), np.zeros((9, LANES))
+    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    times, status = np.full((len(P), 1), 1e9), np.zeros(len(P), dtype=np.int64)
+    lockstep_pairs._refill(P, starts, times, 0, own, here, fixed, six, row, column, status)
+    for _ in range(steps):
+        lockstep_pairs._begin(S, C, W, own, here, sums, LANES)
+        lockstep_pairs._expand(S, C, W, T, six, sums, LANES)
+        for i in range(LANES):
+            lockstep_pairs._vary(T, i)
+        lockstep_pairs._advance(W, T, own, before, here, there, fixed, fate, sums, LANES)
+    state[:], low[:] = own, here
+
+
+@pytest.mark.parametrize("steps", [1, 20])
+def test_a_step_of_a_fast_motion_keeps_the_energy_within_its_bound(steps):
+    """b = 0: w^2 / 2 + V(phi) is constant; there the error is seen to the last of the 23 digits."""
+    rows = drawn(LANES, 11, (0, 0, 1, 1, 1, 1, 3, 1))
+    rows[:, 7] = np.sign(rows[:, 7]) * np.logspace(0, 4, LANES)
+    P, starts = solution.split(rows)
+    state, low = np.zeros((STATE, LANES)), np.zeros((2, LANES))
+    stepped(P, starts, steps, state, low)
+    off = []
+    with mp.workdps(50):
+        for i, (_b, _c, d, c23, s2, s3, phi, w) in enumerate(rows):
+
+            def energy(x, v, d=d, c23=c23, s2=s2, s3=s3):
+                return (
+                    v * v / 2
+                    + d / 2 * mp.sin(x) ** 2
+                    + c23 * mp.sin(2 * x) / 2
+                    - s2 * mp.sin(x)
+                    - s3 * mp.cos(x)
+                )
+
+            x = mp.mpf(float(state[PSI, i])) + mp.mpf(float(low[0, i]))
+            v = mp.mpf(float(state[V, i])) + mp.mpf(float(low[1, i]))
+            change = abs(energy(x, v) - energy(mp.mpf(float(phi)), mp.mpf(float(w))))
+            bars = [np.sqrt(2.0 * steps * state[k, i]) for k in (SAA, SBB)]
+            bound = P[i, BOUND_G] * bars[0] + abs(float(v)) * bars[1] + 1e-29 * w * w
+            assert change <= bound
+            off.append(float(change / bound))
+    assert max(off) > 1e-4
 
 
 def test_the_same_bits_in_any_lane_beside_any_neighbour():
@@ -127,3 +181,20 @@ def test_a_budget_ends_it_and_what_cannot_be_followed_is_not_answered():
     rows[:, :2] = 0.0
     _floats, _turnings, status = solved(rows, 3000.0 / np.sqrt(c.max()) * np.ones(1))
     assert (status != OK).any() and set(np.unique(status)) <= {OK, NO_CONVERGENCE}
+
+
+def test_what_it_cannot_follow_is_left_to_double_double():
+    """At w = 1e11 its coefficients overflow."""
+    row, times = np.array([[0.3, 0.2, 0.4, 0.1, 0.2, 0.1, 0.5, 1e11]]), np.array([[2e-10]])
+    _floats, _turnings, status = solved(row, times)
+    assert status[0, 0] != OK
+    results = [
+        np.full((1, 1, 4), np.nan),
+        np.full((1, 1), UNDETERMINED),
+        np.full((1, 1), NO_CONVERGENCE),
+    ]
+    solve = partial(solution.trajectories, rtol=1e-12)
+    floats, _turnings, status = auto._with_more_digits(
+        results, solve, auto.IN_TIME, 1e-12, row, times
+    )
+    assert status[0, 0] == OK and floats[0, 0, 0] == pytest.approx(20.5, abs=1e-6)

@@ -179,6 +179,27 @@ def test_what_leads_away_from_a_uniform_rotation_is_in_the_bar():
     assert (np.abs(floats - exact)[..., :2] <= (floats + exact)[..., 2:]).all()
 
 
+@pytest.mark.parametrize(("b", "n"), [(1.0, 0.3), (1.0, 0.25), (3.0, 1.0)])
+def test_what_leads_away_from_a_nearly_uniform_rotation_is_in_the_bar(b, n):
+    """mu of some roundings: w varies by mu b, less than six square roots of a ratio can tell from 1."""
+    k = np.array([0.5, 1, 2, 3, 5, 10, 20, 30, 45, 60, 70, 100, 1000, 1e5])
+    mu = k * 2.0**-52 * n / (2 * b)
+    zero = np.zeros_like(mu)
+    # g = (mu - 1) f (mu F + n), f = b cos phi, F = b sin phi
+    rows = np.transpose([zero + b, zero, mu * (1 - mu) * b * b, zero, (mu - 1) * n * b, zero,
+                         zero + 0.4, mu * b * np.sin(0.4) + n])  # fmt: skip
+    angles = rows[:, 6:7] + np.array([0.5, 2.0, 5.0, 20.0])
+    floats, status = solution.abel(closed, rows, angles, 1e-8)
+    exact, known = solution.abel(taylor_double, rows, angles, 1e-8)
+    both = (status == OK) & (known == OK)
+    assert both.all() and (np.abs(floats - exact)[..., :2] <= (floats + exact)[..., 2:]).all()
+    times = exact[..., 1]
+    floats, _turnings, status = solution.trajectories(closed, rows, times, 1e-8)
+    exact, _turnings, known = solution.trajectories(taylor_double, rows, times, 1e-8)
+    assert ((status == OK) & (known == OK)).all()
+    assert (np.abs(floats - exact)[..., :2] <= (floats + exact)[..., 2:]).all()
+
+
 def series(row, t):
     """phi and w of (57) at t by Taylor series of order 30 with 34 digits."""
     b12, b31, d, c23, s2, s3, phi, w = map(mp.mpf, map(float, row))
