@@ -15,6 +15,7 @@ Sources: those of `kernels.math.double` and `kernels.cylinder.flow_double`.
 """
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
@@ -85,22 +86,18 @@ SERVES = ()  # used before `taylor_double`; users cannot choose it
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
 TOLERANCE = 1e-24  # truncation of one step, relative to 1 + |w|
-ROUGH = (
-    16.0 * PAIR_ROUNDOFF
-)  # relative rounding of one step in double-double: 16 operations, with room
-LATER = (
-    64.0 * ROUNDOFF_UP
-)  # what float64 loses of a coefficient from PAIRS on: a few roundings, with room
+# relative rounding of one step in double-double: 16 operations, with room
+ROUGH = 16.0 * PAIR_ROUNDOFF
+# what float64 loses of a coefficient from PAIRS on: a few roundings, with room
+LATER = 64.0 * ROUNDOFF_UP
 LEAST = 1e-21  # of w' times the step: the same, should these coefficients happen to be small
 LOWER = ORDER + 1  # where the second parts begin
-TERMS = 13  # of sin and cos of an eighth of a turn
-EXACT = 6  # of them pairs
+TERMS = 13  # of sin and cos of up to an eighth of a turn
+EXACT = 6  # of these are pairs
 
 
 def _pair(numerator, denominator):
     """A fraction as a double-double."""
-    from fractions import Fraction
-
     exact = Fraction(numerator, denominator)
     high = float(exact)
     return high, float(exact - Fraction(high))
@@ -166,6 +163,7 @@ def _begin(S, C, W, state, low, sums, lanes):
 
 @inline
 def _horner(total, x, term, lanes):
+    """total x + term, of pairs."""
     for i in range(lanes):
         product = dd.mul((total[0, i], total[1, i]), (x[0, i], x[1, i]))
         total[0, i], total[1, i] = dd.loose(product, (term[0], term[1]))
