@@ -97,7 +97,7 @@ class AbelScene(FunctionScene):
             self._limit(flows)
         rows = solution.rows(flows, given[:, -2], given[:, -1])
         if question == "trajectory":
-            return blocks.trajectories(rows, last, back, solution, method, request.rtol)
+            return blocks.trajectories(rows, last, back, solution, method, request)
         return blocks.abel(rows, last, back, solution, method, request)
 
     def why(self, answer):

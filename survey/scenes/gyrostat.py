@@ -284,7 +284,7 @@ def solve(point, request):
         separatrix.SeparatrixAware(measure) if request.method in ("auto", "closed") else measure
     )
     if question == "trajectory":
-        return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request.rtol)
+        return blocks.trajectories(*blocks.dense(point, start, "t"), measure, method, request)
     return blocks.abel(*blocks.dense(point, start, "phi"), measure, method, request)
 
 

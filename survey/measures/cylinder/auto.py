@@ -34,11 +34,11 @@ FINEST = 3e-16  # no float64 can be known better
 IN_TIME, IN_PHI = (lockstep_pairs, taylor_double), (taylor_double,)
 
 
-def trajectories(method, rows, times, rtol):
+def trajectories(method, rows, times, rtol, counted=True):
     """As `solution.trajectories`: in closed form, and by `method` where that has no answer or too
     wide a bound.
     """
-    return _by_rows(rows, times, partial(_trajectories, method, rtol))
+    return _by_rows(rows, times, partial(_trajectories, method, rtol, counted))
 
 
 def abel(method, rows, targets, rtol, before=False, timed=True):
@@ -72,11 +72,13 @@ def _served(rows):
     return served
 
 
-def _trajectories(method, rtol, rows, times, served):
-    solve = partial(solution.trajectories, rtol=rtol)
+def _trajectories(method, rtol, counted, rows, times, served):
+    # where a closed form serves it counts them too
+    counted |= served
+    solve = partial(solution.trajectories, rtol=rtol, counted=counted)
     if not served:
         results = solve(method, rows, times)
-        return _with_more_digits(results, solve, IN_TIME, rtol, rows, times)
+        return _with_more_digits(results, solve, IN_TIME, rtol, rows, times, counted)
     results = solve(closed, rows, times)
     missed = solution.missed(results, rtol)
     floats, turnings, status = results
@@ -114,21 +116,22 @@ def _further(solve, method, finer, rtol, results, missed, rows, columns):
     return results
 
 
-def _with_more_digits(results, solve, finer, rtol, rows, columns, timed=True):
+def _with_more_digits(results, solve, finer, rtol, rows, columns, whole=True):
     """`results`, with those of one method of more digits after the other where they are left open."""
     for method in finer:
-        left = _left_open(results, rtol, timed)
+        left = _left_open(results, rtol, whole)
         last = method is finer[-1]
         results = _completed(results, left, partial(solve, method), rows, columns, last)
     return results
 
 
-def _left_open(results, rtol, timed=True):
+def _left_open(results, rtol, whole=True):
     """The points that more digits may still answer: those that miss rtol, unless by
-    too many steps or an overflow, and those that have turned an undetermined number of times.
+    too many steps or an overflow, and those that have turned an undetermined number of times. Unless
+    `whole`, neither these nor times over phi are asked for.
     """
-    status = results[-1]
-    if solution.met(results, max(rtol, FINEST), timed):
+    status, in_time = results[-1], len(results) == 3
+    if solution.met(results, max(rtol, FINEST), whole or in_time):
         missed = np.zeros(status.shape, bool)
     else:
         missed = solution.missed(results, max(rtol, FINEST))
@@ -138,7 +141,7 @@ def _left_open(results, rtol, timed=True):
             | (status == NO_CONVERGENCE)
             | (status == SEPARATRIX)
         )
-    if len(results) == 3:
+    if in_time and whole:
         _floats, turnings, _status = results
         missed |= (turnings == UNDETERMINED) & (status == OK)
     return missed

@@ -62,10 +62,11 @@ def valid(rows, columns):
     return np.where(numbers, rows, 0.0), np.where(good, columns, 0.0), good
 
 
-def trajectories(rows, times, back, measure, method, rtol):
+def trajectories(rows, times, back, measure, method, request):
     """phi, w, turnings and status at the times; `measure` is `solution` or `auto`."""
     rows, times, good = valid(rows, times)
-    return at_times(measure.trajectories(method, rows, times, rtol), good, back)
+    counted = not request.variables or "turnings" in request.variables
+    return at_times(measure.trajectories(method, rows, times, request.rtol, counted), good, back)
 
 
 def at_times(results, good, back):

@@ -287,9 +287,13 @@ class SeparatrixAware:
     def __init__(self, measure):
         self.measure = measure
 
-    def trajectories(self, method, rows, times, rtol):
+    def trajectories(self, method, rows, times, rtol, counted=True):
         return self._replaced(
-            self.measure.trajectories(method, rows, times, rtol), rows, times, rtol, trajectories
+            self.measure.trajectories(method, rows, times, rtol, counted=counted),
+            rows,
+            times,
+            rtol,
+            trajectories,
         )
 
     def abel(self, method, rows, targets, rtol, before=False, timed=True):

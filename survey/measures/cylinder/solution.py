@@ -73,23 +73,24 @@ def split(rows):
     return P, starts
 
 
-def trajectories(method, rows, times, rtol):
+def trajectories(method, rows, times, rtol, counted=True):
     """PHI to W_BAR of `records` (last axis), turnings and status at `times` (rows, columns), of
     either sign.
 
     turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound
-    leaves it open.
+    leaves it open, and, unless `counted`, where the steps do.
     """
     past = times < 0
     if not past.any():
-        return _in_time(method, rows, times, rtol)
+        return _in_time(method, rows, times, rtol, counted)
     results = _nothing(times.shape)
     for mine, back in ((~past, False), (past, True)):
         picked = mine.any(axis=1)
         if not picked.any():
             continue
         elapsed = np.where(mine, np.abs(times), np.inf)[picked]
-        parts = _in_time(method, reverse(rows[picked]) if back else rows[picked], elapsed, rtol)
+        own = reverse(rows[picked]) if back else rows[picked]
+        parts = _in_time(method, own, elapsed, rtol, counted)
         if back:
             parts[0][..., rc.W] *= -1.0
         take = mine[picked]
@@ -109,16 +110,16 @@ def _nothing(shape):
     )
 
 
-def _in_time(method, rows, times, rtol):
+def _in_time(method, rows, times, rtol, counted):
     times, back = _sorted(times)
     decades = _decades(rows, times)
     kinds = np.unique(decades)
     if len(kinds) < 2:
-        return back(_in_order(method, rows, times, rtol, decades.max(initial=0)))
+        return back(_in_order(method, rows, times, rtol, counted, decades.max(initial=0)))
     results = _nothing(times.shape)
     for kind in kinds:
         mine = decades == kind
-        parts = _in_order(method, rows[mine], times[mine], rtol, kind)
+        parts = _in_order(method, rows[mine], times[mine], rtol, counted, kind)
         for result, part in zip(results, parts, strict=True):
             result[mine] = part
     return back(results)
@@ -142,7 +143,7 @@ def _decades(rows, times):
     return np.rint(2.0 * np.log10(np.clip(np.nan_to_num(turned) / LONG, 1.0, 1e15))).astype(int)
 
 
-def _in_order(method, rows, times, rtol, decades):
+def _in_order(method, rows, times, rtol, counted, decades):
     budget = STEPS * min(method.FLOW_WORK, 10)
     ladder = attempts(method, rtol, decades)
 
@@ -161,7 +162,8 @@ def _in_order(method, rows, times, rtol, decades):
 
     asked = np.isfinite(times)
     results, _met = _repeated(run, lambda: asked, ladder, rtol)
-    if hasattr(method, "flow_turnings") and (rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0):
+    turning = rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0
+    if counted and hasattr(method, "flow_turnings") and turning:
         _count(method, rows, times, ladder[-1], asked, results)
     return results
 

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from flow_truth import exact, zeros_beside_a_focus
 
+import survey
+from survey.kernels.cylinder import taylor_double
 from survey.kernels.cylinder.steps import (
     EQUILIBRIUM,
     NO_CONVERGENCE,
@@ -429,3 +431,24 @@ def test_angles_on_both_sides_of_the_start_are_served_as_those_of_either():
             own, own_codes = solution.abel(taylor, row[None], angles[:1, mine], 1e-9)
             np.testing.assert_array_equal(own[0], found[mine])
             np.testing.assert_array_equal(own_codes[0], codes[mine])
+
+
+def test_turnings_are_counted_on_demand_alone(monkeypatch):
+    """Beside a focus w is less than its bar, and zeros of w are counted apart."""
+    row, times = np.array([[-0.4, 0.0, 0.0, 0.0, 0.0, 1.0, 0.3, 1.0]]), np.array([[5.0, 400.0]])
+    floats, turnings, status = auto.trajectories(taylor, row, times, 1e-10)
+    assert (status == OK).all() and turnings[0, 1] > 50
+
+    def refuse(*_):
+        raise AssertionError("counted")
+
+    monkeypatch.setattr(taylor, "flow_turnings", refuse)
+    monkeypatch.setattr(taylor_double, "flow_trajectories", refuse)
+    alone, unknown, codes = auto.trajectories(taylor, row, times, 1e-10, counted=False)
+    np.testing.assert_array_equal(alone[0, 0], floats[0, 0])
+    assert unknown[0, 0] == turnings[0, 0] and unknown[0, 1] == UNDETERMINED and (codes == OK).all()
+    given = dict(zip(("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0"), row[0], strict=True))
+    ds = survey.evaluate(
+        "gyrostat", question="trajectory", t=400.0, variables=["phi", "w"], **given
+    )
+    assert ds.status == 0 and abs(ds.w) <= ds.w_error + 1e-12 and "turnings" not in ds
