@@ -168,6 +168,12 @@ def vary(T, f, dg, i):
 
 
 @unroll
+def vary_lane(T, i):
+    """Series of the variations of lane i, from those of f and g' in T."""
+    vary(T, *([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG)), i)
+
+
+@unroll
 def _vary(T, fixed, i):
     """Series of f and g', and of the variations, of lane i."""
     p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))

@@ -21,6 +21,7 @@ import numpy as np
 
 from survey.kernels.cylinder import lockstep
 from survey.kernels.cylinder import records as rc
+from survey.kernels.cylinder.balls import VECTOR
 from survey.kernels.cylinder.flow import (
     B12,
     B31,
@@ -70,18 +71,15 @@ from survey.kernels.cylinder.lockstep import (
     V,
     busy,
     varied,
-    vary,
 )
 from survey.kernels.cylinder.steps import OK, TRUST, UNDETERMINED, bar, finite, start_sign
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.kernels.math.angles_double import centred, radians
 from survey.kernels.math.roundoff import PAIR_ROUNDOFF, ROUNDOFF_UP
-from survey.kernels.unroll import unroll
 
 ORDER = 32
 PAIRS = 10  # orders 0 to 9
-VECTOR = 8  # as many lanes as that cost no more than one
 SERVES = ()  # used before `taylor_double`; users cannot choose it
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
@@ -96,25 +94,12 @@ TERMS = 13  # of sin and cos of up to an eighth of a turn
 EXACT = 6  # of these are pairs
 
 
-def _pair(numerator, denominator):
-    """A fraction as a double-double."""
-    exact = Fraction(numerator, denominator)
-    high = float(exact)
-    return high, float(exact - Fraction(high))
-
-
 # 1 / (n + 1); coefficients of sin x / x and of cos x in x^2
-PARTS = np.array([_pair(1, n + 1) for n in range(ORDER + 1)])
-SINE = np.array([_pair((-1) ** n, math.factorial(2 * n + 1)) for n in range(TERMS)])
-COSINE = np.array([_pair((-1) ** n, math.factorial(2 * n)) for n in range(TERMS)])
-
-
-@inline
-def _clear(rows):
-    """Zeros, number by number: an assignment to a slice would take a second to compile."""
-    for k in range(rows.shape[0]):
-        for i in range(rows.shape[1]):
-            rows[k, i] = 0.0
+PARTS = np.array([dd.of_fraction(Fraction(1, n + 1)) for n in range(ORDER + 1)])
+SINE, COSINE = (
+    np.array([dd.of_fraction(Fraction((-1) ** n, math.factorial(2 * n + k))) for n in range(TERMS)])
+    for k in (1, 0)
+)
 
 
 @inline
@@ -132,7 +117,7 @@ def _begin(S, C, W, state, low, sums, lanes):
         x = dd.add((state[PSI, i], low[0, i]), dd.neg(radians(0.25 * quarter[i])))
         rest[0, i], rest[1, i] = x
         z[0, i], z[1, i] = dd.square(x)
-    _clear(sums[5:9])
+        sine[0, i] = sine[1, i] = cosine[0, i] = cosine[1, i] = 0.0
     for n in range(TERMS - 1, -1, -1):
         one, two = SINE[n], COSINE[n]
         if n >= EXACT:
@@ -176,10 +161,8 @@ def _product_of_pairs(total, A, B, n, lanes):
         total[0, i] = total[1, i] = 0.0
     for k in range(n + 1):
         for i in range(lanes):
-            a, b = A[k, i], B[n - k, i]
-            p, e = dd.two_prod(a, b)
-            total[0, i], q = dd.two_sum(total[0, i], p)
-            total[1, i] += q + (e + (a * B[LOWER + n - k, i] + A[LOWER + k, i] * b))
+            a, b = (A[k, i], A[LOWER + k, i]), (B[n - k, i], B[LOWER + n - k, i])
+            total[0, i], total[1, i] = dd.plus_product(total[0, i], total[1, i], a, b)
 
 
 @kernel
@@ -249,11 +232,6 @@ def _onward(S, C, W, six, sums, n, lanes):
     for i in range(lanes):
         S[n + 1, i], S[m + 1, i] = sums[0, i], sums[1, i]
         C[n + 1, i], C[m + 1, i] = sums[2, i], sums[3, i]
-
-
-@unroll
-def _vary(T, i):
-    vary(T, *([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG)), i)
 
 
 @inline
@@ -404,7 +382,7 @@ def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, stat
         _begin(S, C, W, state, low, sums, lanes)
         _expand(S, C, W, T, six, sums, lanes)
         for i in range(LANES):
-            _vary(T, i)
+            lockstep.vary_lane(T, i)
         _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes)
         lockstep._turnings(state)
         for first in range(0, LANES, BLOCK):

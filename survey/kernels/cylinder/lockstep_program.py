@@ -393,12 +393,6 @@ def _bound(p, N, phi, w, row, tables, hold):
 
 
 @unroll
-def _vary(T, i):
-    """Series of the variations of lane i, from those of f and g' in T."""
-    lockstep.vary(T, *([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG)), i)
-
-
-@unroll
 def _onward(S, K, sign, side, r, x, g, w, fw, i):
     """The next order of phi and w, in S from x, w on."""
     times = side * S[w + i]
@@ -526,7 +520,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
             _stay(state, fixed, phi, hold)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
-            _vary(T, i)
+            lockstep.vary_lane(T, i)
         for i in range(LANES):
             if state[SIGN, i] == 0.0 and state[STEPS, i] <= 1.0:
                 start = state[V, i] if state[V, i] != 0.0 else T[W + 1, i]
@@ -940,7 +934,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
             _stay(state, fixed, phi, hold)
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
-            _vary(T, i)
+            lockstep.vary_lane(T, i)
         lockstep.advance(T, state, before, fixed, fate, tolerance)
         _calm(T, state, before, fixed, goal, doubt, started, calm)
         free = False

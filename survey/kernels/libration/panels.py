@@ -129,13 +129,10 @@ def rows(e, first, middle, coefficients, bars, series, row_bars):
         for j in range(INVARIANTS):
             sums[:] = 0.0
             for k in range(terms):
-                high, low = weights[k, 0], weights[k, 1]
+                weight = weights[k, 0], weights[k, 1]
                 for m in range(n):
-                    p, error = dd.two_prod(high, coefficients[j, 0, k, m])
-                    sums[0, m], rest = dd.two_sum(sums[0, m], p)
-                    sums[1, m] += rest + (
-                        error + (high * coefficients[j, 1, k, m] + low * coefficients[j, 0, k, m])
-                    )
+                    term = coefficients[j, 0, k, m], coefficients[j, 1, k, m]
+                    sums[0, m], sums[1, m] = dd.plus_product(sums[0, m], sums[1, m], weight, term)
             for m in range(n):
                 value = dd.quick_two_sum(sums[0, m], sums[1, m])
                 series[i, j, 0, m], series[i, j, 1, m] = dd.mul(growth, value)

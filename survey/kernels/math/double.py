@@ -10,6 +10,7 @@ sqrt); T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955 (inne
 19.8(i) (mean).
 """
 
+from fractions import Fraction
 from math import sqrt as root
 
 import llvmlite.binding as llvm
@@ -25,6 +26,12 @@ HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
 HALF_PI_REST = -1.4973849048591698e-33  # for what is left of pi / 2 beside it
 MEANS = 20
 GAP = 1e-16  # convergence is quadratic: the next mean has every digit
+
+
+def of_fraction(number):
+    """A Fraction as (hi, lo)."""
+    high = float(number)
+    return high, float(number - Fraction(high))
 
 
 @inline
@@ -211,6 +218,14 @@ def mean(a, b):
 
 
 @inline
+def plus_product(s, c, a, b):
+    """(s, c), a sum and what its float64 has lost, with the product of the pairs a and b added."""
+    p, e = two_prod(a[0], b[0])
+    s, q = two_sum(s, p)
+    return s, c + (q + (e + (a[0] * b[1] + a[1] * b[0])))
+
+
+@inline
 def convolved(a, b, n):
     """Coefficient n of the product of two series (2, orders), hi and lo; its error is relative to the sum of |terms|.
 
@@ -219,9 +234,7 @@ def convolved(a, b, n):
     """
     s, c = 0.0, 0.0
     for i in range(n + 1):
-        p, e = two_prod(a[0, i], b[0, n - i])
-        s, q = two_sum(s, p)
-        c += q + (e + (a[0, i] * b[1, n - i] + a[1, i] * b[0, n - i]))
+        s, c = plus_product(s, c, (a[0, i], a[1, i]), (b[0, n - i], b[1, n - i]))
     return quick_two_sum(s, c)
 
 

@@ -8,18 +8,12 @@ from math import factorial
 import numpy as np
 
 from survey.kernels.jit import inline
-from survey.kernels.math.double import loose, mul, neg, quick_two_sum, times, two_prod
+from survey.kernels.math.double import loose, mul, neg, of_fraction, quick_two_sum, times, two_prod
 
 GRID = 16.0
 LARGEST = 3.2
 _ORDERS = 60
 _BITS = 400
-
-
-def _pair(number):
-    """A fraction as (hi, lo)."""
-    high = float(number)
-    return high, float(number - Fraction(high))
 
 
 def _row(j):
@@ -28,13 +22,13 @@ def _row(j):
     for n in range(_ORDERS):
         sums[n % 2] += (-1) ** (n // 2) * term
         term = term * j // (int(GRID) * (n + 1))
-    return *_pair(Fraction(sums[1], 1 << _BITS)), *_pair(Fraction(sums[0], 1 << _BITS))
+    return *of_fraction(Fraction(sums[1], 1 << _BITS)), *of_fraction(Fraction(sums[0], 1 << _BITS))
 
 
 _TABLE = np.array([_row(j) for j in range(int(LARGEST * GRID) + 2)])
 # 1/n!, whose sign alternates in pairs
-_S3, _S5, _S7 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (3, 5, 7))
-_C4, _C6 = (_pair(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6))
+_S3, _S5, _S7 = (of_fraction(Fraction((-1) ** (n // 2), factorial(n))) for n in (3, 5, 7))
+_C4, _C6 = (of_fraction(Fraction((-1) ** (n // 2), factorial(n))) for n in (4, 6))
 
 
 @inline

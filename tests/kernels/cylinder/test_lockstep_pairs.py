@@ -116,7 +116,7 @@ def stepped(P, starts, steps, state, low):
         lockstep_pairs._begin(S, C, W, own, here, sums, LANES)
         lockstep_pairs._expand(S, C, W, T, six, sums, LANES)
         for i in range(LANES):
-            lockstep_pairs._vary(T, i)
+            lockstep.vary_lane(T, i)
         lockstep_pairs._advance(W, T, own, before, here, there, fixed, fate, sums, LANES)
     state[:], low[:] = own, here
 
