@@ -102,6 +102,19 @@ def test_arrays_that_kernels_make_begin_with_a_cache_line_and_those_of_others_as
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+@pytest.mark.parametrize("module, aligned", [("survey.kernels.some", True), ("other", False)])
+def test_stacks_of_kernels_begin_with_a_cache_line_and_those_of_others_as_before(module, aligned):
+    def half(x):
+        return 0.5 * x
+
+    half.__module__ = module
+    kernel = jit.fresh(half)
+    assert kernel(3.0) == 1.5
+    (code,) = kernel.inspect_llvm().values()
+    assert ("alignstack=64" in code) == aligned
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 def test_what_is_inlined_serves_kernels_and_is_plain_python_otherwise():
     def root(x, n):
         for _ in range(n):
