@@ -2,7 +2,7 @@
 compiled.
 
 LLVM makes no vector code of a loop over coefficients, and numba takes a second to type a page of
-sums written out. A function of floats that is made of + - * /, abs, `largest`, Python's loops and
+sums written out. A function of floats that is made of + - * /, abs, the functions below, Python's loops and
 lists is therefore written as such, and run once for each kernel that calls it; every operation
 writes one instruction, in the order in which Python does it, so compiled and plain code give the
 same bits.
@@ -63,16 +63,21 @@ class _Number:
         return _Number(self.builder, self.builder.fneg(self.value))
 
     def __abs__(self):
-        kind = self.value.type
-        several = f"v{kind.count}" if isinstance(kind, ir.VectorType) else ""
-        fabs = self.builder.module.declare_intrinsic(
-            f"llvm.fabs.{several}f64", fnty=ir.FunctionType(kind, [kind])
-        )
-        return _Number(self.builder, self.builder.call(fabs, [self.value]))
+        return _called(self, "fabs")
 
     def __le__(self, other):
         emit = self.builder.fcmp_ordered("<=", *_alike(self.builder, self, other))
         return _Number(self.builder, emit)
+
+
+def _called(x, name):
+    """What a function of LLVM makes of a number."""
+    kind = x.value.type
+    several = f"v{kind.count}" if isinstance(kind, ir.VectorType) else ""
+    function = x.builder.module.declare_intrinsic(
+        f"llvm.{name}.{several}f64", fnty=ir.FunctionType(kind, [kind])
+    )
+    return _Number(x.builder, x.builder.call(function, [x.value]))
 
 
 class _Index:
@@ -159,6 +164,23 @@ def largest(a, b):
     )
 
 
+def smallest(a, b):
+    """min(a, b) of numbers or symbols."""
+    return _chosen(
+        lambda: min(a, b) if np.ndim(a) == 0 else np.where(b < a, b, a),
+        lambda builder, x, y: builder.select(builder.fcmp_ordered("<", y, x), y, x),
+        a,
+        b,
+    )
+
+
+def root(x):
+    """The square root of a number or symbol."""
+    if isinstance(x, _Unknown):
+        return x
+    return _called(x, "sqrt") if isinstance(x, _Number) else np.sqrt(x)
+
+
 def summed(terms):
     """The sum of numbers or symbols, in their order; that of Python begins with 0."""
     first, *others = terms
@@ -217,6 +239,15 @@ def selected(where, numbers):
         return np.where(where, numbers, 0.0)
     nothing = _repeated(where.builder, _value(0.0), numbers.value.type.count)
     return _Number(where.builder, where.builder.select(where.value, numbers.value, nothing))
+
+
+def both(where, also):
+    """Where both hold."""
+    if isinstance(where, _Unknown):
+        return where
+    if not isinstance(where, _Number):
+        return np.logical_and(where, also)
+    return _Number(where.builder, where.builder.and_(where.value, also.value))
 
 
 def counted(where):

@@ -51,7 +51,7 @@ ABOUT = {
 _FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 FLOW_FINEST = 1e-17  # useful truncation error of a step
 FLOW_WORK = 1  # steps, relative to this method
-FLOW_BOUNDS = True
+FLOW_BOUNDS = FLOW_UNCOUNTED = True
 
 
 @inline

@@ -7,12 +7,15 @@ import pytest
 
 from survey.kernels.jit import kernel
 from survey.kernels.unroll import (
+    both,
     changes_sign,
     consecutive,
     counted,
     largest,
     put,
+    root,
     selected,
+    smallest,
     spread,
     unroll,
 )
@@ -67,8 +70,9 @@ def test_compiled_as_plain():
 def eight(table, row, first, limit, scale, out):
     """Every operation on eight numbers at once, with one number before and behind it."""
     x = consecutive(table, (row, first), 8)
-    few = x <= limit
-    y = 2.0 - (abs(x) * scale + largest(x - scale, 0.25)) / (scale + x) - -x
+    few = both(x <= limit, -limit <= x)
+    y = 2.0 - (abs(x) * scale + largest(x - scale, 0.25)) / (scale + x) - -smallest(x, scale)
+    y += root(x)
     put(out, (row, first), y)
     put(out, (row + 1, first + 1), selected(few, y * scale), few)
     put(out, (0, first), spread(scale * scale, x))
@@ -90,7 +94,9 @@ def test_several_numbers_compiled_as_plain(first, limit):
     with np.errstate(all="ignore"):
         assert number == eight(table, 1, first, limit, 0.3, plain)
     np.testing.assert_array_equal(compiled, plain)
-    assert number == (table[1, first : first + 8] <= limit).sum() == np.count_nonzero(compiled[2])
+    assert (
+        number == (abs(table[1, first : first + 8]) <= limit).sum() == np.count_nonzero(compiled[2])
+    )
     assert (
         compiled[1, first : first + 8].any() and (compiled[0, first : first + 8] == 0.3 * 0.3).all()
     )
@@ -100,5 +106,6 @@ def test_several_numbers_compiled_as_plain(first, limit):
 @pytest.mark.parametrize("a", [-1.0, -0.0, 0.0, 2.0])
 @pytest.mark.parametrize("b", [-1.0, -0.0, 0.0, 2.0])
 def test_words(a, b):
-    assert largest(a, b) == max(a, b)
+    assert largest(a, b) == max(a, b) and smallest(a, b) == min(a, b)
+    assert root(b * b) == abs(b)
     assert changes_sign(a, b) == ((a < 0) != (b < 0))

@@ -346,3 +346,18 @@ def test_sets_have_the_same_bits_alone_and_among_others(question, period):
         alone = solved(slice(i, i + 1))
         for name in ("w", "w_error"):
             np.testing.assert_array_equal(alone[name].values[0], together[name].values[i])
+
+
+def test_a_constant_force_and_a_resistance_that_hardly_acts_are_solved_to_rounding():
+    """No rate bounds their steps on the circle, which last for ever, or for a very long time."""
+    times = np.array([0.0, 0.5, 1.0, 10.0])
+    scene = survey.abel(
+        lambda phi, p: -p[1] + 0.0 * phi, lambda phi, p: p[0] + 0.0 * phi, parameters=("a", "b"), period=2 * np.pi
+    )  # fmt: skip
+    ds = survey.evaluate(
+        scene, a=[0.3, 1.0], b=[0.0, 1e-12, 1e-8, 1e-4], phi0=0.1, w0=0.0, t=times, question="trajectory"
+    )  # fmt: skip
+    assert not ds.status.any() and (ds.phi_error <= 1e-14 * (1 + ds.t**2)).all()
+    b = ds.b.where(ds.b > 0, 1e-30)
+    fallen = ds.a * ds.t**2 * (0.5 - b * ds.t / 6 + (b * ds.t) ** 2 / 24 - (b * ds.t) ** 3 / 120)
+    assert (abs(ds.phi - 0.1 - fallen) <= ds.phi_error + 1e-17 * ds.t**5).all()

@@ -10,12 +10,16 @@ with S = sin psi, C = cos psi,
 three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-Steps never depend on the requested times: those within a step are evaluated from its series, the
-first of BLOCK lanes, then the second and so on. Nor does any solution depend on its neighbours. A
-lane that has finished takes the next row.
+Steps never depend on the requested times: those within a step are evaluated from its series, BLOCK
+of a lane at once. Nor does any solution depend on its neighbours. A lane that has finished takes
+the next row.
+
+The loops over lanes are short, and sums end with the latest coefficients: processors overlap iterations only
+while these are independent and fit into the window of instructions that they reorder.
 """
 
 import math
+import operator
 
 import numpy as np
 
@@ -41,13 +45,23 @@ from survey.kernels.cylinder.steps import (
     STEP_LIMIT,
     TRUST,
     UNDETERMINED,
-    bar,
     finite,
     start_sign,
 )
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.kernels.unroll import unroll
+from survey.kernels.unroll import (
+    both,
+    consecutive,
+    counted,
+    largest,
+    put,
+    root,
+    selected,
+    smallest,
+    summed,
+    unroll,
+)
 
 ORDER = 16
 LOW = 6
@@ -64,18 +78,24 @@ STATE = 13
 # ... and of what it does not: the coefficients, their bounds, the next requested time, a.
 (P12, P31, PD, P2, P3, PF, PG, PDG, NEXT, TURN) = range(10)
 FIXED = 10
-# Rows of what is found at a time in the step: is there one, when, and there phi, w, their bars,
-# whether these are narrow enough, and the turnings before.
-(DUE, AFTER, PHI_AT, V_AT, WIDE_AT, HIGH_AT, NARROW, TURNINGS_AT) = range(8)
-FOUND = 8
-ROWS = TABLE + 2 * STATE + FIXED + FOUND + 1
+# Rows of the step: how long it is, and what its series leaves out of w at its end.
+(DT, CUT) = range(2)
+STEP = 2
+# Where the tables begin in the work space of all lanes: the series, the states after and before the
+# step, what stays fixed, the step, and what has become of the lane.
+AFTER = TABLE
+BEFORE = AFTER + STATE
+WHAT_STAYS = BEFORE + STATE
+OF_STEP = WHAT_STAYS + FIXED
+FATE = OF_STEP + STEP
+ROWS = FATE + 1
 
 # what a step has made of a lane, or the sum of both: it has passed its next time
-_PASSED, _LOST = 1.0, 2.0
-BLOCK = 8  # lanes whose times are served together
+PASSED, LOST = 1.0, 2.0
+BLOCK = 4  # times of a lane that are served together; as a rule a step has few
 # Shorter steps have only a share of the tolerance, so that many short ones add up to what a few
 # long ones do.
-_SHORT = 1.0 / 8.0
+SHORT = 1.0 / 8.0
 COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 _MANY = -1e9  # a count that stays below zero
@@ -113,29 +133,37 @@ def sine_cosine(x):
 
 
 def _orders(first, last):
-    """What adds the coefficients first + 1 to `last` of the series of S, C and w of a lane."""
+    """What adds the coefficients first + 1 to `last` of the series of S, C and w of a lane, two by two: both
+    take the same earlier coefficients, which then need to be fetched only once.
+    """
 
     @unroll
     def expand(T, fixed, i):
         p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
         s, c, w = ([T[row + n, i] for n in range(first + 1)] for row in (SIN, COS, W))
-        for n in range(first, last):
-            r = 1.0 / (n + 1)
-            cw, sw, cs = _product(c, w, n), _product(s, w, n), _product(c, s, n)
-            g = p2 * c[n] - p3 * s[n] - pd * cs
-            s.append(cw * r)
-            c.append(-sw * r)
-            w.append((p12 * cw - p31 * sw + g) * r)
-            T[SIN + n + 1, i], T[COS + n + 1, i], T[W + n + 1, i] = s[n + 1], c[n + 1], w[n + 1]
+        for n in range(first, last, 2):
+            sums = {n: (), n + 1: ()}
+            for k in range(1, n + 1):
+                for m in sums if k < n else (n + 1,):
+                    sums[m] = _plus(sums[m], c[k] * w[m - k], s[k] * w[m - k], c[k] * s[m - k])
+            for m, known in sums.items():  # what waits for the latest coefficients comes last
+                cw, sw, cs = c[m] * w[0], s[m] * w[0], c[m] * s[0]
+                if m > 0:
+                    cw, sw, cs = cw + c[0] * w[m], sw + s[0] * w[m], cs + c[0] * s[m]
+                cw, sw, cs = _plus(known, cw, sw, cs)
+                r, g = 1.0 / (m + 1), p2 * c[m] - p3 * s[m] - pd * cs
+                s.append(cw * r)
+                c.append(-sw * r)
+                w.append((p12 * cw - p31 * sw + g) * r)
+                for row, series_of in ((SIN, s), (COS, c), (W, w)):
+                    T[row + m + 1, i] = series_of[m + 1]
 
     return expand
 
 
-def _product(a, b, n):
-    """Coefficient n of the product of two series, from the outside."""
-    terms = [a[n - k] * b[k] + a[k] * b[n - k] for k in range((n + 1) // 2)]
-    terms += [a[n // 2] * b[n // 2]] if n % 2 == 0 else []
-    return sum(terms[1:], terms[0])
+def _plus(sums, *terms):
+    """Three sums with one term more each."""
+    return tuple(map(operator.add, sums, terms)) if sums else terms
 
 
 @inline
@@ -151,7 +179,7 @@ def _begin(T, state):
         T[SIN, i], T[COS, i], T[W, i] = s, c, state[V, i]
 
 
-_low_orders, _middle_orders, _high_orders = _orders(0, 7), _orders(7, 12), _orders(12, ORDER)
+_to_6, _to_10, _to_14, _to_16 = _orders(0, 6), _orders(6, 10), _orders(10, 14), _orders(14, ORDER)
 
 
 def vary(T, f, dg, i):
@@ -159,8 +187,8 @@ def vary(T, f, dg, i):
     for first, u, z in ((U1, [1.0], [-f[0]]), (U2, [0.0], [1.0])):
         for n in range(LOW):
             r = 1.0 / (n + 1)
-            fu = sum((f[k] * u[n - k] for k in range(1, n + 1)), f[0] * u[n])
-            gu = sum((dg[k] * u[n - k] for k in range(1, n + 1)), dg[0] * u[n])
+            fu = summed(f[k] * u[n - k] for k in range(n, -1, -1))  # the latest last
+            gu = summed(dg[k] * u[n - k] for k in range(n, -1, -1))
             u.append((fu + z[n]) * r)
             z.append(gu * r)
         for n in range(LOW + 1):
@@ -180,7 +208,7 @@ def _vary(T, fixed, i):
     s, c = [T[SIN + n, i] for n in range(LOW + 1)], [T[COS + n, i] for n in range(LOW + 1)]
     f, dg = [], []
     for n in range(LOW + 1):
-        squares = _product(s, s, n)
+        squares = summed(s[k] * s[n - k] for k in range(n + 1))
         double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
         f.append(p12 * c[n] - p31 * s[n])
         dg.append(-pd * double - p2 * s[n] - p3 * c[n])
@@ -195,42 +223,42 @@ def series(T, state, fixed):
     """
     _begin(T, state)
     for i in range(LANES):
-        _low_orders(T, fixed, i)
+        _to_6(T, fixed, i)
     for i in range(LANES):
-        _middle_orders(T, fixed, i)
+        _to_10(T, fixed, i)
     for i in range(LANES):
-        _high_orders(T, fixed, i)
+        _to_14(T, fixed, i)
+    for i in range(LANES):
+        _to_16(T, fixed, i)
     for i in range(LANES):
         _vary(T, fixed, i)
 
 
 @inline
 def split(work):
-    """The parts of the work array: series, state, state before the step, what stays fixed, what is
-    found at a time, what became of lanes.
+    """The parts of the work array: series, state, state before the step, what stays fixed, the step, what
+    has become of lanes.
     """
-    first, second = TABLE + STATE, TABLE + 2 * STATE
-    third = second + FIXED
     return (
-        work[:TABLE],
-        work[TABLE:first],
-        work[first:second],
-        work[second:third],
-        work[third : third + FOUND],
-        work[third + FOUND],
+        work[:AFTER],
+        work[AFTER:BEFORE],
+        work[BEFORE:WHAT_STAYS],
+        work[WHAT_STAYS:OF_STEP],
+        work[OF_STEP:FATE],
+        work[FATE],
     )
 
 
 @inline
-def step(T, state, before, fixed, fate, tolerance):
+def step(T, state, before, fixed, taken, fate, tolerance):
     """One step of every lane."""
     series(T, state, fixed)
-    advance(T, state, before, fixed, fate, tolerance)
-    _turnings(state)
+    advance(T, state, before, fixed, taken, fate, tolerance)
+    note_turnings(state)
 
 
 @inline
-def advance(T, state, before, fixed, fate, tolerance):
+def advance(T, state, before, fixed, taken, fate, tolerance):
     """One step of every lane; `before` keeps the state before it."""
     for k in range(STATE):
         for i in range(LANES):
@@ -242,40 +270,36 @@ def advance(T, state, before, fixed, fate, tolerance):
         fall = FALL * state[RATE, i] * state[RATE, i]
         size = max(last, fall * abs(T[W + ORDER - 2, i]))
         size = max(size, max(previous, fall * abs(T[W + ORDER - 3, i])) * state[RATE, i])
-        size = size * max(1.0, _SHORT * state[RATE, i])
+        size = size * max(1.0, SHORT * state[RATE, i])
         size = size / (tolerance * (1.0 + abs(w)))
         # within `flow.longest_step` w has one zero at most
         square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
         rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
         dt = 1.0 / rate
-        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] < dt
+        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] <= dt
+        high = state[TIME, i] + dt
+        state[TIME_LOW, i] += dt - (high - state[TIME, i])
+        state[TIME, i], state[RATE, i] = high, rate
+        taken[DT, i], fate[i] = dt, PASSED if passed else 0.0
+    for i in range(LANES):
+        dt, w = taken[DT, i], state[V, i]
         x, v = T[W + ORDER, i] * (1.0 / (ORDER + 1)), T[W + ORDER, i]
         for k in range(ORDER - 1, 0, -1):
             x, v = x * dt + T[W + k, i] * (1.0 / (k + 1)), v * dt + T[W + k, i]
-        x, v = state[PSI, i] + (x * dt + w) * dt, w + v * dt
-        u1, z1, u2, z2, f = (
-            T[U1 + LOW, i],
-            T[Z1 + LOW, i],
-            T[U2 + LOW, i],
-            T[Z2 + LOW, i],
-            T[F_ + LOW, i],
-        )
-        for k in range(LOW - 1, -1, -1):
-            u1, z1 = u1 * dt + T[U1 + k, i], z1 * dt + T[Z1 + k, i]
-            u2, z2, f = u2 * dt + T[U2 + k, i], z2 * dt + T[Z2 + k, i], f * dt + T[F_ + k, i]
-        z1, z2 = z1 + f * u1, z2 + f * u2
-        ends = last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
-        carried, jacobian = (state[SAA, i], state[SAB, i], state[SBB, i]), (u1, u2, z1, z2)
-        state[SAA, i], state[SAB, i], sbb = ellipse(
-            carried, jacobian, dt, v, ends, fixed[PF, i], fixed[PG, i]
-        )
-        n = state[STEPS, i] + 1.0
-        state[SBB, i], state[STEPS, i] = sbb, n
-        high = state[TIME, i] + dt
-        state[TIME_LOW, i] += dt - (high - state[TIME, i])
-        state[TIME, i], state[PSI, i], state[V, i], state[RATE, i] = high, x, v, rate
-        good = state[SAA, i] < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
-        fate[i] = (_PASSED if passed else 0.0) + (0.0 if good else _LOST)
+        state[PSI, i], state[V, i] = state[PSI, i] + (x * dt + w) * dt, w + v * dt
+    for i in range(LANES):
+        v, dt, ends = state[V, i], taken[DT, i], last_terms(T, i)
+        cut = left_out(ends, dt)
+        # a series that ends has no limit of the step, and 0 times a power that overflows is NaN
+        cut = cut if ends[0] + ends[1] + ends[2] + ends[3] > 0.0 else 0.0
+        taken[CUT, i] = cut
+        carried = state[SAA, i], state[SAB, i], state[SBB, i]
+        jacobian = varied(variations(T, i), dt)
+        saa, sab, sbb = carried_on(carried, jacobian, dt, v, cut, fixed[PF, i], fixed[PG, i])
+        state[SAA, i], state[SAB, i], state[SBB, i] = saa, sab, sbb
+        state[STEPS, i] += 1.0
+        good = saa < TRUST and sbb < (1.0 + abs(v)) * (1.0 + abs(v))
+        fate[i] += 0.0 if good else LOST
 
 
 @unroll
@@ -304,37 +328,34 @@ def polynomial(coefficients, x):
     return total
 
 
-@inline
+@unroll
 def last_terms(T, i):
-    """`ends` of `lockstep.ellipse`."""
-    last, previous = abs(T[W + ORDER, i]), abs(T[W + ORDER - 1, i])
-    return last, previous, FALL * abs(T[W + ORDER - 2, i]), FALL * abs(T[W + ORDER - 3, i])
+    """The sizes of the last term of w, of the one before, and those of the two before these, times FALL."""
+    last, previous, third, fourth = (abs(T[W + ORDER - n, i]) for n in range(4))
+    return last, previous, FALL * third, FALL * fourth
 
 
-@inline
+@unroll
 def left_out(ends, h):
     """What a series leaves out at h beyond its last term, of order ORDER: as much as its last terms
-    (`ends` of `ellipse`, of which one may be small by accident) where these fall by a third in two
-    orders, more where they fall less.
+    (`ends`, from `last_terms`, of which one may be small by accident) where these fall by a third in two
+    orders, more where they fall less: what follows the last two is bounded with the help of the others.
     """
     last, previous, third, fourth = ends
     h2 = h * h
     h4 = h2 * h2
-    high, low = (last * h + previous) * h2, max(third * h, fourth)
-    fallen = min(FALL * high / (low + 1e-300), 0.9)
-    return h4 * h4 * h4 * h * max(high + low, high * (2.0 * fallen / (1.0 - fallen)))
+    high, low = (last * h + previous) * h2, largest(third * h, fourth)
+    fallen = smallest(FALL * high / (low + 1e-300), 0.9)
+    return h4 * h4 * h4 * h * largest(high + low, high * (2.0 * fallen / (1.0 - fallen)))
 
 
-@inline
-def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
-    """The error ellipse at dt in a step, where w = v, from the one at its start.
-
-    `ends`: the sizes of the last term of w, of the one before, and those of the two before these,
-    times FALL: what follows the last two is bounded with the help of the others.
+@unroll
+def carried_on(carried, jacobian, dt, v, cut, most_f, most_g):
+    """The error ellipse at dt in a step, where w = v, from the one at its start, if its series leaves out `cut`
+    of w.
     """
     saa, sab, sbb = carried
     u1, u2, z1, z2 = jacobian
-    cut = left_out(ends, dt)
     speed = most_f * abs(v) + most_g
     e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
     g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
@@ -345,8 +366,14 @@ def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
     )
 
 
+@unroll
+def ellipse(carried, jacobian, dt, v, ends, most_f, most_g):
+    """The error ellipse at dt in a step, where w = v, from the one at its start; `ends` as in `left_out`."""
+    return carried_on(carried, jacobian, dt, v, left_out(ends, dt), most_f, most_g)
+
+
 @inline
-def _turnings(state):
+def note_turnings(state):
     """Count the sign changes of w; where the bar reaches zero for more than two steps the count is lost."""
     for i in range(LANES):
         v, sign, unsure, count = state[V, i], state[SIGN, i], state[UNSURE, i], state[COUNT, i]
@@ -385,83 +412,144 @@ def enter(p, phi0, w0, state, fixed, i):
 
 
 @unroll
-def _moved(c, dt):
-    """The change of psi, and w, at dt, as in `advance`."""
-    x, v = c[ORDER] * (1.0 / (ORDER + 1)), c[ORDER]
-    for k in range(ORDER - 1, 0, -1):
-        x, v = x * dt + c[k] * (1.0 / (k + 1)), v * dt + c[k]
-    return (x * dt + c[0]) * dt, c[0] + v * dt
+def moved(c, dt):
+    """The change of psi, and w, at dt; even and odd powers apart: half as long a chain."""
+    square = dt * dt
+    x = [c[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
+    rise, v = (polynomial(a[2::2], square) * dt + polynomial(a[1::2], square) for a in (x, c))
+    return (rise * dt + c[0]) * dt, c[0] + v * dt
 
 
 @inline
-def _passed(fate):
-    return (fate == _PASSED) | (fate == _PASSED + _LOST)
+def passed(fate):
+    """Has a lane passed its next time?"""
+    return (fate == PASSED) | (fate == PASSED + LOST)
 
 
-@inline
-def _due(state, before, fixed, found, fate, first):
-    """Set DUE and AFTER of BLOCK lanes, from the `first` on, by whether their next time lies in the
-    step; how many do?
+def at_lane(row, size):
+    """What reads `size` rows of a lane, from `row` on, of the work space in one row."""
+
+    @unroll
+    def read(work, i):
+        # of one array, whose rows are LANES apart: offsets known to LLVM, which else computes 40 products a call
+        return tuple(work[i + LANES * (row + n)] for n in range(size))
+
+    return read
+
+
+_coefficients_at, _variations_at = at_lane(W, ORDER + 1), at_lane(U1, 5 * (LOW + 1))
+_after_at, _before_at = at_lane(AFTER, STATE), at_lane(BEFORE, STATE)
+_fixed_at, _step_at = at_lane(WHAT_STAYS, FIXED), at_lane(OF_STEP, STEP)
+
+
+@unroll
+def _block(work, i, times, k, first, planes):
+    """Record phi, w and their bars of lane i at BLOCK times of row k, from the `first` on; returns how many of
+    those that lie in the step have bars narrow enough. What is recorded of the others means nothing.
     """
-    count = 0
-    for j in range(BLOCK):
-        i = np.uint64(first + j)  # no index that may count from the end: else no vector code
-        after = (fixed[NEXT, i] - before[TIME, i]) - before[TIME_LOW, i]
-        due = _passed(fate[i]) & (after < 1.0 / state[RATE, i])
-        found[DUE, i], found[AFTER, i] = (1.0, after) if due else (0.0, 0.0)
-        count += due
-    return count
+    after, before, fixed = _after_at(work, i), _before_at(work, i), _fixed_at(work, i)
+    end, cut = _step_at(work, i)
+    dt = (consecutive(times, (k, first), BLOCK) - before[TIME]) - before[TIME_LOW]
+    within = dt <= end
+    dt = selected(within, dt)
+    part = dt * after[RATE]
+    part = part * part
+    part = part * part
+    cut = cut * (part * part * part)  # falls as the 13th power at least, see `left_out`
+    x, v = moved(_coefficients_at(work, i), dt)
+    carried = before[SAA], before[SAB], before[SBB]
+    jacobian = varied(_variations_at(work, i), dt)
+    saa, _sab, sbb = carried_on(carried, jacobian, dt, v, cut, fixed[PF], fixed[PG])
+    share, turns, angle = 2.0 * after[STEPS], after[TURNS], fixed[TURN]
+    wide, high = 1.01 * root(share * saa), 1.01 * root(share * sbb)  # as `steps.bar`
+    narrow = both(wide <= TRUST, high <= TRUST * (1.0 + abs(v)))
+    put(planes, (rc.PHI, k, first), ((before[PSI] + x) + angle) + turns * TWO_PI)
+    put(planes, (rc.W, k, first), v)
+    put(planes, (rc.PHI_BAR, k, first), wide + _slip(turns, angle))
+    put(planes, (rc.W_BAR, k, first), high)
+    return counted(both(within, narrow))
+
+
+@kernel
+def _last_block(work, i, times, k, first, count, planes):
+    """As `_block`, where fewer than BLOCK times are left."""
+    own, found = np.full((1, BLOCK), math.inf), np.zeros((rc.STATE, 1, BLOCK))
+    for j in range(count):
+        own[0, j] = times[k, first + j]
+    fine = _block(work, i, own, 0, 0, found)
+    for n in range(rc.STATE):
+        for j in range(count):
+            planes[n, k, first + j] = found[n, 0, j]
+    return fine
 
 
 @inline
-def _evaluate(T, state, before, fixed, found, first):
-    """Find what there is AFTER the start of the step in BLOCK lanes."""
-    for j in range(BLOCK):
-        i = np.uint64(first + j)
-        dt = found[AFTER, i]
-        x, v = _moved(coefficients(T, i), dt)
-        carried = before[SAA, i], before[SAB, i], before[SBB, i]
-        jacobian = varied(variations(T, i), dt)
-        saa, _sab, sbb = ellipse(
-            carried, jacobian, dt, v, last_terms(T, i), fixed[PF, i], fixed[PG, i]
-        )
-        n, turns, angle = state[STEPS, i], state[TURNS, i], fixed[TURN, i]
-        count, sign, unsure = before[COUNT, i], before[SIGN, i], before[UNSURE, i]
-        wide, high = bar(n, saa), bar(n, sbb)
-        # then w is 0 at the start and nowhere else
-        from_rest = (before[STEPS, i] == 0.0) & (before[V, i] == 0.0)
-        sure = (unsure < 3.0) & (count >= 0.0) & ((abs(v) > high) | from_rest)
-        passed = (sign * v < 0.0) & (not from_rest)
-        narrow = (wide < TRUST) & (high < TRUST * (1.0 + abs(v)))
-        found[PHI_AT, i], found[V_AT, i] = ((before[PSI, i] + x) + angle) + turns * TWO_PI, v
-        found[WIDE_AT, i] = wide + 3e-16 * (abs(turns) * TWO_PI + abs(angle))
-        found[HIGH_AT, i], found[NARROW, i] = high, 1.0 if narrow else 0.0
-        found[TURNINGS_AT, i] = count + (1.0 if passed else 0.0) if sure else float(UNDETERMINED)
+def _serve(work, i, times, k, first, size, planes):
+    """Record lane i of the work space, in one row, at the times of row k, from the `first` on, within the step;
+    returns the next, and whether all bars were narrow enough.
+    """
+    at, at_low = work[LANES * (BEFORE + TIME) + i], work[LANES * (BEFORE + TIME_LOW) + i]
+    last, end = first, work[LANES * (OF_STEP + DT) + i]
+    while last < size and (times[k, last] - at) - at_low <= end:
+        last += 1
+    for j in range(first, last, BLOCK):
+        count = min(last - j, BLOCK)
+        if j + BLOCK <= times.shape[1]:
+            fine = _block(work, i, times, k, j, planes)
+        else:
+            fine = _last_block(work, i, times, k, j, count, planes)
+        if fine < count:
+            slip = _slip(work[LANES * (AFTER + TURNS) + i], work[LANES * (WHAT_STAYS + TURN) + i])
+            last, beyond = j, j + count
+            while last < beyond and narrow(planes, k, last, slip):
+                last += 1
+            return last, False
+    return last, True
+
+
+@unroll
+def _slip(turns, angle):
+    """What rounds where turns, and the angle of the axes, are added to psi."""
+    return 3e-16 * (abs(turns) * TWO_PI + abs(angle))
+
+
+@inline
+def narrow(planes, k, j, slip):
+    """Are the bars narrow enough, that of phi but for `slip`?"""
+    most = TRUST * (1.0 + abs(planes[rc.W, k, j]))
+    return planes[rc.PHI_BAR, k, j] - slip <= TRUST and planes[rc.W_BAR, k, j] <= most
 
 
 @kernel
-def _note(times, fixed, found, fate, row, column, first, planes, turnings):
-    """Note what BLOCK lanes have found for their next times; those whose bars are too wide are lost."""
-    for i in range(first, first + BLOCK):
-        if found[DUE, i] == 0.0:
-            continue
-        if found[NARROW, i] == 0.0:
-            fate[i] = _LOST
-            continue
-        r, j = row[i], column[i]
-        planes[rc.PHI, r, j], planes[rc.PHI_BAR, r, j] = found[PHI_AT, i], found[WIDE_AT, i]
-        planes[rc.W, r, j], planes[rc.W_BAR, r, j] = found[V_AT, i], found[HIGH_AT, i]
-        turnings[r, j] = int(found[TURNINGS_AT, i])
-        column[i] = j + 1
-        fixed[NEXT, i] = times[r, j + 1] if j + 1 < times.shape[1] else math.inf
+def turnings_at(work, i, planes, k, first, last, turnings):
+    """The turning points before the times `first` to `last` - 1 of row k, which lie in the step of lane i."""
+    before = LANES * BEFORE + i
+    count, sign = work[before + LANES * COUNT], work[before + LANES * SIGN]
+    # then w is 0 at the start and nowhere else
+    from_rest = work[before + LANES * STEPS] == 0.0 and work[before + LANES * V] == 0.0
+    known = work[before + LANES * UNSURE] < 3.0 and count >= 0.0
+    for j in range(first, last):
+        v = planes[rc.W, k, j]
+        passed = sign * v < 0.0 and not from_rest
+        sure = known and (abs(v) > planes[rc.W_BAR, k, j] or from_rest)
+        turnings[k, j] = int(count) + passed if sure else UNDETERMINED
+
+
+@inline
+def nothing(planes, k, first):
+    """Nothing is known in row k from the `first` column on."""
+    for n in range(rc.STATE):
+        for j in range(first, planes.shape[2]):
+            planes[n, k, j] = math.nan
 
 
 @kernel
-def _refill(P, starts, times, waiting, state, fixed, row, column, status):
+def _refill(P, starts, times, waiting, state, fixed, row, column, sizes, status):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            if finite(times[waiting]) == 0:
+            size = finite(times[waiting])
+            if size == 0:
                 status[waiting] = OK
             else:
                 enter(
@@ -472,27 +560,44 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, status):
                     fixed,
                     i,
                 )
-                fixed[NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
+                fixed[NEXT, i], row[i], column[i], sizes[i] = times[waiting, 0], waiting, 0, size
             waiting += 1
     return waiting
 
 
 @kernel
-def _free(limit, state, fixed, fate, row, status):
-    """Free the lanes that have ended; returns whether any has."""
+def record(work, times, row, column, sizes, planes, turnings):
+    """Record the times that lie in the step of each lane, of the work space in one row; lanes whose bars
+    are too wide are lost.
+    """
+    for i in range(LANES):
+        if row[i] >= 0 and passed(work[LANES * FATE + i]):
+            first = column[i]
+            column[i], sound = _serve(work, i, times, row[i], first, sizes[i], planes)
+            if turnings.shape[1] > 0:
+                turnings_at(work, i, planes, row[i], first, column[i], turnings)
+            if not sound:
+                work[LANES * FATE + i] = LOST
+
+
+@kernel
+def free(limit, times, row, column, sizes, state, fixed, fate, planes, status):
+    """Note the next time of each lane, and free those that have ended; returns whether any has."""
     freed = False
     for i in range(LANES):
         if row[i] < 0 or (fate[i] == 0.0 and state[STEPS, i] < limit):
             continue
         r, ending = row[i], -1
-        if _passed(fate[i]) and fixed[NEXT, i] == math.inf:
+        if column[i] == sizes[i]:
             ending = OK
-        if ending < 0 and fate[i] >= _LOST:
+        elif fate[i] >= LOST:
             ending = NO_CONVERGENCE if math.isfinite(state[V, i]) else OVERFLOW
-        if ending < 0 and state[STEPS, i] >= limit:
+        elif state[STEPS, i] >= limit:
             ending = STEP_LIMIT
+        fixed[NEXT, i] = times[r, column[i]] if ending < 0 else math.inf
         if ending >= 0:
-            status[r], row[i], fixed[NEXT, i], freed = ending, -1, math.inf, True
+            nothing(planes, r, column[i])
+            status[r], row[i], freed = ending, -1, True
     return freed
 
 
@@ -514,19 +619,17 @@ def trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     lanes, free ones too.
     """
     work = np.zeros((ROWS, LANES))  # one array: LLVM sees that its rows do not overlap
-    T, state, before, fixed, found, fate = split(work)
-    tolerance = min(tolerance, COARSEST)
-    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    T, state, before, fixed, taken, fate = split(work)
+    flat, tolerance = work.reshape(-1), min(tolerance, COARSEST)
+    row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    column = np.zeros(LANES, dtype=np.int64)
     fixed[NEXT, :] = math.inf  # of lanes that stay free, too
     waiting = np.int64(0)  # a literal 0 would have `_refill` compiled twice
-    waiting, steps = _refill(P, starts, times, waiting, state, fixed, row, column, status), 0
+    waiting, steps = _refill(P, starts, times, waiting, state, fixed, row, column, sizes, status), 0
     while busy(row):
-        step(T, state, before, fixed, fate, tolerance)
+        step(T, state, before, fixed, taken, fate, tolerance)
         steps += LANES
-        for first in range(0, LANES, BLOCK):
-            while _due(state, before, fixed, found, fate, first):
-                _evaluate(T, state, before, fixed, found, first)
-                _note(times, fixed, found, fate, row, column, first, planes, turnings)
-        if _free(limit, state, fixed, fate, row, status):
-            waiting = _refill(P, starts, times, waiting, state, fixed, row, column, status)
+        record(flat, times, row, column, sizes, planes, turnings)
+        if free(limit, times, row, column, sizes, state, fixed, fate, planes, status):
+            waiting = _refill(P, starts, times, waiting, state, fixed, row, column, sizes, status)
     return steps

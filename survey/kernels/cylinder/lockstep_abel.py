@@ -59,6 +59,7 @@ from survey.kernels.cylinder.lockstep import (
     ellipse,
     enter,
     last_terms,
+    moved,
     polynomial,
     series,
     sine_cosine,
@@ -104,19 +105,10 @@ GOAL, DT, SQUARE, VALUE, TIMES, VALUE_BAR, TIME_BAR, MISS = range(0, _SIZE, BLOC
 _GOING = -1
 
 
-@unroll
-def _moved(c, dt):
-    """The change of psi, and w, at dt."""
-    square = dt * dt  # even and odd powers apart: half as long a chain
-    x = [c[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
-    rise, v = (polynomial(a[2::2], square) * dt + polynomial(a[1::2], square) for a in (x, c))
-    return (rise * dt + c[0]) * dt, c[0] + v * dt
-
-
 @inline
 def _nearer(c, rise, dt, reach):
     """One step of Newton's method from dt to where psi has risen by `rise`; with w and the residual at dt."""
-    x, v = _moved(c, dt)
+    x, v = moved(c, dt)
     miss = rise - x
     return min(max(dt + miss / max(v, 1e-300), 0.0), reach), v, miss
 
@@ -149,7 +141,7 @@ def _functions(forces, x):
 def _at(_p, given, dt):
     """(psi, w, 0, 0) at dt of a step: stands for a method's `flow_at`."""
     psi, c = given
-    x, v = _moved(c, dt)
+    x, v = moved(c, dt)
     return psi + x, v, 0.0, 0.0
 
 
@@ -207,7 +199,7 @@ def _cross(T, state, before, fixed, i, reach, total, end, block, size):
                                      60)[1]  # fmt: skip
     for j in range(BLOCK):
         dt = block[DT + j]
-        x, v = _moved(c, dt)
+        x, v = moved(c, dt)
         x += psi
         a, b, d = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
         a += block[SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
@@ -242,7 +234,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
             (1e-17 + 4e-16 * reach, 0.0),
             60,
         )[1]
-        x, v1 = _moved(c, reach)
+        x, v1 = moved(c, reach)
         x1 = before[PSI, i] + x
         carried = before[SAA, i], before[SAB, i], before[SBB, i]
         jacobian = varied(variations(T, i), reach)
@@ -405,7 +397,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
     `lockstep_phi.abels` left it, which comes first.
     """
     work, block = np.zeros((ROWS, LANES)), np.zeros(_SIZE)
-    T, state, before, fixed, _found, fate = split(work)
+    T, state, before, fixed, taken, fate = split(work)
     axes = np.zeros((LANES, BOUND_DDG + 1))  # coefficients and bounds in the axes of the lane
     tolerance = min(tolerance, COARSEST)
     row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
@@ -426,7 +418,7 @@ def abels(P, starts, targets, tolerance, limit, ahead, planes, status):
             if not busy(row):
                 return
         series(T, state, fixed)
-        advance(T, state, before, fixed, fate, tolerance)
+        advance(T, state, before, fixed, taken, fate, tolerance)
         _calm(state, fixed, goal, doubt, started, calm)
         free = False
         for i in range(LANES):

@@ -36,23 +36,16 @@ from survey.kernels.cylinder.flow import (
     D,
 )
 from survey.kernels.cylinder.lockstep import (
-    AFTER,
-    BLOCK,
-    COUNT,
     DG,
-    DUE,
     F_,
     FALL,
-    HIGH_AT,
     LANES,
     LOW,
-    NARROW,
     NEAREST,
     NEXT,
     PDG,
     PF,
     PG,
-    PHI_AT,
     PSI,
     RATE,
     SAA,
@@ -63,16 +56,12 @@ from survey.kernels.cylinder.lockstep import (
     STEPS,
     TIME,
     TIME_LOW,
-    TURNINGS_AT,
     TURNS,
-    UNSURE,
-    V_AT,
-    WIDE_AT,
     V,
     busy,
     varied,
 )
-from survey.kernels.cylinder.steps import OK, TRUST, UNDETERMINED, bar, finite, start_sign
+from survey.kernels.cylinder.steps import OK, TRUST, bar, finite, start_sign
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.kernels.math.angles_double import centred, radians
@@ -83,6 +72,7 @@ PAIRS = 10  # orders 0 to 9
 SERVES = ()  # used before `taylor_double`; users cannot choose it
 FLOW_FINEST = 1.0  # nothing to refine
 FLOW_WORK = 1
+FLOW_UNCOUNTED = True
 TOLERANCE = 1e-24  # truncation of one step, relative to 1 + |w|
 # relative rounding of one step in double-double: 16 operations, with room
 ROUGH = 16.0 * PAIR_ROUNDOFF
@@ -278,9 +268,9 @@ def _ellipse(W, fixed, i, carried, jacobian, dt, v):
 
 
 @inline
-def _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes):
-    """One step of every lane; `before` and `low_before` keep the state before it."""
-    dt, x, v = sums[0], sums[1:3], sums[3:5]
+def _advance(W, T, state, before, low, low_before, fixed, dt, fate, sums, lanes):
+    """One step dt of every lane; `before` and `low_before` keep the state before it."""
+    x, v = sums[1:3], sums[3:5]
     for i in range(lanes):
         for k in range(STATE):
             before[k, i] = state[k, i]
@@ -291,7 +281,7 @@ def _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes):
         fall = FALL * guess * guess
         size = max(last, fall * abs(W[ORDER - 2, i]))
         size = max(size, max(previous, fall * abs(W[ORDER - 3, i])) * guess)
-        size = size * max(1.0, lockstep._SHORT * guess) / (TOLERANCE * (1.0 + abs(w)))
+        size = size * max(1.0, lockstep.SHORT * guess) / (TOLERANCE * (1.0 + abs(w)))
         root = math.sqrt(math.sqrt(math.sqrt(math.sqrt(size))))
         square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
         state[RATE, i] = math.sqrt(max(root, square) + 1e-300)
@@ -299,13 +289,13 @@ def _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes):
     _move(W, dt, x, v, 0, lanes)
     for i in range(lanes):
         h, w = dt[i], v[0, i]
-        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] < h
+        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] <= h
         carried = state[SAA, i], state[SAB, i], state[SBB, i]
         state[SAA, i], state[SAB, i], state[SBB, i] = _ellipse(
             W, fixed, i, carried, varied(lockstep.variations(T, i), h), h, w
         )
         good = state[SAA, i] < TRUST and state[SBB, i] < (1.0 + abs(w)) * (1.0 + abs(w))
-        fate[i] = (lockstep._PASSED if passed else 0.0) + (0.0 if good else lockstep._LOST)
+        fate[i] = (lockstep.PASSED if passed else 0.0) + (0.0 if good else lockstep.LOST)
     for i in range(lanes):
         time = dd.shifted((state[TIME, i], state[TIME_LOW, i]), dt[i])
         phi = dd.add((state[PSI, i], low[0, i]), (x[0, i], x[1, i]))
@@ -316,33 +306,39 @@ def _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes):
 
 
 @kernel
-def _evaluate(W, T, state, before, low_before, fixed, found, i, sums):
-    """Find what there is AFTER the start of the step in lane i: as `lockstep._evaluate`."""
-    dt, x, v = found[AFTER], sums[1:3], sums[3:5]
-    _move(W, dt, x, v, i, i + 1)
-    h, w = dt[i], v[0, i]
-    carried = before[SAA, i], before[SAB, i], before[SBB, i]
-    saa, _sab, sbb = _ellipse(W, fixed, i, carried, varied(lockstep.variations(T, i), h), h, w)
-    n, count, sign = state[STEPS, i], before[COUNT, i], before[SIGN, i]
-    phi = dd.add((before[PSI, i], low_before[0, i]), (x[0, i], x[1, i]))
-    phi = dd.add(phi, radians(before[TURNS, i]))[0]
-    late = 4.0 * ROUNDOFF_UP * h  # the time in the step is float64's
-    wide = bar(n, saa) + late * abs(w) + ROUNDOFF_UP * abs(phi)
-    high = bar(n, sbb) + late * (fixed[PF, i] * abs(w) + fixed[PG, i]) + ROUNDOFF_UP * abs(w)
-    from_rest = (before[STEPS, i] == 0.0) & (before[V, i] == 0.0)
-    sure = (before[UNSURE, i] < 3.0) & (count >= 0.0) & ((abs(w) > high) | from_rest)
-    passed = (sign * w < 0.0) & (not from_rest)
-    found[PHI_AT, i], found[V_AT, i], found[WIDE_AT, i], found[HIGH_AT, i] = phi, w, wide, high
-    found[NARROW, i] = 1.0 if (wide < TRUST) & (high < TRUST * (1.0 + abs(w))) else 0.0
-    found[TURNINGS_AT, i] = count + (1.0 if passed else 0.0) if sure else float(UNDETERMINED)
+def _serve(W, T, state, before, low_before, fixed, taken, i, times, k, first, size, planes, sums):
+    """Record phi, w and their bars of lane i at the times of row k, from the `first` on, within the step,
+    which ends after `taken`; returns the next, and whether all bars were narrow enough.
+    """
+    dt, x, v = sums[0], sums[1:3], sums[3:5]
+    carried, n = (before[SAA, i], before[SAB, i], before[SBB, i]), state[STEPS, i]
+    for j in range(first, size):
+        h = (times[k, j] - before[TIME, i]) - before[TIME_LOW, i]
+        if not h <= taken[i]:
+            return j, True
+        dt[i] = h
+        _move(W, dt, x, v, i, i + 1)
+        w = v[0, i]
+        saa, _sab, sbb = _ellipse(W, fixed, i, carried, varied(lockstep.variations(T, i), h), h, w)
+        phi = dd.add((before[PSI, i], low_before[0, i]), (x[0, i], x[1, i]))
+        phi = dd.add(phi, radians(before[TURNS, i]))[0]
+        late = 4.0 * ROUNDOFF_UP * h  # the time in the step is float64's
+        wide = bar(n, saa) + late * abs(w) + ROUNDOFF_UP * abs(phi)
+        high = bar(n, sbb) + late * (fixed[PF, i] * abs(w) + fixed[PG, i]) + ROUNDOFF_UP * abs(w)
+        planes[rc.PHI, k, j], planes[rc.PHI_BAR, k, j] = phi, wide
+        planes[rc.W, k, j], planes[rc.W_BAR, k, j] = w, high
+        if not lockstep.narrow(planes, k, j, ROUNDOFF_UP * abs(phi)):
+            return j, False
+    return size, True
 
 
 @kernel
-def _refill(P, starts, times, waiting, state, low, fixed, six, row, column, status):
+def _refill(P, starts, times, waiting, state, low, fixed, six, row, column, sizes, status):
     """Give free lanes the rows that wait; returns the first that still waits."""
     for i in range(LANES):
         while waiting < len(P) and row[i] < 0:
-            if finite(times[waiting]) == 0:
+            size = finite(times[waiting])
+            if size == 0:
                 status[waiting] = OK
             else:
                 p, w0 = P[waiting], starts[waiting, rc.START_W]
@@ -357,7 +353,7 @@ def _refill(P, starts, times, waiting, state, low, fixed, six, row, column, stat
                 square = p[BOUND_DG] + p[BOUND_F] * (abs(w0) + 0.25 * p[BOUND_F])
                 state[RATE, i] = abs(w0) + math.sqrt(square)
                 state[SIGN, i] = start_sign(p, phi[0], w0)
-                fixed[NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
+                fixed[NEXT, i], row[i], column[i], sizes[i] = times[waiting, 0], waiting, 0, size
             waiting += 1
     return waiting
 
@@ -366,7 +362,7 @@ def _refill(P, starts, times, waiting, state, low, fixed, six, row, column, stat
 def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     """As `lockstep.trajectories`; `tolerance` has no meaning here."""
     work = np.zeros((lockstep.ROWS, LANES))
-    T, state, before, fixed, found, fate = lockstep.split(work)
+    T, state, before, fixed, taken, fate = lockstep.split(work)
     S, C, W = (
         np.zeros((LOWER + PAIRS, LANES)),
         np.zeros((LOWER + PAIRS, LANES)),
@@ -375,23 +371,31 @@ def flow_trajectories(P, starts, times, tolerance, limit, planes, turnings, stat
     low, low_before = np.zeros((2, LANES)), np.zeros((2, LANES))
     six, sums = np.zeros((SIX, LANES)), np.zeros((9, LANES))
     fixed[NEXT, :] = math.inf  # of lanes that stay free, too
-    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    column = np.zeros(LANES, dtype=np.int64)
     waiting, lanes = np.int64(0), min(LANES, (len(P) + VECTOR - 1) // VECTOR * VECTOR)
-    waiting = _refill(P, starts, times, waiting, state, low, fixed, six, row, column, status)
+    waiting = _refill(P, starts, times, waiting, state, low, fixed, six, row, column, sizes, status)
     while busy(row):
         _begin(S, C, W, state, low, sums, lanes)
         _expand(S, C, W, T, six, sums, lanes)
         for i in range(LANES):
             lockstep.vary_lane(T, i)
-        _advance(W, T, state, before, low, low_before, fixed, fate, sums, lanes)
-        lockstep._turnings(state)
-        for first in range(0, LANES, BLOCK):
-            while lockstep._due(state, before, fixed, found, fate, first):
-                for i in range(first, first + BLOCK):
-                    if found[DUE, i] != 0.0:
-                        _evaluate(W, T, state, before, low_before, fixed, found, i, sums)
-                lockstep._note(times, fixed, found, fate, row, column, first, planes, turnings)
-        if lockstep._free(limit, state, fixed, fate, row, status):
+        _advance(W, T, state, before, low, low_before, fixed, taken[lockstep.DT], fate, sums, lanes)
+        lockstep.note_turnings(state)
+        for i in range(LANES):
+            if row[i] >= 0 and lockstep.passed(fate[i]):
+                first = column[i]
+                column[i], narrow = _serve(
+                    W, T, state, before, low_before, fixed, taken[lockstep.DT], i, times, row[i], first, sizes[i],
+                    planes, sums
+                )  # fmt: skip
+                if turnings.shape[1] > 0:
+                    lockstep.turnings_at(
+                        work.reshape(-1), i, planes, row[i], first, column[i], turnings
+                    )
+                if not narrow:
+                    fate[i] = lockstep.LOST
+        if lockstep.free(limit, times, row, column, sizes, state, fixed, fate, planes, status):
             waiting = _refill(
-                P, starts, times, waiting, state, low, fixed, six, row, column, status
+                P, starts, times, waiting, state, low, fixed, six, row, column, sizes, status
             )

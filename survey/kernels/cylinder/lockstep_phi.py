@@ -39,6 +39,8 @@ from survey.kernels.cylinder.lockstep import (
     FALL,
     LANES,
     NEAREST,
+    SHORT,
+    at_lane,
     busy,
     left_out,
     polynomial,
@@ -70,9 +72,10 @@ TABLE = INTEGRAL + ORDER + 1
 (AT, TURNED, W, TIME, TIME_LOW, W_BOUND, T_BOUND, COUNT, COLUMN, RATE) = range(10)
 STATE = 10
 FIXED = BOUND_G + 1  # rows of what stays fixed: as the columns of `flow.coefficients`
-# Of a step: the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|.
-W_WITHIN, LOWEST, STEEPEST = range(3)
-STEP = 3
+# Of a step: the error bound of w at its targets, a lower bound of w, an upper bound of |dw/dphi|, its length, 1 / w
+# at its start, and what the series of w and of the time leave out.
+W_WITHIN, LOWEST, STEEPEST, H, INVERSE, CUT, CUT_TIME = range(7)
+STEP = 7
 # Where the tables begin in the work space of all lanes: the series, the states after and before the
 # step, the step, and what stays fixed.
 AFTER = TABLE
@@ -84,7 +87,6 @@ _END, _TURNS = LANES * (AFTER + AT), LANES * (BEFORE + TURNED)  # in one row
 FAR = 2.0  # phi is the variable while w^2 is greater than this times the bound of |g|, ...
 SURE = 1e-3  # and while the error bound of w is smaller than this share of it
 BLOCK = 16  # targets at once: two vectors
-_SHORT = 1.0 / 8.0  # as in `lockstep`
 # bits of numbers: those of the exponent, those of 1, and 15 / 16 of the latter
 _EXPONENT, _ONE, _ROOT_OF_1 = (
     np.uint64(bits) for bits in (0x7FF0000000000000, 0x3FF0000000000000, 0x3BF1000000000000)
@@ -127,14 +129,28 @@ def _orders(first, last, functions):
     def expand(T, i):
         f, g = functions(T, i, first, last)
         omega, q = [T[OMEGA + n, i] for n in range(first + 1)], [T[Q + n, i] for n in range(first)]
-        for n in range(first, last):
-            # what is known last comes last: else each sum would wait for the one before
-            order = sorted(range(1, n + 1), key=lambda k: max(k, n - k))
-            q.append(g[n] - summed(omega[k] * q[n - k] for k in order) if n else g[n])
-            omega.append((f[n] + q[n]) * (1.0 / (n + 1)))
-            T[Q + n, i], T[OMEGA + n + 1, i] = q[n], omega[n + 1]
+        for n in range(first, last, 2):
+            rest = _less_two(g[n], g[n + 1], omega, q, n, n)
+            for m, value in zip((n, n + 1), rest, strict=True):
+                if m > n:  # what waits for the latest coefficients comes last
+                    value = value - (omega[1] * q[n] + omega[m] * q[0] if n else omega[1] * q[0])
+                q.append(value)
+                omega.append((f[m] + value) * (1.0 / (m + 1)))
+                T[Q + m, i], T[OMEGA + m + 1, i] = q[m], omega[m + 1]
 
     return expand
+
+
+def _less_two(one, two, a, b, n, last):
+    """`one` less a[k] b[n - k] for k from 1 to n, and `two` less a[k] b[n + 1 - k] for k from 2 to `last`: both at
+    once, since they take the same coefficients, and the latest of these last.
+    """
+    for k in sorted(range(1, max(n, last) + 1), key=lambda k: max(k, n - k)):
+        if k <= n:
+            one = one - a[k] * b[n - k]
+        if 2 <= k <= last:
+            two = two - a[k] * b[n + 1 - k]
+    return one, two
 
 
 def _inverses(first, last):
@@ -146,9 +162,11 @@ def _inverses(first, last):
             [T[OMEGA + n, i] for n in range(last + 1)],
             [T[R + n, i] for n in range(first + 1)],
         )
-        for n in range(first, last):
-            r.append(-summed(omega[k] * r[n + 1 - k] for k in range(n + 1, 0, -1)))
-            T[R + n + 1, i], T[INTEGRAL + n + 1, i] = r[n + 1], r[n + 1] * (1.0 / (n + 2))
+        for n in range(first + 1, last + 1, 2):
+            one, two = _less_two(0.0, 0.0, omega, r, n, n + 1)
+            r += [one, two - omega[1] * one]
+            for m in (n, n + 1):
+                T[R + m, i], T[INTEGRAL + m, i] = r[m], r[m] * (1.0 / (m + 1))
 
     return expand
 
@@ -158,8 +176,8 @@ def expansion(functions):
 
     In several loops, since one has more numbers than there are registers.
     """
-    low, middle, high = (_orders(*ends, functions) for ends in ((0, 7), (7, 12), (12, ORDER)))
-    low_inverses, high_inverses = _inverses(0, 11), _inverses(11, ORDER)
+    low, middle, high = (_orders(*ends, functions) for ends in ((0, 8), (8, 12), (12, ORDER)))
+    low_inverses, high_inverses = _inverses(0, 10), _inverses(10, ORDER)
 
     @inline
     def expand(T):
@@ -209,9 +227,22 @@ def _coefficients(row, size):
 
 
 _omega = _coefficients(OMEGA, ORDER + 1)
-_r = _coefficients(R, ORDER + 1)
 _integral = _coefficients(INTEGRAL, ORDER + 1)
-_low_q = _coefficients(Q, VARIED + 1)
+_low_q, _low_r = _coefficients(Q, VARIED + 1), _coefficients(R, VARIED + 1)
+
+
+def _last_of(row, share):
+    """`lockstep.left_out`'s `ends` of a series that begins in a row, times `share`."""
+
+    @unroll
+    def read(T, i):
+        last, previous, third, fourth = (share * abs(T[row + ORDER - n, i]) for n in range(4))
+        return last, previous, FALL * third, FALL * fourth
+
+    return read
+
+
+_last_of_omega, _last_of_r = _last_of(OMEGA, 1.0), _last_of(R, 1.0 / ORDER)
 
 
 @unroll
@@ -265,55 +296,47 @@ def _advance(T, state, before, step, fixed, tolerance):
             before[k, i] = state[k, i]
     for i in range(LANES):
         w, psi, most_f, most_g = state[W, i], state[AT, i], fixed[BOUND_F, i], fixed[BOUND_G, i]
-        omega, r = _omega(T, i), _r(T, i)
+        ends, ends_r = _last_of_omega(T, i), _last_of_r(T, i)
         inverse = 1.0 / w
         # at most half of w is lost within a step this short
         slope = most_f + 2.0 * most_g * inverse
         least = 2.0 * slope * inverse
-        last, previous = abs(omega[ORDER]), abs(omega[ORDER - 1])
-        third, fourth = FALL * abs(omega[ORDER - 2]), FALL * abs(omega[ORDER - 3])
-        last_r, previous_r = (1.0 / ORDER) * abs(r[ORDER]), (1.0 / ORDER) * abs(r[ORDER - 1])
-        third_r, fourth_r = (FALL / ORDER) * abs(r[ORDER - 2]), (FALL / ORDER) * abs(r[ORDER - 3])
         relative, guess = w / (1.0 + w), state[RATE, i]
-        size = max(max(last, third * guess * guess) * relative, last_r)
-        size = max(size, max(max(previous, fourth * guess * guess) * relative, previous_r) * guess)
-        size = size * max(1.0, _SHORT * guess) / tolerance
+        size = max(max(ends[0], ends[2] * guess * guess) * relative, ends_r[0])
+        size = max(size, max(max(ends[1], ends[3] * guess * guess) * relative, ends_r[1]) * guess)
+        size = size * max(1.0, SHORT * guess) / tolerance
         rate = max(_root(size), max(least, 0.25))
         end = psi + 1.0 / rate
         h = end - psi
-        v = w + w * _rise(omega, h)
-        spent = _elapsed(_integral(T, i), h) * inverse
+        step[CUT, i], step[CUT_TIME, i] = w * left_out(ends, h), left_out(ends_r, h)
+        step[H, i], step[STEEPEST, i], step[INVERSE, i] = h, slope, inverse
+        state[AT, i], state[RATE, i] = end, rate
+    for i in range(LANES):
+        w, h = state[W, i], step[H, i]
+        spent = _elapsed(_integral(T, i), h) * step[INVERSE, i]
+        high = state[TIME, i] + spent
+        state[TIME_LOW, i] += spent - (high - state[TIME, i])
+        state[TIME, i], state[W, i] = high, w + w * _rise(_omega(T, i), h)
+    for i in range(LANES):
+        w, v, h = before[W, i], state[W, i], step[H, i]
+        most_g, slope, inverse = fixed[BOUND_G, i], step[STEEPEST, i], step[INVERSE, i]
         lowest = 0.5 * (w + v - h * slope)
-        cut = w * left_out((last, previous, third, fourth), h)
-        cut_t = 2.0 * inverse * h * left_out((last_r, previous_r, third_r, fourth_r), h)
-        local = cut + ROUNDOFF_UP * (1.5 * max(w, v) + 8.0 * h * slope)
+        local = step[CUT, i] + ROUNDOFF_UP * (1.5 * max(w, v) + 8.0 * h * slope)
         bound, most = state[W_BOUND, i], 1.0 / (lowest * lowest)
         grown = h * most_g * most
         within = bound * (1.0 + grown + grown * grown) + local  # grown < 1
-        contracted, doubt = _contracted(_low_q(T, i), r, h)
+        contracted, doubt = _contracted(_low_q(T, i), _low_r(T, i), h)
         doubt += 4.0 * grown * within * inverse  # the square of the error
-        now = contracted * (1.0 + doubt) * bound + local
-        step[W_WITHIN, i], step[LOWEST, i], step[STEEPEST, i] = within, lowest, slope
-        high = state[TIME, i] + spent
-        state[TIME_LOW, i] += spent - (high - state[TIME, i])
+        step[W_WITHIN, i], step[LOWEST, i] = within, lowest
+        state[W_BOUND, i] = contracted * (1.0 + doubt) * bound + local
+        cut_t = 2.0 * inverse * h * step[CUT_TIME, i]
         state[T_BOUND, i] += h * within * most + cut_t + ROUNDOFF_UP * (4.0 * h * inverse)
-        state[TIME, i], state[AT, i], state[W, i], state[W_BOUND, i] = high, end, v, now
         state[COUNT, i] += 1.0
-        state[RATE, i] = rate
 
 
-def _at_lane(row, size):
-    @unroll
-    def read(work, i):
-        # of one array, whose rows are LANES apart: offsets known to LLVM, which else computes 40 products a call
-        return tuple(work[i + LANES * (row + n)] for n in range(size))
-
-    return read
-
-
-_omega_at, _integral_at = _at_lane(OMEGA, ORDER + 1), _at_lane(INTEGRAL, ORDER + 1)
-_before_at, _step_at = _at_lane(BEFORE, STATE), _at_lane(OF_STEP, STEP)
-_after_at = _at_lane(AFTER, STATE)
+_omega_at, _integral_at = at_lane(OMEGA, ORDER + 1), at_lane(INTEGRAL, ORDER + 1)
+_before_at, _step_at = at_lane(BEFORE, STATE), at_lane(OF_STEP, STEP)
+_after_at = at_lane(AFTER, STATE)
 
 
 @unroll

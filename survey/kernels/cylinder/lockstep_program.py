@@ -463,7 +463,7 @@ def _hold_nothing(hold, i):
 
 @splice
 def _enter(
-    P, leads, lead, starts, times, waiting, state, fixed, numbers, hold, row, column, status
+    P, leads, lead, starts, times, waiting, state, fixed, numbers, hold, row, column, sizes, status
 ):  # fmt: skip
     """Give free lanes the rows of the program `lead` that wait; returns the first that still waits."""
     circle = P[lead, ON_CIRCLE] > 0.0
@@ -472,7 +472,8 @@ def _enter(
             if leads[waiting] != lead:
                 waiting += 1
                 continue
-            if finite(times[waiting]) == 0:
+            size = finite(times[waiting])
+            if size == 0:
                 status[waiting] = OK
             else:
                 p, w0 = P[waiting], starts[waiting, rc.START_W]
@@ -489,6 +490,7 @@ def _enter(
                 _hold_nothing(hold, i)
                 program.note(p, numbers, i, i + 1)
                 fixed[lockstep.NEXT, i], row[i], column[i] = times[waiting, 0], waiting, 0
+                sizes[i] = size
             waiting += 1
     return waiting
 
@@ -497,7 +499,7 @@ def _enter(
 def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnings, status):
     """As `lockstep.trajectories`, of the rows of P that have the program `lead`: see `grouped`."""
     work = np.zeros((lockstep.ROWS, LANES))
-    T, state, before, fixed, found, fate = lockstep.split(work)
+    T, state, before, fixed, taken, fate = lockstep.split(work)
     p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
     circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
@@ -505,12 +507,13 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
     phi = np.zeros(LANES)
     tables, hold = _ball_tables(p)
     fixed[lockstep.NEXT, :] = math.inf  # of lanes that stay free, too
-    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    row, sizes = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    column = np.zeros(LANES, dtype=np.int64)
     waiting, free = np.int64(lead), True
     while True:
         if free:
             waiting = _enter(
-                P, leads, lead, starts, times, waiting, state, fixed, numbers, hold, row, column, status
+                P, leads, lead, starts, times, waiting, state, fixed, numbers, hold, row, column, sizes, status
             )  # fmt: skip
             if not lockstep.busy(row):
                 return
@@ -526,13 +529,10 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
                 start = state[V, i] if state[V, i] != 0.0 else T[W + 1, i]
                 still = state[V, i] == 0.0 and abs(start) <= 8.0 * ROUNDOFF_UP * fixed[PG, i]
                 state[SIGN, i] = 0.0 if still else (1.0 if start > 0.0 else -1.0)
-        lockstep.advance(T, state, before, fixed, fate, tolerance)
-        lockstep._turnings(state)
-        for first in range(0, LANES, lockstep.BLOCK):
-            while lockstep._due(state, before, fixed, found, fate, first):
-                lockstep._evaluate(T, state, before, fixed, found, first)
-                lockstep._note(times, fixed, found, fate, row, column, first, planes, turnings)
-        free = lockstep._free(limit, state, fixed, fate, row, status)
+        lockstep.advance(T, state, before, fixed, taken, fate, tolerance)
+        lockstep.note_turnings(state)
+        lockstep.record(work.reshape(-1), times, row, column, sizes, planes, turnings)
+        free = lockstep.free(limit, times, row, column, sizes, state, fixed, fate, planes, status)
 
 
 @splice
@@ -730,7 +730,7 @@ def _cross(T, state, before, fixed, i, reach, total, end, block, size):
             )[1]
     for j in range(near.BLOCK):
         dt = block[near.DT + j]
-        x, v = near._moved(c, dt)
+        x, v = lockstep.moved(c, dt)
         x += psi
         a, b, d = ellipse(carried, varied(vary, dt), dt, v, ends, most_f, most_g)
         a += block[near.SQUARE + j] + (4e-16 * dt * v) * (4e-16 * dt * v)
@@ -767,7 +767,7 @@ def _pass(p, T, state, before, fixed, delay, i, block, targets, j, doubt, starte
             (1e-17 + 4e-16 * reach, 0.0),
             60,
         )[1]
-        x, v1 = near._moved(c, reach)
+        x, v1 = lockstep.moved(c, reach)
         x1 = before[PSI, i] + x
         carried = before[SAA, i], before[SAB, i], before[SBB, i]
         jacobian = varied(variations(T, i), reach)
@@ -906,7 +906,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
     with bounds of some place.
     """
     work, block = np.zeros((lockstep.ROWS, LANES)), np.zeros(8 * near.BLOCK)
-    T, state, before, fixed, _found, fate = lockstep.split(work)
+    T, state, before, fixed, taken, fate = lockstep.split(work)
     p, tolerance = P[lead].copy(), min(tolerance, lockstep.COARSEST)
     circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
@@ -935,7 +935,7 @@ def abels_near(P, leads, lead, starts, targets, tolerance, limit, ahead, planes,
         _in_time(p, operations, N, degree, S, K, T, phi, state[V], width)
         for i in range(LANES):
             lockstep.vary_lane(T, i)
-        lockstep.advance(T, state, before, fixed, fate, tolerance)
+        lockstep.advance(T, state, before, fixed, taken, fate, tolerance)
         _calm(T, state, before, fixed, goal, doubt, started, calm)
         free = False
         for i in range(LANES):

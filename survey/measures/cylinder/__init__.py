@@ -22,6 +22,10 @@ METHODS = {
             "spike? False if not given",
             bool,
         ),
+        "FLOW_UNCOUNTED": Value(
+            "may `turnings` of `flow_trajectories` have no columns if they are not wanted? False if not given",
+            bool,
+        ),
         "FLOW_WORK": Value(
             "how many steps it takes where Taylor's method of order 20 takes one", int, needed=True
         ),

@@ -58,6 +58,7 @@ def _by_rows(rows, columns, solve):
         solve(rows[pick], columns[pick], known)
         for pick, known in ((served, True), (~served, False))
     ]
+    # in the types of the former part, in which turnings are counted
     results = tuple(np.empty((len(rows), *result.shape[1:]), result.dtype) for result in parts[0])
     for pick, part in zip((served, ~served), parts, strict=True):
         for result, new in zip(results, part, strict=True):
@@ -120,6 +121,8 @@ def _with_more_digits(results, solve, finer, rtol, rows, columns, whole=True):
     """`results`, with those of one method of more digits after the other where they are left open."""
     for method in finer:
         left = _left_open(results, rtol, whole)
+        if not left.any():
+            break
         last = method is finer[-1]
         results = _completed(results, left, partial(solve, method), rows, columns, last)
     return results

@@ -66,22 +66,29 @@ def trajectories(rows, times, back, measure, method, request):
     """phi, w, turnings and status at the times; `measure` is `solution` or `auto`."""
     rows, times, good = valid(rows, times)
     counted = not request.variables or "turnings" in request.variables
-    return at_times(measure.trajectories(method, rows, times, request.rtol, counted), good, back)
+    results = measure.trajectories(method, rows, times, request.rtol, counted)
+    return at_times(results, good, back, counted)
 
 
-def at_times(results, good, back):
-    """The outputs of the question `trajectory`, from floats, turnings and status where the input is
-    `good`.
+def at_times(results, good, back, counted=True):
+    """The outputs of the question `trajectory`, turnings among them if they are `counted`, from floats,
+    turnings and status where the input is `good`.
     """
     floats, turnings, status = results
-    status = np.where(good, status, INVALID_PARAMETERS)
-    lost = status != OK
-    if lost.any():
-        floats[lost], turnings[lost] = np.nan, UNDETERMINED
-    turnings[turnings > MOST_TURNINGS] = UNDETERMINED
+    if not good.all():
+        status = np.where(good, status, INVALID_PARAMETERS)
+    lost = None
+    if status.any():
+        lost = status != OK
+        floats[lost] = np.nan
     columns = {"phi": rc.PHI, "w": rc.W, "phi_error": rc.PHI_BAR, "w_error": rc.W_BAR}
     results = {name: back(floats[..., at]) for name, at in columns.items()}
-    return results | {"turnings": back(turnings), "status": back(status)}
+    if counted:
+        turnings[turnings > MOST_TURNINGS] = UNDETERMINED
+        if lost is not None:
+            turnings[lost] = UNDETERMINED
+        results["turnings"] = back(turnings)
+    return results | {"status": back(status)}
 
 
 def abel(rows, targets, back, measure, method, request):

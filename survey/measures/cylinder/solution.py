@@ -78,7 +78,7 @@ def trajectories(method, rows, times, rtol, counted=True):
     either sign.
 
     turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound
-    leaves it open, and, unless `counted`, where the steps do.
+    leaves it open, and, unless `counted`, everywhere.
     """
     past = times < 0
     if not past.any():
@@ -101,12 +101,12 @@ def trajectories(method, rows, times, rtol, counted=True):
     return results
 
 
-def _nothing(shape):
-    """floats, turnings and status before anything is known."""
+def _nothing(shape, counted=True):
+    """floats, turnings and status before anything is known; turnings have no columns unless `counted`."""
     return (
         np.full((rc.STATE, *shape), np.nan).transpose(1, 2, 0),  # planes, as each is read by itself
-        np.full(shape, UNDETERMINED, dtype=np.int64),
-        np.zeros(shape, dtype=np.int64),
+        np.full(shape if counted else (shape[0], 0), UNDETERMINED, dtype=np.int64),
+        np.zeros(shape, dtype=np.int8),
     )
 
 
@@ -146,24 +146,30 @@ def _decades(rows, times):
 def _in_order(method, rows, times, rtol, counted, decades):
     budget = STEPS * min(method.FLOW_WORK, 10)
     ladder = attempts(method, rtol, decades)
+    skips = getattr(method, "FLOW_UNCOUNTED", False)
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
         at = np.array(times[pick], order="C")  # never read-only, as a broadcast array is
-        floats, turnings, status = _nothing(at.shape)
+        floats, turnings, status = _nothing(at.shape, counted or not skips)
         ends = np.zeros(len(P), dtype=np.int64)
         planes = floats.transpose(2, 0, 1)
         method.flow_trajectories(P, starts, at, tolerance, budget, planes, turnings, ends)
-        np.copyto(status, ends[:, None], where=~np.isfinite(floats[..., rc.PHI]))  # else OK
-        if (lost := floats[..., rc.W_BAR] < LEAST_BAR).any():
-            lost &= floats[..., rc.W] != 0
+        if ends.any():
+            left = ~np.isfinite(floats[..., rc.PHI])
+            np.copyto(status, ends[:, None], where=left, casting="unsafe")
+        if not planes[rc.W_BAR].min(initial=np.inf) >= LEAST_BAR:  # or NaN
+            lost = (floats[..., rc.W_BAR] < LEAST_BAR) & (floats[..., rc.W] != 0)
             floats[..., rc.W_BAR][lost] = LEAST_BAR
-        return floats, turnings, status
+        return (floats, turnings, status) if counted else (floats, status)
 
-    asked = np.isfinite(times)
+    asked = np.broadcast_to(np.isfinite(distinct(times)), times.shape)
     results, _met = _repeated(run, lambda: asked, ladder, rtol)
+    if not counted:
+        floats, status = results
+        return floats, np.full(status.shape, UNDETERMINED, dtype=np.int8), status
     turning = rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0
-    if counted and hasattr(method, "flow_turnings") and turning:
+    if hasattr(method, "flow_turnings") and turning:
         _count(method, rows, times, ladder[-1], asked, results)
     return results
 

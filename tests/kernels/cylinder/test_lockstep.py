@@ -190,3 +190,44 @@ def test_bars_hold_where_every_second_coefficient_vanishes():
     good = (known == steps.OK) & (status == steps.OK)
     assert good.mean() > 0.5
     assert (abs(found - exact)[..., :2] <= (found + exact)[..., 2:])[good].all()
+
+
+def test_bars_inside_a_step_are_not_those_of_its_end():
+    """Pendulums from rest, also slow ones, whose steps last long: early in the first step no more than rounding is
+    lost.
+    """
+    rows = np.zeros((6, 8))
+    rows[:, 5], rows[:, 6] = 10.0 ** -np.arange(0.0, 12.0, 2.0), 1.0
+    unit = rows[:, 5] ** -0.5
+    for share in (0.01, 0.1, 0.3, 1.0):
+        P, starts = solution.split(rows)
+        times = (share * unit)[:, None]
+        planes, turnings = np.full((4, 6, 1), np.nan), np.zeros((6, 1), np.int64)
+        status = np.full(6, 99)
+        taylor.flow_trajectories(P, starts, times, 1e-11, 1000, planes, turnings, status)
+        assert not status.any()
+        (phi, w), (bar, bar_w) = planes[:2, :, 0], planes[2:, :, 0]
+        exact = [
+            _pendulum(1.0, float(t) * float(s) ** 0.5, s)
+            for t, s in zip(times[:, 0], rows[:, 5], strict=True)
+        ]
+        assert (abs(phi - [float(e[0]) for e in exact]) <= bar).all()
+        assert (abs(w - [float(e[1]) for e in exact]) <= bar_w).all()
+        if share < 0.2:
+            assert (bar < 2e-15).all() and (bar_w < 2e-15).all()
+
+
+def _pendulum(phi0, t, s3):
+    """phi, w of phi'' = -s3 sin phi from rest, after the time t / sqrt(s3) (DLMF 22.19.3)."""
+    with mp.workdps(30):
+        k = mp.sin(mp.mpf(phi0) / 2)
+        at = mp.mpf(t) + mp.ellipk(k * k)
+        sn, cn = (mp.ellipfun(kind, at, k=k) for kind in ("sn", "cn"))
+        return 2 * mp.asin(k * sn), 2 * k * mp.sqrt(mp.mpf(s3)) * cn
+
+
+def test_huge_angles_are_answered_within_what_they_round():
+    rows = [[0, 0, 0, 0, 0, 1, phi0, 0.3] for phi0 in (6e13, 7e13, 1e15, -1e15)]
+    floats, _, status = solved(rows, [0.0, 1.0])
+    assert not status.any()
+    assert (floats[..., 3] < 1e-10).all() and (floats[..., 2] < 1e-15 * abs(floats[..., 0])).all()

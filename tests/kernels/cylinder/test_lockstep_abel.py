@@ -146,7 +146,7 @@ def one_step(P, starts, tolerance, factors):
         lockstep_phi._advance(T, state, before, step, fixed, tolerance)
         for i in range(lockstep.LANES):
             h = state[lockstep_phi.AT, i] - before[lockstep_phi.AT, i]
-            low_q, r = lockstep_phi._low_q(T, i), lockstep_phi._r(T, i)
+            low_q, r = lockstep_phi._low_q(T, i), lockstep_phi._low_r(T, i)
             contracted, doubt = lockstep_phi._contracted(low_q, r, h)
             factors[first + i, 0] = before[lockstep_phi.W, i] / state[lockstep_phi.W, i]
             factors[first + i, 1] = contracted * (1.0 + doubt)

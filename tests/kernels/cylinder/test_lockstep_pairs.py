@@ -104,20 +104,22 @@ def test_bars_hold_where_errors_grow_by_many_orders():
 @fresh
 def stepped(P, starts, steps, state, low):
     work = np.zeros((lockstep.ROWS, LANES))
-    T, own, before, fixed, _found, fate = lockstep.split(work)
+    T, own, before, fixed, taken, fate = lockstep.split(work)
     size = lockstep_pairs.LOWER + lockstep_pairs.PAIRS
     S, C, W = np.zeros((size, LANES)), np.zeros((size, LANES)), np.zeros((size, LANES))
     here, there = np.zeros((2, LANES)), np.zeros((2, LANES))
     six, sums = np.zeros((6, LANES)), np.zeros((9, LANES))
-    row, column = np.full(LANES, -1), np.zeros(LANES, dtype=np.int64)
+    row, column, sizes = np.full(LANES, -1), np.zeros(LANES, np.int64), np.zeros(LANES, np.int64)
     times, status = np.full((len(P), 1), 1e9), np.zeros(len(P), dtype=np.int64)
-    lockstep_pairs._refill(P, starts, times, 0, own, here, fixed, six, row, column, status)
+    lockstep_pairs._refill(P, starts, times, 0, own, here, fixed, six, row, column, sizes, status)
     for _ in range(steps):
         lockstep_pairs._begin(S, C, W, own, here, sums, LANES)
         lockstep_pairs._expand(S, C, W, T, six, sums, LANES)
         for i in range(LANES):
             lockstep.vary_lane(T, i)
-        lockstep_pairs._advance(W, T, own, before, here, there, fixed, fate, sums, LANES)
+        lockstep_pairs._advance(
+            W, T, own, before, here, there, fixed, taken[lockstep.DT], fate, sums, LANES
+        )
     state[:], low[:] = own, here
 
 
