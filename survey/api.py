@@ -185,7 +185,11 @@ def evaluate(
     if variables is not None:
         variables = _as_list(variables)
     request = check_request(module, options, method, rtol, variables)
-    given |= {key: xr.DataArray(float(p.default)) for key, p in used.items() if key not in given}
+    given |= {
+        key: arrays.as_labelled(key, float(p.default))
+        for key, p in used.items()
+        if key not in given
+    }
     arrays.check_domains(used, given, request, named)
     arrays.check_dimensions(module, given)
     if any(map(arrays.is_lazy, given.values())):
@@ -245,8 +249,11 @@ def _seconds(module: Any, request: Request, grid: Grid) -> float:
     return float(module.cost(request.options, sizes) * grid.points)
 
 
-def _lazy(module: Any, scene: str, request: Request, given: dict[str, xr.DataArray]) -> xr.Dataset:
+def _lazy(
+    module: Any, scene: str, request: Request, arrays_given: Mapping[str, arrays.Labelled]
+) -> xr.Dataset:
     """The same dataset, its values computed block by block when they are asked for."""
+    given = {key: arrays.as_data_array(array) for key, array in arrays_given.items()}
     table = layout(module, request)
     names = list(given)
     axes = {name: (array.dims, array) for name, array in given.items()}

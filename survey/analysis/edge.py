@@ -14,7 +14,13 @@ from survey.analysis.given import check_names, options_at, parameters
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes, variable
 from survey.request import physical, user_scene
-from survey.request.arrays import as_labelled, check_dimensions, grid_of, own_coordinates
+from survey.request.arrays import (
+    as_data_array,
+    as_labelled,
+    check_dimensions,
+    grid_of,
+    own_coordinates,
+)
 from survey.request.checks import check_options, check_parameters, is_number
 from survey.request.function_scene import FunctionScene
 from survey.scene import plus_minus
@@ -157,7 +163,7 @@ def _of_rows(name, module, measure, options, used, along, ends, near, given):
     fixed = {key: float(array) for key, array in arrays.items() if not array.ndim}
     ds = _described(module, measure, used, along, fixed, replace(found, complete=None), ends)
     about = {key: {"long_name": p.long_name, "units": p.units} for key, p in others.items()}
-    named = {key: array.variable for key, array in arrays.items() if array.ndim}
+    named = {key: as_data_array(array).variable for key, array in arrays.items() if array.ndim}
     for key, values in (named | own_coordinates(arrays)).items():
         every = values.set_dims(dict(grid.sizes)).values.ravel()
         ds.coords[key] = "place", every[row], about.get(key, values.attrs)

@@ -3,9 +3,8 @@ is made of them.
 """
 
 import warnings
-from collections.abc import Hashable, Iterable
-from functools import cache
-from typing import Any
+from collections.abc import Hashable, Iterable, Mapping
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -17,16 +16,13 @@ from survey.request import physical
 from survey.scene import Parameter, Request
 from survey.wording import counted, short, shown
 
-
-@cache
-def _a_number() -> xr.DataArray:
-    """A DataArray of one number: to copy it takes less time than to make another."""
-    # not where this module is loaded: xarray imports dask.array here, 0.3 s
-    return xr.DataArray(0.0)
+Labelled: TypeAlias = xr.Variable | xr.DataArray
 
 
-def as_labelled(key: str, value: Any) -> xr.DataArray:
-    """The parameter as a float64 DataArray."""
+def as_labelled(key: str, value: Any) -> Labelled:
+    """The parameter as float64 numbers with dimensions: plain numbers and NumPy arrays become a Variable, which
+    is faster to make, all else a DataArray.
+    """
     given = value
     if isinstance(value, xr.Variable):
         value = xr.DataArray(value)
@@ -41,9 +37,8 @@ def as_labelled(key: str, value: Any) -> xr.DataArray:
     if array.size == 0:
         raise BadInput(f"{short(key, 40)}: an empty array has no points; give at least one value")
     if unnamed and isinstance(array, np.ndarray):
-        numbers = np.array(array, dtype=float)
-        return (
-            _a_number().copy(data=numbers) if not array.ndim else xr.DataArray(numbers, dims=(key,))
+        return xr.Variable(
+            (key,) if array.ndim else (), np.array(array, dtype=float), fastpath=True
         )
     if unnamed:
         value = xr.DataArray(array, dims=(key,) if array.ndim else ())
@@ -54,7 +49,12 @@ def as_labelled(key: str, value: Any) -> xr.DataArray:
     )
 
 
-def is_lazy(array: xr.DataArray) -> bool:
+def as_data_array(array: Labelled) -> xr.DataArray:
+    """The same numbers as a DataArray."""
+    return array if isinstance(array, xr.DataArray) else xr.DataArray(array)
+
+
+def is_lazy(array: Labelled) -> bool:
     """Is it a dask array? (`chunks` alone is slow where it is not.)"""
     return not isinstance(array.data, np.ndarray) and bool(array.chunks)
 
@@ -75,7 +75,7 @@ def _not_real(key: str, value: Any) -> BadInput:
     )
 
 
-def check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
+def check_dimensions(module: Any, given: Mapping[str, Labelled]) -> None:
     """Raise BadInput if coordinates disagree along a shared dimension, or a dimension has the name
     of an output.
     """
@@ -83,8 +83,8 @@ def check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
     if not wide:
         return
     try:
-        if len(wide) > 1:
-            xr.align(*wide, join="exact", copy=False)
+        if len(wide) > 1 and any(isinstance(array, xr.DataArray) for array in wide):
+            xr.align(*map(as_data_array, wide), join="exact", copy=False)
     except ValueError as error:
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
@@ -107,7 +107,7 @@ def check_dimensions(module: Any, given: dict[str, xr.DataArray]) -> None:
 
 def check_domains(
     used: dict[str, Parameter],
-    given: dict[str, xr.DataArray],
+    given: Mapping[str, Labelled],
     request: Request,
     named: Iterable[str],
 ) -> None:
@@ -131,7 +131,7 @@ def check_domains(
             warnings.warn(f"evaluate: {key} has {what}{hint}", stacklevel=3)
 
 
-def grid_of(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
+def grid_of(used: dict[str, Parameter], given: Mapping[str, Labelled]) -> Grid:
     """The Grid of the parameters; raises BadInput where sizes of a dimension differ."""
     sizes: dict[Hashable, int] = {}
     for key, array in given.items():
@@ -150,9 +150,11 @@ def grid_of(used: dict[str, Parameter], given: dict[str, xr.DataArray]) -> Grid:
     )
 
 
-def own_coordinates(given: dict[str, xr.DataArray]) -> dict[Hashable, xr.Variable]:
+def own_coordinates(given: Mapping[str, Labelled]) -> dict[Hashable, xr.Variable]:
     """Coordinates that the caller's DataArrays bring along, without what these bring along in turn."""
     own: dict[Hashable, xr.Variable] = {}
     for array in given.values():
+        if not isinstance(array, xr.DataArray):
+            continue
         own |= {name: coord.variable for name, coord in array.coords.items() if name not in given}
     return own
