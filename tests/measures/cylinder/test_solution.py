@@ -446,7 +446,7 @@ def test_turnings_are_counted_on_demand_alone(monkeypatch):
     monkeypatch.setattr(taylor_double, "flow_trajectories", refuse)
     alone, unknown, codes = auto.trajectories(taylor, row, times, 1e-10, counted=False)
     np.testing.assert_array_equal(alone[0, 0], floats[0, 0])
-    assert unknown[0, 0] == turnings[0, 0] and unknown[0, 1] == UNDETERMINED and (codes == OK).all()
+    assert (unknown == UNDETERMINED).all() and (codes == OK).all()
     given = dict(zip(("b12", "b31", "d", "c23", "s2", "s3", "phi0", "w0"), row[0], strict=True))
     ds = survey.evaluate(
         "gyrostat", question="trajectory", t=400.0, variables=["phi", "w"], **given
