@@ -156,11 +156,13 @@ def _of_cache_lines(_type):
 
 
 def _with_aligned_stack(module, fndesc):
+    """Declare a function whose stack begins with a cache line, see `_of_cache_lines`: what registers cannot
+    hold is put there in vectors of 32 bytes.
+    """
     context = cpu_target.target_context
     function = type(context).declare_function(context, module, fndesc)
-    function.attributes.add(
-        "nonlazybind"
-    )  # means nothing here, but llvmlite writes no lone alignstack
+    # changes nothing, but llvmlite does not write an alignstack that stands alone
+    function.attributes.add("nonlazybind")
     function.attributes.alignstack = 64
     return function
 

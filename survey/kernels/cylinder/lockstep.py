@@ -276,11 +276,11 @@ def advance(T, state, before, fixed, taken, fate, tolerance):
         square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
         rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
         dt = 1.0 / rate
-        passed = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] <= dt
+        due = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] <= dt
         high = state[TIME, i] + dt
         state[TIME_LOW, i] += dt - (high - state[TIME, i])
         state[TIME, i], state[RATE, i] = high, rate
-        taken[DT, i], fate[i] = dt, PASSED if passed else 0.0
+        taken[DT, i], fate[i] = dt, PASSED if due else 0.0
     for i in range(LANES):
         dt, w = taken[DT, i], state[V, i]
         x, v = T[W + ORDER, i] * (1.0 / (ORDER + 1)), T[W + ORDER, i]
@@ -290,7 +290,7 @@ def advance(T, state, before, fixed, taken, fate, tolerance):
     for i in range(LANES):
         v, dt, ends = state[V, i], taken[DT, i], last_terms(T, i)
         cut = left_out(ends, dt)
-        # a series that ends has no limit of the step, and 0 times a power that overflows is NaN
+        # where the series ends nothing limits the step, and 0 times a power that overflows is NaN
         cut = cut if ends[0] + ends[1] + ends[2] + ends[3] > 0.0 else 0.0
         taken[CUT, i] = cut
         carried = state[SAA, i], state[SAB, i], state[SBB, i]
@@ -530,9 +530,9 @@ def turnings_at(work, i, planes, k, first, last, turnings):
     known = work[before + LANES * UNSURE] < 3.0 and count >= 0.0
     for j in range(first, last):
         v = planes[rc.W, k, j]
-        passed = sign * v < 0.0 and not from_rest
+        turned = sign * v < 0.0 and not from_rest
         sure = known and (abs(v) > planes[rc.W_BAR, k, j] or from_rest)
-        turnings[k, j] = int(count) + passed if sure else UNDETERMINED
+        turnings[k, j] = int(count) + turned if sure else UNDETERMINED
 
 
 @inline
