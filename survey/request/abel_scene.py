@@ -94,7 +94,7 @@ class AbelScene(FunctionScene):
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
         flows = self._flows(given[:, :-2])
         if not getattr(method, "FLOW_BOUNDS", False):
-            self._limit(flows)
+            self._limit(flows, equation.FEW_PIECES)
         rows = solution.rows(flows, given[:, -2], given[:, -1])
         if question == "trajectory":
             return blocks.trajectories(rows, last, back, solution, method, request)
@@ -133,9 +133,9 @@ class AbelScene(FunctionScene):
         self._limit(flows)
         return flows
 
-    def _limit(self, flows):
+    def _limit(self, flows, pieces=equation.PIECES):
         if self.period is not None:
-            equation.limit(flows)
+            equation.limit(flows, pieces)
 
     def _flows(self, points):
         try:

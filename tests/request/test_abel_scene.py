@@ -8,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import xarray as xr
+from mpmath import mp
 from scipy import special
 from scipy.integrate import solve_ivp
 
@@ -315,6 +316,54 @@ def test_weak_features_count_in_the_error_bar(system, start, goal, exact):
     )
     ds = survey.evaluate(scene, question="abel", phi=goal, **given)
     assert abs(float(ds.w) - exact) <= float(ds.w_error) < 1e-10
+
+
+@pytest.mark.parametrize("period", [2 * np.pi, None], ids=["circle", "line"])
+@pytest.mark.parametrize(("method", "rtol", "n"), [("taylor", 1e-12, 1500), ("dop853", 1e-10, 60)])
+def test_steps_that_a_wave_hides_count_in_the_error_bar(method, rtol, n, period):
+    """F = c sin(phi) + A tanh(u / s): far from a the slope of its step, 1e-17 of that of the wave and less, grows
+    by exp(2) within each s. With g = 0, w - F(phi) is constant.
+    """
+
+    def distance(phi, a):
+        return np.sin(phi - a) if period else phi - a
+
+    scene = survey.abel(
+        lambda phi, p: (
+            p[0] * np.cos(phi)
+            + p[1] / p[3] * (1 - np.tanh(distance(phi, p[2]) / p[3]) ** 2)
+            * (np.cos(phi - p[2]) if period else 1.0)
+        ),
+        lambda phi, p: 0.0 * phi,
+        period=period,
+        parameters=("c", "A", "a", "s"),
+    )  # fmt: skip
+    random = np.random.default_rng(12)
+    if method == "dop853":
+        s, height = random.uniform(0.015, 0.04, n), 10 ** random.uniform(-9.0, -6.0, n)
+    else:
+        s, height = 10 ** random.uniform(-2.7, -1.3, n), 10 ** random.uniform(-7.0, 0.5, n)
+    c, A = random.uniform(0.5, 2.0, (2, n)) * random.choice([-1, 1], (2, n))
+    A, phi0, reach = A * height * s, random.uniform(-3, 3, n), random.uniform(0.3, 3.0, n)
+    w0 = random.uniform(5.0, 12.0, n) * random.choice([-1, 1], n)
+    a = phi0 + np.sign(w0) * reach * random.uniform(0.05, 1.0, n)
+    given = {"c": c, "A": A, "a": a, "s": s, "phi0": phi0, "w0": w0, "t": reach / abs(w0)}
+    ds = survey.evaluate(
+        scene, question="trajectory", method=method, rtol=rtol,
+        **{name: xr.DataArray(values, dims="point") for name, values in given.items()},
+    )  # fmt: skip
+    assert (ds.status == 0).all() and float(ds.w_error.median()) < 1e3 * rtol
+    with mp.workdps(30):
+        for i in range(n):
+            c, A, a, s = (mp.mpf(given[name][i]) for name in ("c", "A", "a", "s"))
+
+            def F(phi, c=c, A=A, a=a, s=s):
+                return c * mp.sin(phi) + A * mp.tanh((mp.sin(phi - a) if period else phi - a) / s)
+
+            phi, off = mp.mpf(ds.phi.values[i]), ds.phi_error.values[i]
+            exact = w0[i] + F(phi) - F(mp.mpf(phi0[i]))
+            doubt = 1.5 * (abs(c) + abs(A / s)) * off
+            assert abs(exact - ds.w.values[i]) <= ds.w_error.values[i] + doubt
 
 
 @pytest.mark.parametrize("period", [2 * np.pi, None], ids=["circle", "line"])

@@ -23,6 +23,7 @@ from survey.kernels.cylinder.program import (
     MULTIPLY,
     OVER,
     PLUS,
+    SECH_SQUARED,
     SIN,
     SLOTS,
     SUBTRACT,
@@ -43,10 +44,12 @@ VECTOR = 8  # lanes of vector code
 
 @kernel
 def _function_ball(code, x, r, number):
-    """The ball of the function over (x, r): all but sin, cos, cosh are monotone, and cosh dips less
-    than it rises.
+    """The ball of the function over (x, r): all but sin, cos, cosh and 1/cosh^2 are monotone, and cosh dips
+    less than it rises.
     """
     value = function(code, x, number)
+    # what libm rounds, and more
+    slip = (6.0 if code == SECH_SQUARED else 2.0) * EPS * abs(value)
     if r == 0.0:
         spread = 0.0
     elif code == SIN or code == COS:
@@ -55,14 +58,15 @@ def _function_ball(code, x, r, number):
     else:
         below = abs(function(code, x - r, number) - value)
         above = abs(function(code, x + r, number) - value)
-        spread = (below if below > above else above) + 2.0 * EPS * abs(value)
+        spread = (below if below > above else above) + slip
+        if code == SECH_SQUARED and r > abs(x):
+            spread = max(spread, 1.0 - value + EPS)
         spread = spread if math.isfinite(below + above) else math.inf  # max drops a NaN
         if code == TAN and math.floor((x - r) / math.pi + 0.5) != math.floor(
             (x + r) / math.pi + 0.5
         ):
             spread = math.inf
-    # what libm rounds, and more
-    rounding = 0.0 if x == 0.0 and value == 0.0 else 2.0 * EPS * abs(value)
+    rounding = 0.0 if x == 0.0 and value == 0.0 else slip
     return (value, spread + rounding) if math.isfinite(value + spread) else (0.0, math.inf)
 
 
@@ -169,6 +173,9 @@ def _extend_balls(p, numbers, known, lanes, width, orders, B, n):
         elif code == OVER:
             for q in range(width):
                 _ball_set(B, numbers, x, share, o, q)
+        elif code == SECH_SQUARED and n > 0:
+            for q in range(width):
+                _ball_shift(B, -1.0, two + step * n, numbers, x, 0.0, o, q)
         elif code == MULTIPLY or n > 0:
             for q in range(width):
                 _ball_set(B, numbers, x, 0.0, o, q)
@@ -194,7 +201,7 @@ def _extend_balls(p, numbers, known, lanes, width, orders, B, n):
             for k in range(n + 1):
                 for q in range(width):
                     _ball_add(B, one + step * k, two + step * (n - k), 1.0, n * ROUNDOFF_UP, o, q)
-        elif code > OVER and n > 0:
+        elif code > OVER and code != SECH_SQUARED and n > 0:
             for k in range(1, n + 1):
                 rounding = (n + 1) * ROUNDOFF_UP
                 for q in range(width):

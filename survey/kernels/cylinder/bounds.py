@@ -33,7 +33,7 @@ BOUNDS, KNOWN = 4, 8
 LEAST_RADIUS = 1e-9
 # f and g are bounded over an interval with DERIVATIVES of their derivatives; what their series leave
 # out, as these bound it, may be HIDDEN of them, unless the interval is narrower than FINE.
-DERIVATIVES, HIDDEN, FINE = 6, 1e-3, 1e-6
+DERIVATIVES, HIDDEN, FINE = 8, 1e-5, 1e-6
 NEGLIGIBLE = 1e-18  # what changes w by such a share may be left out
 WEAK = 1e-9  # of the largest on the circle, where steps have the same limit all round it
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
@@ -242,15 +242,15 @@ def complete(rows, angles):
 
 
 @kernel
-def limit_to_shown(rows):
+def limit_to_shown(rows, pieces):
     """Limit RADIUS of programs on the circle, all of one length, to the half-width of pieces that show all
-    that f and g have in them, where their bounds are finite: 128 equal pieces, or shorter ones where
-    these leave out more than HIDDEN, and than WEAK of the largest.
+    that f and g have in them, where their bounds are finite: shorter ones than these many equal pieces
+    where these leave out more than HIDDEN, and than WEAK of the largest.
     """
     if len(rows) == 0:
         return
-    count, orders, pieces = number_of(rows[0], SLOTS), DERIVATIVES + 1, 4 * LANES
-    over, known = np.zeros((4, count * orders * 2 * LANES)), np.zeros(count, np.bool_)
+    count, orders, batches = number_of(rows[0], SLOTS), DERIVATIVES + 1, (pieces - 1) // LANES + 1
+    over, known = np.zeros((batches, count * orders * 2 * LANES)), np.zeros(count, np.bool_)
     finer, numbers = np.zeros(count * orders * 2 * LANES), np.zeros((2 * count, LANES))
     at, sizes, last = np.empty(pieces), np.empty((4, pieces)), np.full(rows.shape[1], math.nan)
     longest = _middles(pieces, at)
@@ -263,12 +263,12 @@ def limit_to_shown(rows):
         unchanged(p, last, known)
         note(p, numbers, 0, LANES)
         f, g, N = int(p[F_AT]), int(p[G_AT]), numbers.ravel()
-        for k in range(4):
+        for k in range(batches):
             balls(p, N, known, at[k * LANES : (k + 1) * LANES], wide, over[k])
-            for q in range(LANES):
-                i = k * LANES + q
-                sizes[0, i], sizes[1, i] = _shown(over[k], f, q, longest)
-                sizes[2, i], sizes[3, i] = _shown(over[k], g, q, longest)
+        for i in range(pieces):
+            own, q = over[i // LANES], i % LANES
+            sizes[0, i], sizes[1, i] = _shown(own, f, q, longest)
+            sizes[2, i], sizes[3, i] = _shown(own, g, q, longest)
         weak_f, weak_g = WEAK * sizes[0].max(), WEAK * sizes[2].max()
         phi, left = at.copy(), 0
         for i in range(pieces):

@@ -69,6 +69,7 @@ from survey.kernels.cylinder.program import (
     PLUS,
     RADIUS,
     REVERSED,
+    SECH_SQUARED,
     SECOND,
     SLOTS,
     SUBTRACT,
@@ -298,6 +299,9 @@ def _extend(operations, N, degree, S, K, n, first, last, width):
         elif code > OVER and n == 0:
             for q in range(width):
                 S[o + q] = function(code, S[one + q], N[x + q])
+        elif code == SECH_SQUARED:
+            for q in range(width):
+                _affine(S, -1.0, two + LANES * n, N, x, 0.0, o, q)
         else:  # the sum of A[k] S[n - k] over k
             A, series, other, low, high = S, one, two, n - degree[b], degree[a]
             if code == DIVIDE or code == OVER:

@@ -44,13 +44,16 @@ CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
     SQRT,
     ERF,
     POWER,
-) = range(9, 26)
+    SECH_SQUARED,  # 1 - tanh^2, whose value stays exact where tanh rounds to 1; its second operand is tanh^2
+) = range(9, 27)
 UNLIMITED = 1e300  # RADIUS on a circle where f and g cannot have spikes
 
 
 @kernel
 def function(code, x, number):
     """The function of this code at x; NaN outside its domain."""
+    if code == SECH_SQUARED:
+        return functions.sech_squared(x)
     if code != POWER:
         return functions.function(code - SIN, x)
     return x**number if x > 0.0 else math.nan
@@ -98,6 +101,8 @@ def extend(p, S, n, count):
             value = (first + value) / S[b, 0]
         elif n == 0:
             value = function(code, S[a, 0], number)
+        elif code == SECH_SQUARED:
+            value = -S[b, n]
         else:
             for k in range(1, n + 1):
                 value += k * S[a, k] * S[b, n - k]

@@ -30,6 +30,8 @@ SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is
 # Of the circle: samples in which what f or g vary by is seen, whose coefficients count above RESOLVED,
 # relative to the largest; and what a step may span of the angle in which they vary.
 EVENLY, RESOLVED, SPAN = 512, 1e-12, 1.2
+PIECES = 128  # of the circle, in which series of high order show all that f and g have in them
+FEW_PIECES = 16  # likewise, for steps in which f and g are seen at a few angles alone
 TOGETHER = 128  # programs that are sampled together
 SIMPLE = 4  # sines and cosines of lines, multiplied with each other, cannot hide a spike
 
@@ -174,6 +176,10 @@ class AngleRecord:
         """x - y."""
         if not isinstance(y, Angle):
             return self.sum(x, -self.mpf(y))
+        if not isinstance(x, (Angle, Number)) and x == 1:
+            code, a, b, _number = self.operations[y.index]
+            if code == pg.MULTIPLY and a == b and self.operations[a][0] == pg.TANH:
+                return self.index(pg.SECH_SQUARED, self.operations[a][1], y.index)
         if not isinstance(x, Angle):
             return self.with_number(pg.FROM, x, first=y.index)
         return self.index(pg.SUBTRACT, x.index, y.index)
@@ -241,6 +247,9 @@ class AngleRecord:
             return self.constant(1)
         if code == pg.CONSTANT:
             return None
+        if code == pg.SECH_SQUARED:
+            inner = self.slope(second)
+            return None if inner is None else -inner
         if code in (pg.PLUS, pg.FROM, pg.TIMES):
             inner = self.slope(first)
             number = self.numbers[index][0] if index in self.numbers else number
@@ -406,9 +415,10 @@ def _degrees(table):
     return degrees
 
 
-def limit(rows):
+def limit(rows, pieces=PIECES):
     """Limit the steps of programs on the circle, whose f and g may have spikes that the series of other
-    steps do not show: for those who take steps without bounds of their own.
+    steps do not show: for those who take steps without bounds of their own. See
+    `bounds.limit_to_shown` for `pieces`.
     """
     spiky = np.flatnonzero((rows[:, pg.ON_CIRCLE] > 0.0) & (rows[:, pg.RADIUS] < pg.UNLIMITED))
     leads = grouped(np.ascontiguousarray(rows[spiky])) if spiky.size else spiky
@@ -416,7 +426,7 @@ def limit(rows):
         own = spiky[leads == lead]
         some = rows[own]
         _limit(some)
-        bounds.limit_to_shown(some)
+        bounds.limit_to_shown(some, pieces)
         rows[own] = some
 
 

@@ -217,6 +217,40 @@ def test_balls_of_squares_hold_them_and_are_not_negative():
         assert 0.0 <= (middle + wide) - (abs(x) + radius) ** 2 < 1e-14
 
 
+@pytest.mark.parametrize("x", [-30.0, -0.2, 19.5, 24.0])
+def test_series_of_tanh_hold_where_it_rounds_to_one(x):
+    row = equation.program(
+        lambda x, p: 1 - np.tanh(x) ** 2, lambda x, p: np.tanh(x) * p[0], (1.0,), False
+    )
+    f, g = np.zeros(12), np.zeros(12)
+    pg.in_angle(row, x, f, g)
+    with mp.workdps(60):
+        for own, h in ((f, lambda x: mp.sech(x) ** 2), (g, mp.tanh)):
+            wanted = [float(c) for c in mp.taylor(h, mp.mpf(x), 11)]
+            assert np.allclose(own, wanted, rtol=1e-13, atol=0.0)
+        assert pg.values(row, x)[2] == pytest.approx(float(mp.sech(x) ** 2), rel=1e-15)
+
+
+@pytest.mark.parametrize("x", [-3.0, -0.1, 0.0, 0.4, 20.0])
+@pytest.mark.parametrize("radius", [0.0, 1e-9, 0.3, 5.0])
+def test_balls_of_the_slope_of_tanh_hold_its_ends_and_its_peak(x, radius):
+    row = equation.program(lambda x, p: 1 - np.tanh(x) ** 2, plain, (1.0,), False)
+    out = np.zeros((int(row[pg.SLOTS]), 3, 2))
+    ball(row, x, radius, 3, out)
+    at = int(row[pg.F_AT])
+    with mp.workdps(60):
+        for y in {
+            x,
+            mp.mpf(x) - radius,
+            mp.mpf(x) + radius,
+            *([mp.mpf(0)] if abs(x) <= radius else []),
+        }:
+            for n, wanted in enumerate(mp.taylor(lambda z: mp.sech(z) ** 2, y, 2)):
+                assert abs(out[at, n, 0] - wanted) <= out[at, n, 1]
+        if radius == 0.0:
+            assert out[at, 0, 1] <= 2e-15 * mp.sech(x) ** 2
+
+
 def test_what_cancels_is_counted_as_rounding():
     row = equation.program(plain, lambda x, p: (x + 1e8) - 1e8, (1.0,), False)
     middle, radius = ball_of_g(row, 0.1)
