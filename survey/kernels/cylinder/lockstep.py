@@ -282,11 +282,8 @@ def advance(T, state, before, fixed, taken, fate, tolerance):
         state[TIME, i], state[RATE, i] = high, rate
         taken[DT, i], fate[i] = dt, PASSED if due else 0.0
     for i in range(LANES):
-        dt, w = taken[DT, i], state[V, i]
-        x, v = T[W + ORDER, i] * (1.0 / (ORDER + 1)), T[W + ORDER, i]
-        for k in range(ORDER - 1, 0, -1):
-            x, v = x * dt + T[W + k, i] * (1.0 / (k + 1)), v * dt + T[W + k, i]
-        state[PSI, i], state[V, i] = state[PSI, i] + (x * dt + w) * dt, w + v * dt
+        rise, v = moved(coefficients(T, i), taken[DT, i])
+        state[PSI, i], state[V, i] = state[PSI, i] + rise, v
     for i in range(LANES):
         v, dt, ends = state[V, i], taken[DT, i], last_terms(T, i)
         cut = left_out(ends, dt)
