@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -87,14 +88,16 @@ class AbelScene(FunctionScene):
         method = load(methods, "taylor" if request.method == "auto" else request.method, "method")
         question = request.options["question"]
         names = tuple(p.name for p in self.own)
+        bounded = getattr(method, "FLOW_BOUNDS", False)
+        pieces = equation.PIECES if bounded else equation.FEW_PIECES
         if question in ("fate", "portrait"):
             measure = blocks.fates if question == "fate" else blocks.portraits
-            return measure(point, names, self.flows, method, request)
+            return measure(point, names, partial(self.flows, pieces=pieces), method, request)
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
         flows = self._flows(given[:, :-2])
-        if not getattr(method, "FLOW_BOUNDS", False):
-            self._limit(flows, equation.FEW_PIECES)
+        if not bounded:
+            self._limit(flows, pieces)
         rows = solution.rows(flows, given[:, -2], given[:, -1])
         if question == "trajectory":
             return blocks.trajectories(rows, last, back, solution, method, request)
@@ -127,13 +130,13 @@ class AbelScene(FunctionScene):
             lambda asked: self.solve(asked, request), self.OUTPUTS, names, point, time, panels, flow
         )
 
-    def flows(self, points):
-        """The programs of the parameters (N, n)."""
+    def flows(self, points, pieces=equation.PIECES):
+        """The programs of the parameters (N, n); see `equation.limit` for `pieces`."""
         flows = self._flows(points)
-        self._limit(flows)
+        self._limit(flows, pieces)
         return flows
 
-    def _limit(self, flows, pieces=equation.PIECES):
+    def _limit(self, flows, pieces):
         if self.period is not None:
             equation.limit(flows, pieces)
 

@@ -318,11 +318,25 @@ def test_weak_features_count_in_the_error_bar(system, start, goal, exact):
     assert abs(float(ds.w) - exact) <= float(ds.w_error) < 1e-10
 
 
+def test_a_start_where_g_underflows_is_not_at_rest():
+    """w = 4 exp(-800) (exp(t) - 1) until phi moves."""
+    scene = survey.abel(
+        lambda phi, p: p[0] + 0 * phi,
+        lambda phi, p: 1 - np.tanh(400 * (phi - 1)) ** 2,
+        period=None,
+        parameters="growth",
+    )
+    ds = survey.evaluate(
+        scene, question="trajectory", growth=1.0, phi0=0.0, w0=0.0, t=[10.0, 1000.0]
+    )
+    assert ds.status[0] == 0 and ds.w[0] == 0.0 and ds.status[1] != 0
+
+
 @pytest.mark.parametrize("period", [2 * np.pi, None], ids=["circle", "line"])
 @pytest.mark.parametrize(("method", "rtol", "n"), [("taylor", 1e-12, 1500), ("dop853", 1e-10, 60)])
 def test_steps_that_a_wave_hides_count_in_the_error_bar(method, rtol, n, period):
-    """F = c sin(phi) + A tanh(u / s): far from a the slope of its step, 1e-17 of that of the wave and less, grows
-    by exp(2) within each s. With g = 0, w - F(phi) is constant.
+    """F = c sin(phi) + A tanh(distance(phi, a) / s): far from a the slope of tanh, 1e-17 of the wave's and less,
+    grows by exp(2) within each s. With g = 0, w - F(phi) is constant.
     """
 
     def distance(phi, a):

@@ -108,9 +108,9 @@ def chunk(random, size):
         narrow = bool(random.random() < 0.5)
         s = 10 ** random.uniform(*((-5.0, -2.0) if narrow else (-2.0, 0.3)), number)
         A = random.choice([-1, 1], number) * 10 ** random.uniform(-12.0, 0.5, number)
-        if random.random() < 0.5:  # so that the step is no steeper than the wave, which hides its tail
-            A *= s
         c = random.choice([-1, 1], number) * 10 ** random.uniform(-3.0, 0.3, number)
+        if random.random() < 0.5:  # mostly flatter than the wave, which hides its tail
+            A *= abs(c) * s
         phi0 = random.uniform(-3, 3, number)
         reach = random.choice([-1, 1], number) * random.uniform(0.1, 8.0, number)
         # beside what is asked for, near it, or in between

@@ -38,6 +38,7 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 from survey.kernels.unroll import unroll
 
+UNDERFLOW = 1e-322  # more than what a function rounds near 0
 LANES = 32  # balls at once
 VECTOR = 8  # lanes of vector code
 
@@ -48,25 +49,28 @@ def _function_ball(code, x, r, number):
     less than it rises.
     """
     value = function(code, x, number)
-    # what libm rounds, and more
-    slip = (6.0 if code == SECH_SQUARED else 2.0) * EPS * abs(value)
+    size = abs(value)
     if r == 0.0:
         spread = 0.0
     elif code == SIN or code == COS:
         steep = math.cos(x) if code == SIN else math.sin(x)
         spread = min(r, abs(steep) * r + 0.5 * r * r, 1.0 + abs(value))
     else:
-        below = abs(function(code, x - r, number) - value)
-        above = abs(function(code, x + r, number) - value)
-        spread = (below if below > above else above) + slip
-        if code == SECH_SQUARED and r > abs(x):
-            spread = max(spread, 1.0 - value + EPS)
+        wide = r + ROUNDOFF_UP * (abs(x) + r)  # as the ends are rounded
+        low, high = function(code, x - wide, number), function(code, x + wide, number)
+        below, above = abs(low - value), abs(high - value)
+        spread = below if below > above else above
+        size = max(size, max(abs(low), abs(high)))
+        if code == SECH_SQUARED and wide > abs(x):
+            spread, size = max(spread, 1.0 - value), 1.0
         spread = spread if math.isfinite(below + above) else math.inf  # max drops a NaN
-        if code == TAN and math.floor((x - r) / math.pi + 0.5) != math.floor(
-            (x + r) / math.pi + 0.5
+        if code == TAN and math.floor((x - wide) / math.pi + 0.5) != math.floor(
+            (x + wide) / math.pi + 0.5
         ):
             spread = math.inf
-    rounding = 0.0 if x == 0.0 and value == 0.0 else slip
+    # what libm rounds, and more: 1/cosh^2 takes five more operations
+    rounding = (4.0 if code == SECH_SQUARED else 2.0) * EPS * size + UNDERFLOW
+    rounding = 0.0 if x == 0.0 and value == 0.0 else rounding
     return (value, spread + rounding) if math.isfinite(value + spread) else (0.0, math.inf)
 
 

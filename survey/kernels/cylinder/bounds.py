@@ -243,9 +243,9 @@ def complete(rows, angles):
 
 @kernel
 def limit_to_shown(rows, pieces):
-    """Limit RADIUS of programs on the circle, all of one length, to the half-width of pieces that show all
-    that f and g have in them, where their bounds are finite: shorter ones than these many equal pieces
-    where these leave out more than HIDDEN, and than WEAK of the largest.
+    """Limit RADIUS of programs on the circle, all of one length, where their bounds are finite: it stays where
+    equal `pieces` show all that f and g have in them; where some leave out more than HIDDEN, and than
+    WEAK of the largest, these are halved until they do not, and it is their half-width at most.
     """
     if len(rows) == 0:
         return

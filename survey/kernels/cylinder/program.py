@@ -4,7 +4,7 @@ A program is a list of operations, each of which makes one value from earlier on
 is phi itself. It stands in the row p of a flow after the columns of `flow`: SLOTS to RADIUS, then
 WIDTH numbers an operation: its code, the indices of its two operands, and a number. Where a number
 is an operand, the rest that binary64 does not hold stands in the column that is not used. The
-series of a function h(y) follows from h' y': its second operand is h'. p[REVERSED] is the sign of
+series of a function h(y) follows from h' y': its second operand is h' (of 1/cosh^2, tanh^2). p[REVERSED] is the sign of
 f, p[MIRRORED] that of phi and of g: -1 under the symmetries S1 and S2 of `solution`.
 
 Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), chapter 13.
@@ -44,7 +44,7 @@ CONSTANT, ADD, SUBTRACT, MULTIPLY, DIVIDE, PLUS, TIMES, FROM, OVER = range(9)
     SQRT,
     ERF,
     POWER,
-    SECH_SQUARED,  # 1 - tanh^2, whose value stays exact where tanh rounds to 1; its second operand is tanh^2
+    SECH_SQUARED,  # 1 - tanh^2, accurate also where tanh rounds to 1
 ) = range(9, 27)
 UNLIMITED = 1e300  # RADIUS on a circle where f and g cannot have spikes
 

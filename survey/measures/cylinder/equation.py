@@ -30,8 +30,9 @@ SAMPLES = np.pi * np.sin(np.arange(1.0, 17.0))  # angles at which periodicity is
 # Of the circle: samples in which what f or g vary by is seen, whose coefficients count above RESOLVED,
 # relative to the largest; and what a step may span of the angle in which they vary.
 EVENLY, RESOLVED, SPAN = 512, 1e-12, 1.2
-PIECES = 128  # of the circle, in which series of high order show all that f and g have in them
-FEW_PIECES = 16  # likewise, for steps in which f and g are seen at a few angles alone
+# Equal pieces of the circle from which `bounds.limit_to_shown` starts: for power series, and for steps that see f and
+# g at a few angles alone, so that a spike must show in longer pieces.
+PIECES, FEW_PIECES = 128, 16
 TOGETHER = 128  # programs that are sampled together
 SIMPLE = 4  # sines and cosines of lines, multiplied with each other, cannot hide a spike
 
@@ -176,7 +177,7 @@ class AngleRecord:
         """x - y."""
         if not isinstance(y, Angle):
             return self.sum(x, -self.mpf(y))
-        if not isinstance(x, (Angle, Number)) and x == 1:
+        if isinstance(x, (int, float, self.mp.mpf)) and x == 1:
             code, a, b, _number = self.operations[y.index]
             if code == pg.MULTIPLY and a == b and self.operations[a][0] == pg.TANH:
                 return self.index(pg.SECH_SQUARED, self.operations[a][1], y.index)

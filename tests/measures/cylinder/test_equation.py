@@ -206,6 +206,18 @@ def test_one_limit_of_steps_all_round_the_circle_shows_spikes_and_spares_what_is
     assert (limits[1] > 0.1).all() and (limits[2] == pg.UNLIMITED).all()
 
 
+def test_steps_that_see_a_few_angles_alone_are_limited_by_weaker_spikes():
+    def f(phi, p):
+        return np.cos(phi) + p[0] * np.exp(-((np.sin(phi - 0.7) / 0.05) ** 2))
+
+    rows = equation.flows(f, plain, np.array([[1e-8], [1e-2]]), True)
+    few = rows.copy()
+    equation.limit(rows)
+    equation.limit(few, equation.FEW_PIECES)
+    (weak, strong), (as_before, alike) = few[:, pg.RADIUS], rows[:, pg.RADIUS]
+    assert weak < 0.12 and weak < 0.25 * as_before and strong == alike < 0.05
+
+
 def test_balls_of_squares_hold_them_and_are_not_negative():
     row = equation.program(plain, lambda x, p: x * x, (1.0,), False)
     out = np.zeros((int(row[pg.SLOTS]), 1, 2))
@@ -249,6 +261,32 @@ def test_balls_of_the_slope_of_tanh_hold_its_ends_and_its_peak(x, radius):
                 assert abs(out[at, n, 0] - wanted) <= out[at, n, 1]
         if radius == 0.0:
             assert out[at, 0, 1] <= 2e-15 * mp.sech(x) ** 2
+
+
+@pytest.mark.parametrize(("h", "exact"), [(lambda x, p: 1 - np.tanh(x) ** 2, lambda x: mp.sech(x) ** 2),
+                                          (lambda x, p: np.exp(x), mp.exp)], ids=["sech2", "exp"])  # fmt: skip
+def test_balls_hold_steep_ends(h, exact):
+    """There the function is larger than in the middle by orders of magnitude, and so is its rounding."""
+    row = equation.program(plain, h, (1.0,), False)
+    out, random = np.zeros((int(row[pg.SLOTS]), 1, 2)), np.random.default_rng(4)
+    x = random.uniform(0.5, 30.0, 1500)
+    given = [*zip(x, x * 10 ** random.uniform(-3.0, 0.0, 1500), strict=True),
+             (19.791417978502313, 2.5243551185492645), (289.9955379567339, 1.42e-13), (372.0, 0.0)]  # fmt: skip
+    with mp.workdps(40):
+        for x, radius in given:
+            ball(row, x, radius, 1, out)
+            middle, wide = out[int(row[pg.G_AT]), 0]
+            for end in (mp.mpf(x) - radius, mp.mpf(x) + radius):
+                assert abs(middle - exact(end)) <= wide
+
+
+def test_what_underflows_is_not_at_rest():
+    row = equation.program(
+        lambda x, p: 1.0 + 0.0 * x, lambda x, p: 1 - np.tanh(400.0 * (x - 1)) ** 2, (1.0,), False
+    )
+    assert row[pg.AT_REST] == 0.0 and pg.values(row, 0.0)[1] == 0.0
+    resting = equation.program(plain, lambda x, p: np.tanh(x), (1.0,), False)
+    assert resting[pg.AT_REST] == 1.0
 
 
 def test_what_cancels_is_counted_as_rounding():
