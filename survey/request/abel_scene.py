@@ -89,15 +89,13 @@ class AbelScene(FunctionScene):
         question = request.options["question"]
         names = tuple(p.name for p in self.own)
         bounded = getattr(method, "FLOW_BOUNDS", False)
-        pieces = equation.PIECES if bounded else equation.FEW_PIECES
+        limited = self.flows if bounded else partial(self.flows, pieces=equation.FEW_PIECES)
         if question in ("fate", "portrait"):
             measure = blocks.fates if question == "fate" else blocks.portraits
-            return measure(point, names, partial(self.flows, pieces=pieces), method, request)
+            return measure(point, names, limited, method, request)
         names = (*names, "phi0", "w0")
         given, last, back = blocks.dense(point, names, {"trajectory": "t", "abel": "phi"}[question])
-        flows = self._flows(given[:, :-2])
-        if not bounded:
-            self._limit(flows, pieces)
+        flows = (self._flows if bounded else limited)(given[:, :-2])
         rows = solution.rows(flows, given[:, -2], given[:, -1])
         if question == "trajectory":
             return blocks.trajectories(rows, last, back, solution, method, request)
@@ -133,12 +131,9 @@ class AbelScene(FunctionScene):
     def flows(self, points, pieces=equation.PIECES):
         """The programs of the parameters (N, n); see `equation.limit` for `pieces`."""
         flows = self._flows(points)
-        self._limit(flows, pieces)
-        return flows
-
-    def _limit(self, flows, pieces):
         if self.period is not None:
             equation.limit(flows, pieces)
+        return flows
 
     def _flows(self, points):
         try:
