@@ -108,7 +108,7 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import summed, unroll
 
 GOING = -1  # what has not ended
-UNSEEN = 1e-300  # square of an error that no square of a bar shows
+LEAST_SQUARE = 1e-300  # of a bar: smaller ones would underflow as they are carried on
 SERIES = ORDER + 1  # coefficients of a value
 # Bounds that a lane holds: what they leave out, the middle of the angles, their half width, and what
 # `bounds.bounded` says of these.
@@ -492,7 +492,7 @@ def _enter(
                 slip = ROUNDOFF_UP * 4.0 * (turns != 0.0)
                 state[SAA, i], state[RATE, i] = slip * slip, 1.0 + abs(w0)
                 if w0 == 0.0 and p[AT_REST] == 0.0:
-                    state[SBB, i] = UNSEEN  # g may have underflowed
+                    state[SBB, i] = LEAST_SQUARE  # g may have underflowed
                 fixed[PF, i], fixed[PG, i], fixed[PDG, i] = p[BOUND_F], p[BOUND_G], p[BOUND_DG]
                 fixed[TURN, i] = 0.0
                 _hold_nothing(hold, i)
