@@ -1,10 +1,10 @@
 """The decorators of kernels, their flags, and a kernel cache that cannot go stale.
 
 nogil: dask's threads run kernels side by side. error_model="numpy": a division by zero gives inf,
-which is checked, and loops vectorise. No fastmath and no contraction: compiled code and plain
-Python (NUMBA_DISABLE_JIT=1) give the same bits, and NaN checks stay. No signatures: importing
-compiles nothing. Loops become vector code but are not unrolled beyond that: it took a third of the
-compiler's time and made no kernel faster.
+which is checked, and loops vectorise. No fastmath and no contraction (kernels ask for fused
+multiply-adds by name, `unroll.fma`): compiled code and plain Python (NUMBA_DISABLE_JIT=1) give the
+same bits, and NaN checks stay. No signatures: importing compiles nothing. Loops become vector code
+but are not unrolled beyond that: it took a third of the compiler's time and made no kernel faster.
 
 numba's own cache returns stale results when an imported module changes; here its directory is named
 by a hash of every source that is compiled, of the versions and of the CPU, so that any edit starts
@@ -27,6 +27,10 @@ from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic, overload
 
+# Fused multiply-adds: all of today's processors but x86's oldest have them.
+HAS_FMA = not llvm.get_process_triple().startswith(
+    ("x86", "i686")
+) or llvm.get_host_cpu_features().get("fma", False)
 COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
 # What decides no number of the output: all other sources do, those that are yet to be written
 # included.

@@ -12,6 +12,8 @@ every instruction then serves all.
 """
 
 import inspect
+import math
+from fractions import Fraction
 
 import numpy as np
 from llvmlite import ir
@@ -19,6 +21,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import make_array
+
+from survey.kernels.jit import HAS_FMA
 
 _ALIGNED = 8  # bytes: numbers that follow each other begin anywhere in an array
 
@@ -70,14 +74,14 @@ class _Number:
         return _Number(self.builder, emit)
 
 
-def _called(x, name):
-    """What a function of LLVM makes of a number."""
-    kind = x.value.type
+def _called(x, name, *others):
+    """What a function of LLVM makes of a number, and of others as values."""
+    kind, values = x.value.type, [x.value, *others]
     several = f"v{kind.count}" if isinstance(kind, ir.VectorType) else ""
     function = x.builder.module.declare_intrinsic(
-        f"llvm.{name}.{several}f64", fnty=ir.FunctionType(kind, [kind])
+        f"llvm.{name}.{several}f64", fnty=ir.FunctionType(kind, [kind] * len(values))
     )
-    return _Number(x.builder, x.builder.call(function, [x.value]))
+    return _Number(x.builder, x.builder.call(function, values))
 
 
 class _Index:
@@ -179,6 +183,35 @@ def root(x):
     if isinstance(x, _Unknown):
         return x
     return _called(x, "sqrt") if isinstance(x, _Number) else np.sqrt(x)
+
+
+def fma(a, b, c):
+    """a b + c of numbers or symbols; rounded once where the processor can (`jit.HAS_FMA`), else twice."""
+    given = (a, b, c)
+    if any(isinstance(x, _Unknown) for x in given):
+        return _Unknown()
+    if not HAS_FMA:
+        return a * b + c
+    symbols = [x for x in given if isinstance(x, _Number)]
+    if not symbols:
+        return _rounded_once(a, b, c) if np.ndim(a * b + c) == 0 else _each_rounded_once(a, b, c)
+    first, *others = _alike(symbols[0].builder, *given)
+    return _called(_Number(symbols[0].builder, first), "fma", *others)
+
+
+def _rounded_once(a, b, c):
+    if not (math.isfinite(a) and math.isfinite(b)):
+        return a * b + c
+    if not math.isfinite(c):
+        return c  # also where the rounded product overflows
+    exact = Fraction(a) * Fraction(b) + Fraction(c)
+    try:
+        return float(exact) if exact else a * b + c  # the zero that has the right sign
+    except OverflowError:
+        return math.inf if exact > 0 else -math.inf
+
+
+_each_rounded_once = np.vectorize(_rounded_once, otypes=[float])
 
 
 def summed(terms):

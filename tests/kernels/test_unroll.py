@@ -5,12 +5,14 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from survey.kernels.jit import kernel
+from survey.kernels import unroll as module
+from survey.kernels.jit import HAS_FMA, fresh, kernel
 from survey.kernels.unroll import (
     both,
     changes_sign,
     consecutive,
     counted,
+    fma,
     largest,
     put,
     root,
@@ -73,6 +75,7 @@ def eight(table, row, first, limit, scale, out):
     few = both(x <= limit, -limit <= x)
     y = 2.0 - (abs(x) * scale + largest(x - scale, 0.25)) / (scale + x) - -smallest(x, scale)
     y += root(x)
+    y = fma(-x, y, fma(scale, y, x))
     put(out, (row, first), y)
     put(out, (row + 1, first + 1), selected(few, y * scale), few)
     put(out, (0, first), spread(scale * scale, x))
@@ -101,6 +104,36 @@ def test_several_numbers_compiled_as_plain(first, limit):
         compiled[1, first : first + 8].any() and (compiled[0, first : first + 8] == 0.3 * 0.3).all()
     )
     assert not np.delete(compiled[:2], np.s_[first : first + 8], axis=1).any()
+
+
+@pytest.mark.parametrize("fused", [True, False])
+def test_multiply_adds_compiled_as_plain(fused, monkeypatch):
+    if fused and not HAS_FMA:
+        pytest.skip("this processor has no fused multiply-adds")
+    monkeypatch.setattr(module, "HAS_FMA", fused)
+
+    @unroll
+    def one(a, b, c):
+        return fma(a, b, c)
+
+    @fresh
+    def all_of(a, b, c, out):
+        for i in range(len(a)):
+            out[i] = one(a[i], b[i], c[i])
+
+    special = [0.0, -0.0, 1.0, -1e-310, 1e-200, -1e200, 1.7e308, inf, -inf, nan, 1 / 3, -1 / 9]
+    a, b, c = (values.ravel() for values in np.meshgrid(special, special, special))
+    with np.errstate(all="ignore"):
+        left = -(a * b)  # to which once rounded sums add what the product's rounding has lost
+    a, b, c = np.tile(a, 2), np.tile(b, 2), np.append(c, left)
+    compiled = np.zeros(a.size)
+    all_of(a, b, c, compiled)
+    with np.errstate(all="ignore"):
+        plain = np.array([one(*numbers) for numbers in zip(a, b, c, strict=True)])
+    np.testing.assert_array_equal(compiled, plain)
+    zero = compiled == 0
+    np.testing.assert_array_equal(np.signbit(compiled[zero]), np.signbit(plain[zero]))
+    assert np.any(compiled[left.size :][np.isfinite(left)] != 0) == fused
 
 
 @pytest.mark.parametrize("a", [-1.0, -0.0, 0.0, 2.0])

@@ -19,7 +19,6 @@ while these are independent and fit into the window of instructions that they re
 """
 
 import math
-import operator
 
 import numpy as np
 
@@ -54,12 +53,12 @@ from survey.kernels.unroll import (
     both,
     consecutive,
     counted,
+    fma,
     largest,
     put,
     root,
     selected,
     smallest,
-    summed,
     unroll,
 )
 
@@ -132,38 +131,39 @@ def sine_cosine(x):
     return sine, cosine
 
 
-def _orders(first, last):
-    """What adds the coefficients first + 1 to `last` of the series of S, C and w of a lane, two by two: both
-    take the same earlier coefficients, which then need to be fetched only once.
+def _orders(n):
+    """What adds the coefficients n + 1 and n + 2 of the series of S, C and w of a lane, whose sums take the
+    same earlier coefficients: these are fetched once.
     """
 
     @unroll
     def expand(T, fixed, i):
         p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
-        s, c, w = ([T[row + n, i] for n in range(first + 1)] for row in (SIN, COS, W))
-        for n in range(first, last, 2):
-            sums = {n: (), n + 1: ()}
-            for k in range(1, n + 1):
-                for m in sums if k < n else (n + 1,):
-                    sums[m] = _plus(sums[m], c[k] * w[m - k], s[k] * w[m - k], c[k] * s[m - k])
-            for m, known in sums.items():  # what waits for the latest coefficients comes last
-                cw, sw, cs = c[m] * w[0], s[m] * w[0], c[m] * s[0]
-                if m > 0:
-                    cw, sw, cs = cw + c[0] * w[m], sw + s[0] * w[m], cs + c[0] * s[m]
-                cw, sw, cs = _plus(known, cw, sw, cs)
-                r, g = 1.0 / (m + 1), p2 * c[m] - p3 * s[m] - pd * cs
-                s.append(cw * r)
-                c.append(-sw * r)
-                w.append((p12 * cw - p31 * sw + g) * r)
-                for row, series_of in ((SIN, s), (COS, c), (W, w)):
-                    T[row + m + 1, i] = series_of[m + 1]
+        s, c, w = ([T[row + k, i] for k in range(n + 1)] for row in (SIN, COS, W))
+        sums = {n: (), n + 1: ()}
+        for k in range(1, n + 1):
+            for m in sums if k < n else (n + 1,):
+                sums[m] = _plus(sums[m], (c[k], w[m - k]), (s[k], w[m - k]), (c[k], s[m - k]))
+        for m, known in sums.items():  # what waits for the latest coefficients comes last
+            known = _plus(known, (c[m], w[0]), (s[m], w[0]), (c[m], s[0]))
+            if m > 0:
+                known = _plus(known, (c[0], w[m]), (s[0], w[m]), (c[0], s[m]))
+            cw, sw, cs = known
+            r, g = 1.0 / (m + 1), fma(-pd, cs, fma(-p3, s[m], p2 * c[m]))
+            s.append(cw * r)
+            c.append(-sw * r)
+            w.append(fma(-p31, sw, fma(p12, cw, g)) * r)
+            for row, series_of in ((SIN, s), (COS, c), (W, w)):
+                T[row + m + 1, i] = series_of[m + 1]
 
     return expand
 
 
-def _plus(sums, *terms):
-    """Three sums with one term more each."""
-    return tuple(map(operator.add, sums, terms)) if sums else terms
+def _plus(sums, *products):
+    """Each of the sums with the product of two numbers more."""
+    if not sums:
+        return tuple(a * b for a, b in products)
+    return tuple(fma(a, b, rest) for (a, b), rest in zip(products, sums, strict=True))
 
 
 @inline
@@ -179,41 +179,41 @@ def _begin(T, state):
         T[SIN, i], T[COS, i], T[W, i] = s, c, state[V, i]
 
 
-_to_6, _to_10, _to_14, _to_16 = _orders(0, 6), _orders(6, 10), _orders(10, 14), _orders(14, ORDER)
+_to_2, _to_4, _to_6, _to_8, _to_10, _to_12, _to_14, _to_16 = map(_orders, range(0, ORDER, 2))
 
 
-def vary(T, f, dg, i):
-    """Series of the variations of lane i, u' = f u + z, z' = g' u, from those of f and g'."""
+@unroll
+def vary_lane(T, i):
+    """Series of the variations of lane i, u' = f u + z, z' = g' u, from those of f and g' in T."""
+    f, dg = ([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG))
     for first, u, z in ((U1, [1.0], [-f[0]]), (U2, [0.0], [1.0])):
         for n in range(LOW):
             r = 1.0 / (n + 1)
-            fu = summed(f[k] * u[n - k] for k in range(n, -1, -1))  # the latest last
-            gu = summed(dg[k] * u[n - k] for k in range(n, -1, -1))
+            fu, gu = convolved(f, u, n), convolved(dg, u, n)
             u.append((fu + z[n]) * r)
             z.append(gu * r)
         for n in range(LOW + 1):
             T[first + n, i], T[first + LOW + 1 + n, i] = u[n], z[n]
 
 
-@unroll
-def vary_lane(T, i):
-    """Series of the variations of lane i, from those of f and g' in T."""
-    vary(T, *([T[row + n, i] for n in range(LOW + 1)] for row in (F_, DG)), i)
+def convolved(a, b, n):
+    """The coefficient n of the product of two series; the latest coefficients of b come last."""
+    total = a[n] * b[0]
+    for k in range(n - 1, -1, -1):
+        total = fma(a[k], b[n - k], total)
+    return total
 
 
 @unroll
-def _vary(T, fixed, i):
-    """Series of f and g', and of the variations, of lane i."""
+def _functions(T, fixed, i):
+    """Series of f and g' of lane i."""
     p12, p31, p2, p3, pd = (fixed[row, i] for row in (P12, P31, P2, P3, PD))
-    s, c = [T[SIN + n, i] for n in range(LOW + 1)], [T[COS + n, i] for n in range(LOW + 1)]
-    f, dg = [], []
+    s, c = ([T[row + n, i] for n in range(LOW + 1)] for row in (SIN, COS))
     for n in range(LOW + 1):
-        squares = summed(s[k] * s[n - k] for k in range(n + 1))
-        double = 1.0 - 2.0 * squares if n == 0 else -2.0 * squares  # cos 2 psi
-        f.append(p12 * c[n] - p31 * s[n])
-        dg.append(-pd * double - p2 * s[n] - p3 * c[n])
-        T[F_ + n, i], T[DG + n, i] = f[n], dg[n]
-    vary(T, f, dg, i)
+        double = -2.0 * convolved(s, s, n)
+        double = 1.0 + double if n == 0 else double  # cos 2 psi
+        T[F_ + n, i] = fma(-p31, s[n], p12 * c[n])
+        T[DG + n, i] = fma(-p3, c[n], fma(-p2, s[n], -pd * double))
 
 
 @inline
@@ -223,15 +223,25 @@ def series(T, state, fixed):
     """
     _begin(T, state)
     for i in range(LANES):
+        _to_2(T, fixed, i)
+    for i in range(LANES):
+        _to_4(T, fixed, i)
+    for i in range(LANES):
         _to_6(T, fixed, i)
     for i in range(LANES):
+        _to_8(T, fixed, i)
+    for i in range(LANES):
         _to_10(T, fixed, i)
+    for i in range(LANES):
+        _to_12(T, fixed, i)
     for i in range(LANES):
         _to_14(T, fixed, i)
     for i in range(LANES):
         _to_16(T, fixed, i)
     for i in range(LANES):
-        _vary(T, fixed, i)
+        _functions(T, fixed, i)
+    for i in range(LANES):
+        vary_lane(T, i)
 
 
 @inline
@@ -315,13 +325,13 @@ def varied(series_of, dt):
     u1, z1, u2, z2, f = (
         polynomial(series_of[row * (LOW + 1) : (row + 1) * (LOW + 1)], dt) for row in range(5)
     )
-    return u1, u2, z1 + f * u1, z2 + f * u2
+    return u1, u2, fma(f, u1, z1), fma(f, u2, z2)
 
 
 def polynomial(coefficients, x):
     *lower, total = coefficients
     for coefficient in reversed(lower):
-        total = total * x + coefficient
+        total = fma(total, x, coefficient)
     return total
 
 
@@ -356,10 +366,12 @@ def carried_on(carried, jacobian, dt, v, cut, most_f, most_g):
     speed = most_f * abs(v) + most_g
     e = cut * dt * (1.0 / ORDER) + ROUNDOFF_UP * (4.0 + 3.0 * dt * (abs(v) + dt * speed))
     g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
+    first, second = fma(u1, saa, u2 * sab), fma(u1, sab, u2 * sbb)
+    third, fourth = fma(z1, saa, z2 * sab), fma(z1, sab, z2 * sbb)
     return (
-        u1 * u1 * saa + 2.0 * u1 * u2 * sab + u2 * u2 * sbb + e * e,
-        u1 * z1 * saa + (u1 * z2 + u2 * z1) * sab + u2 * z2 * sbb,
-        z1 * z1 * saa + 2.0 * z1 * z2 * sab + z2 * z2 * sbb + g * g,
+        fma(u1, first, fma(u2, second, e * e)),
+        fma(z1, first, z2 * second),
+        fma(z1, third, fma(z2, fourth, g * g)),
     )
 
 
@@ -413,8 +425,8 @@ def moved(c, dt):
     """The change of psi, and w, at dt; even and odd powers apart: half as long a chain."""
     square = dt * dt
     x = [c[n] * (1.0 / (n + 1)) for n in range(ORDER + 1)]
-    rise, v = (polynomial(a[2::2], square) * dt + polynomial(a[1::2], square) for a in (x, c))
-    return (rise * dt + c[0]) * dt, c[0] + v * dt
+    rise, v = (fma(polynomial(a[2::2], square), dt, polynomial(a[1::2], square)) for a in (x, c))
+    return fma(rise, dt, c[0]) * dt, fma(v, dt, c[0])
 
 
 @inline

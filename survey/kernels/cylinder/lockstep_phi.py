@@ -42,6 +42,7 @@ from survey.kernels.cylinder.lockstep import (
     SHORT,
     at_lane,
     busy,
+    convolved,
     left_out,
     polynomial,
     sine_cosine,
@@ -52,11 +53,11 @@ from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import (
     consecutive,
     counted,
+    fma,
     largest,
     put,
     selected,
     spread,
-    summed,
     unroll,
 )
 
@@ -133,7 +134,9 @@ def _orders(first, last, functions):
             rest = _less_two(g[n], g[n + 1], omega, q, n, n)
             for m, value in zip((n, n + 1), rest, strict=True):
                 if m > n:  # what waits for the latest coefficients comes last
-                    value = value - (omega[1] * q[n] + omega[m] * q[0] if n else omega[1] * q[0])
+                    value = fma(-omega[m], q[0], value)
+                    if n:
+                        value = fma(-omega[1], q[n], value)
                 q.append(value)
                 omega.append((f[m] + value) * (1.0 / (m + 1)))
                 T[Q + m, i], T[OMEGA + m + 1, i] = q[m], omega[m + 1]
@@ -147,9 +150,9 @@ def _less_two(one, two, a, b, n, last):
     """
     for k in sorted(range(1, max(n, last) + 1), key=lambda k: max(k, n - k)):
         if k <= n:
-            one = one - a[k] * b[n - k]
+            one = fma(-a[k], b[n - k], one)
         if 2 <= k <= last:
-            two = two - a[k] * b[n + 1 - k]
+            two = fma(-a[k], b[n + 1 - k], two)
     return one, two
 
 
@@ -164,7 +167,7 @@ def _inverses(first, last):
         )
         for n in range(first + 1, last + 1, 2):
             one, two = _less_two(0.0, 0.0, omega, r, n, n + 1)
-            r += [one, two - omega[1] * one]
+            r += [one, fma(-omega[1], one, two)]
             for m in (n, n + 1):
                 T[R + m, i], T[INTEGRAL + m, i] = r[m], r[m] * (1.0 / (m + 1))
 
@@ -249,22 +252,20 @@ _last_of_omega, _last_of_r = _last_of(OMEGA, 1.0), _last_of(R, 1.0 / ORDER)
 def _rise(omega, s):
     """omega - 1 at s; even and odd powers apart: half as long a chain."""
     square = s * s
-    return (polynomial(omega[2::2], square) * s + polynomial(omega[1::2], square)) * s
+    return fma(polynomial(omega[2::2], square), s, polynomial(omega[1::2], square)) * s
 
 
 @unroll
 def _elapsed(integral, s):
     """w0 (t - t0) at s."""
     square = s * s
-    return (polynomial(integral[0::2], square) + polynomial(integral[1::2], square) * s) * s
+    return fma(polynomial(integral[1::2], square), s, polynomial(integral[0::2], square)) * s
 
 
 @unroll
 def _contracted(q, r, h):
     """What dw has been multiplied by at h, exp(-integral of g / w^2), and a bound of its relative error."""
-    rates = [
-        summed(q[k] * r[n - k] for k in range(n + 1)) * (1.0 / (n + 1)) for n in range(VARIED + 1)
-    ]
+    rates = [convolved(q, r, n) * (1.0 / (n + 1)) for n in range(VARIED + 1)]
     exponent = h * polynomial(rates, h)
     half = 0.0625 * exponent  # of an eighth of it
     part = (1.0 - half) / (1.0 + half)

@@ -13,12 +13,11 @@ sqrt); T. Ogita, S. M. Rump, S. Oishi, SIAM J. Sci. Comput. 26 (2005) 1955 (inne
 from fractions import Fraction
 from math import sqrt as root
 
-import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import types
 from numba.extending import lower_builtin, type_callable
 
-from survey.kernels.jit import inline
+from survey.kernels.jit import HAS_FMA, inline
 
 SPLITTER = 134217729.0  # 2^27 + 1
 PI = (3.141592653589793, 1.2246467991473532e-16)
@@ -77,9 +76,6 @@ def _fused(context, builder, signature, values):
     return builder.call(fma, [a, b, builder.fneg(p)])
 
 
-HAS_FMA = not llvm.get_process_triple().startswith(
-    ("x86", "i686")
-) or llvm.get_host_cpu_features().get("fma", False)
 _error = fused_error if HAS_FMA else inline(split_error)
 
 
