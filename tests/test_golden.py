@@ -34,7 +34,16 @@ WORDS = {"_FillValue", "comment", "long_name"}  # a fill value may be NaN, and w
 COMPILERS = ("version_numba", "version_llvmlite", "version_numpy", "cpu")
 
 
-@pytest.fixture(scope="module", params=sorted(path.stem for path in FOLDER.glob("*.toml")))
+KEPT = "mathieu", "satellite", "brun", "gyrostat", "libration_elliptic"  # by default
+
+
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(path.stem, marks=[pytest.mark.slow] * (path.stem not in KEPT))
+        for path in sorted(FOLDER.glob("*.toml"))
+    ],
+)
 def both(request, tmp_path_factory):
     """The kept file and one of today, open."""
     folder = tmp_path_factory.mktemp(request.param)

@@ -174,7 +174,7 @@ def at_the_ends():
     """The questions whose domains have ends that are solved in seconds; three unequal moments are slow."""
     for q in questions():
         if "gyrostat" not in q.id and q.id != "brun_triaxial-trajectory":
-            slow = [pytest.mark.slow] * q.id.startswith("satellite_triaxial")
+            slow = [pytest.mark.slow] * q.id.startswith(("satellite_triaxial", "satellite-oblate"))
             yield pytest.param(*q.values, id=q.id, marks=slow)
 
 

@@ -40,7 +40,7 @@ def test_edges_of_a_row_are_those_of_boundaries(tmp_path):
     ("scene", "along", "ends", "rows"),
     [
         ("satellite", "rho", (0.6, 2.5), {"k": np.linspace(0.0, 0.9, 140), "body": "oblate"}),
-        (
+        pytest.param(
             "satellite_triaxial",
             "k",
             (0.0, 0.8),
@@ -49,6 +49,7 @@ def test_edges_of_a_row_are_those_of_boundaries(tmp_path):
                 "B": xr.DataArray([0.7, 0.8], dims="body_number"),
                 "C": xr.DataArray([1.0, 1.1], dims="body_number"),
             },
+            marks=pytest.mark.slow,
         ),
         ("libration_elliptic", "mu", (0.0, 0.05), {"e": [0.0, 0.1, 0.5]}),  # one row after another
     ],
@@ -403,7 +404,7 @@ def _verdict_changes(point, along, low, high):
     return found
 
 
-@pytest.mark.parametrize("epsilon", [1.0, -1.0])
+@pytest.mark.parametrize("epsilon", [1.0, pytest.param(-1.0, marks=pytest.mark.slow)])
 def test_permanent_rotations_in_clebschs_case(epsilon):
     """Along each parameter: (7) for Omega, and where the verdicts change, no more and no fewer."""
     # with C the least moment and epsilon < 0, or A the largest and epsilon > 0, there is a critical
@@ -535,7 +536,7 @@ def test_a_point_outside_the_domain_has_no_margin():
         point.survey.margin()
 
 
-@pytest.mark.parametrize("along", ["s3", "b12"])
+@pytest.mark.parametrize("along", ["s3", pytest.param("b12", marks=pytest.mark.slow)])
 def test_the_exact_edge_of_a_gyrostats_ends_is_found_whatever_the_signs(along):
     """K = b12 s3 - b31 s2 = 0, a hyperbola whose border on the line's narrow map is reached by
     rounding alone.

@@ -30,7 +30,9 @@ def test_a_sound_file_has_no_complaints(copy):
     assert reading.check(copy) == []
 
 
-@pytest.mark.parametrize("place", [0, 10, 40])
+@pytest.mark.parametrize(
+    "place", [10, *(pytest.param(place, marks=pytest.mark.slow) for place in (0, 40))]
+)
 def test_a_flipped_bit_of_the_digest_is_found_and_mended(copy, small, place):
     beside = copy.with_name("copy.nc.sha256")
     bits = bytearray(beside.read_bytes())
@@ -274,7 +276,7 @@ def test_every_flipped_bit_and_every_cut_of_a_block_is_found():
     [
         (os, "fsync", OSError(28, "No space left on device")),
         (netcdf.NewFile, "write", OSError("HDF5: an error of its own")),
-        (os, "write", OSError(5, "Input/output error")),
+        pytest.param(os, "write", OSError(5, "Input/output error"), marks=pytest.mark.slow),
     ],
 )
 def test_a_disk_that_refuses_leaves_the_old_file(copy, small, monkeypatch, where, name, error):
@@ -307,7 +309,9 @@ CALLS = [
 @pytest.mark.parametrize(
     ("where", "name"),
     [
-        pytest.param(*call, marks=[pytest.mark.slow] * (call[1] in ("fsync", "write")))
+        pytest.param(
+            *call, marks=[pytest.mark.slow] * (call[1] in ("fsync", "write", "define", "pack"))
+        )
         for call in CALLS
     ],
     ids=lambda value: getattr(value, "__name__", value),

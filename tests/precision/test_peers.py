@@ -9,7 +9,13 @@ from survey.precision.cases import gyrostat_abel, satellite
 from survey.precision.peers import PeerSystem, batches
 
 
-@pytest.fixture(params=modules.names(survey.precision.peers))
+# the others compile longer
+@pytest.fixture(
+    params=[
+        pytest.param(name, marks=[pytest.mark.slow] * (name != "heyoka"))
+        for name in modules.names(survey.precision.peers)
+    ]
+)
 def peer(request):
     pytest.importorskip(request.param)
     return modules.load(survey.precision.peers, request.param, "peer")

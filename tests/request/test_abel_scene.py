@@ -210,8 +210,16 @@ def test_constants_may_stand_in_a_dict_or_be_fractions():
     assert own.w.values == plain.w.values
 
 
-@pytest.mark.parametrize("period", [2 * np.pi, None], ids=["circle", "line"])
-@pytest.mark.parametrize("question", ["trajectory", "abel"])
+@pytest.mark.parametrize(
+    ("question", "period"),
+    [
+        ("trajectory", None),
+        ("abel", 2 * np.pi),
+        pytest.param("trajectory", 2 * np.pi, marks=pytest.mark.slow),
+        pytest.param("abel", None, marks=pytest.mark.slow),
+    ],
+    ids=["trajectory-line", "abel-circle", "trajectory-circle", "abel-line"],
+)
 def test_spikes_between_the_angles_of_a_step_are_seen(question, period):
     """Of random ones a quarter were passed in time, and one in 13 in the angle."""
     random = np.random.default_rng(8)
@@ -261,7 +269,7 @@ def test_spikes_between_the_angles_of_a_step_are_seen(question, period):
         assert off <= float(ds.w_error[i]) + 2e-10 * (1 + abs(exact.y[-1, -1])), i
 
 
-@pytest.mark.parametrize("width", [0.03, 1e-3, 1e-4])
+@pytest.mark.parametrize("width", [0.03, 1e-3, pytest.param(1e-4, marks=pytest.mark.slow)])
 def test_spikes_of_any_width_on_the_circle_are_seen(width):
     """With g = 0, w - F(phi) is constant: F = A erf(sin(phi - a) / width) rises by 2 A within its
     width. Of widths below 1e-3 up to one in five were passed.

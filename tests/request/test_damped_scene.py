@@ -82,6 +82,7 @@ def test_a_map_without_damping_keeps_its_verdicts():
     assert gains.any() and not ((damped.verdict.sel(c=0.1) == 0) & (plain.verdict == 1)).any()
 
 
+@pytest.mark.slow
 def test_from_a_file_and_on_worker_processes(tmp_path):
     (tmp_path / "z.py").write_text(
         "from math import cos, pi\nPARAMETERS = ('a', 'q')\nPERIOD = pi\nEVEN = True\nDAMPING = 0.05\n"

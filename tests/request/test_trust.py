@@ -239,7 +239,9 @@ def in_terminal(words, answers):
     return os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]), shown.decode().replace("\r\n", "\n")
 
 
-@pytest.mark.parametrize(("answer", "code"), [("\n", 2), ("y\n", 0)])
+@pytest.mark.parametrize(
+    ("answer", "code"), [("\n", 2), pytest.param("y\n", 0, marks=pytest.mark.slow)]
+)
 def test_in_a_terminal_the_user_is_asked(strange, answer, code):
     ended, shown = in_terminal(["verify", strange.path, "--points", "1"], answer)
     assert ended == code and strange.ran == (code == 0), shown

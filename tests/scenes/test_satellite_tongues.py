@@ -96,7 +96,7 @@ def test_hills_method_gives_the_reference(case):
 
 @pytest.mark.parametrize(
     ("family", "n", "k"),
-    [pytest.param(*cell, marks=[pytest.mark.slow] * (i % 3 > 0)) for i, cell in enumerate(CELLS)],
+    [pytest.param(*cell, marks=[pytest.mark.slow] * (i % 6 > 0)) for i, cell in enumerate(CELLS)],
 )
 def test_no_verdict_is_wrong_and_none_is_open(family, n, k):
     edges = tongue(family, n, k)

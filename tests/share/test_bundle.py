@@ -81,7 +81,7 @@ def test_a_bundle_holds_everything_and_describes_it(folder):
     assert {"@id": "map.nc"} in action["result"] and {"@id": "workflow.toml"} in action["object"]
 
 
-@pytest.mark.parametrize("name", ["map.zip", "kept"])
+@pytest.mark.parametrize("name", ["map.zip", pytest.param("kept", marks=pytest.mark.slow)])
 def test_verify_checks_the_whole(folder, name):
     done = program(folder, "verify", name, "--points", "5", "--trust-scene")
     assert done.returncode == 0, done.stderr

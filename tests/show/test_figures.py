@@ -165,7 +165,7 @@ def test_the_colours_differ_for_the_colour_blind_and_in_grey():
     assert apart(grey(*palette.GREYS)) > 0.1 and not set(palette.GREYS) & set(palette.COLOURS)
 
 
-@pytest.mark.parametrize("name", ["w", "turnings", "status"])
+@pytest.mark.parametrize("name", ["w", "turnings", pytest.param("status", marks=pytest.mark.slow)])
 def test_any_variable_can_be_drawn(surveyed, tmp_path, name):
     ds = survey.open(surveyed)
     figures.save(ds, tmp_path / "map.png", name)

@@ -77,7 +77,13 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in ("not even", "linear", "states")))
+        for name in CASES
+    ],
+)
 def test_planes_of_three_axes_have_the_curves_of_two(name):
     """Those of the last pairs, of which the first axis is not one, to the last bit."""
     scene, axes, fixed, number = CASES[name]

@@ -31,13 +31,14 @@ finally:
 READ, COMPILED, UNUSED = "1 0", "0 1", "0 0"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(dispatch.cpus() == 1, reason="nothing is compiled beside on one processor")
 @pytest.mark.parametrize(
     ("scene", "row", "lane", "variables", "kernels"),
     [
         ("mathieu", "q", "a", ["discriminant", "verdict"], (READ, UNUSED, UNUSED)),
         *(
-            pytest.param("satellite", "k", "rho", variables, kernels, marks=pytest.mark.slow)
+            ("satellite", "k", "rho", variables, kernels)
             for variables, kernels in (
                 # meanwhile the other process compiles the longer one of factors
                 (["exponent", "rotation_number", "verdict"], (UNUSED, UNUSED, COMPILED)),

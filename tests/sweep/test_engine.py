@@ -16,7 +16,10 @@ from survey.sweep import cost, engine, solve, time_left
 CUTS = [(1, 2**20, 2**16), (5, 2**20, 2**16), (4, 8, 4), (3, 6, 2), (24, 1, 1)]
 
 
-@pytest.mark.parametrize(("block", "region", "tile"), CUTS)
+@pytest.mark.parametrize(
+    ("block", "region", "tile"),
+    [pytest.param(*cut, marks=[pytest.mark.slow] * (cut not in CUTS[-2:])) for cut in CUTS],
+)
 def test_any_cut_gives_the_same_file(small, surveyed, tmp_path, monkeypatch, block, region, tile):
     monkeypatch.setattr(cost, "BLOCK_POINTS", block)
     monkeypatch.setattr(cost, "REGION_POINTS", region)

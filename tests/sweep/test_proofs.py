@@ -265,7 +265,7 @@ def test_the_edges_of_a_row_are_those_of_meissner(here):
     pytest.param("k", [1.3, 1.36], {"rho": 1.0}, {}, 2, marks=pytest.mark.slow),
     pytest.param("k", [1.2, 1.25], {"inertia_ratio": 0.2}, {"direction": "-1"}, 1, marks=pytest.mark.slow),
     # one at rho = 0, where the body is a sphere
-    ("rho", [-0.4, 0.45], {"k": 1.3}, {"body": "oblate"}, 3),
+    pytest.param("rho", [-0.4, 0.45], {"k": 1.3}, {"body": "oblate"}, 3, marks=pytest.mark.slow),
 ], ids=["libration", "rotation", "backward", "oblate"])  # fmt: skip
 def test_the_edges_of_a_row_of_satellites(axis, ends, fixed, options, number):
     """Against the Fourier series of `survey.edge`, which knows nothing of formulas in the angle."""

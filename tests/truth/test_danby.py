@@ -13,7 +13,7 @@ from survey.truth.danby_flow import A_DOUBT, B_DOUBT, A, B
     "mu, short",
     [
         (0.01, 0.7),
-        (0.02, 0.1),
+        pytest.param(0.02, 0.1, marks=pytest.mark.slow),
         pytest.param(1e-3, 1e-3, marks=pytest.mark.slow),
         pytest.param(1e-12, 1e-5, marks=pytest.mark.slow),
         pytest.param(0.3, 1e-6, marks=pytest.mark.slow),

@@ -551,6 +551,7 @@ READ, RUN = "Show the file", "I have read it: allow it to run until survey view 
 
 @served
 @browsed
+@pytest.mark.slow
 def test_in_a_browser_a_strange_scene_runs_only_once_its_text_was_shown_and_allowed(
     tmp_path, monkeypatch
 ):

@@ -110,7 +110,8 @@ def in_full(out, column):
 
 
 @pytest.mark.parametrize(
-    ("k", "rho", "oblate"), [(0.3, 1.0, False), (0.9, 2.2, True), (1.3, -0.7, False)]
+    ("k", "rho", "oblate"),
+    [(0.3, 1.0, False), pytest.param(0.9, 2.2, True, marks=pytest.mark.slow), (1.3, -0.7, False)],
 )
 def test_truth_of_satellites(k, rho, oblate):
     """Against mpmath's Taylor series of the pendulum, 30 digits."""
@@ -265,7 +266,9 @@ OWN = {
 }
 
 
-@pytest.mark.parametrize("name", OWN)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "harmonics")) for name in OWN]
+)
 def test_truth_of_own_equations(name):
     """Against mpmath's Taylor series, piece by piece."""
     p = np.array(OWN[name])

@@ -30,7 +30,7 @@ from survey.request import schema, workflow
 DOCS = ROOT / "workflows/docs"
 PAGES = sorted(DOCS.glob("*.md"))
 NOTEBOOKS = sorted((ROOT / "workflows/notebooks").glob("*.ipynb"))
-COMPILING = {"own_equation", "damping"}  # pages whose examples compile for long
+LONG = {"own_equation", "damping", "analysis"}  # pages whose examples take long
 each_page = pytest.mark.parametrize("page", PAGES, ids=lambda path: path.stem)
 
 
@@ -53,7 +53,7 @@ def tool(monkeypatch):
 
 @pytest.mark.parametrize(
     "page",
-    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in COMPILING)) for p in PAGES],
+    [pytest.param(p, id=p.stem, marks=[pytest.mark.slow] * (p.stem in LONG)) for p in PAGES],
 )
 def test_the_python_of_a_page_runs(page, folder):
     scope = {"__name__": "__main__"}
@@ -355,14 +355,18 @@ def test_a_scene_with_its_mathematics_has_its_notebook_and_its_kept_file():
     assert {path.stem for path in (ROOT / "tests/golden").glob("*.toml")} == named
 
 
-@pytest.mark.parametrize("name", modules.names(survey.scenes))
-def test_every_scene_has_its_page_with_its_mathematics(tool, name):
-    page = tool("scene_pages").pages()[f"scenes/{name}.md"]
-    path = ROOT / f"survey/scenes/{name}.md"
-    assert path.exists() == (f"{name}.md" in survey.scenes.load(name).__doc__)
-    if path.exists():
-        errata = path.read_text().partition("\n## Errata\n")[2]
-        assert errata.strip() and errata.replace("../../results/", "../results/").strip() in page
+def test_every_scene_has_its_page_with_its_mathematics(tool):
+    pages = tool("scene_pages").pages()  # takes seconds
+    for name in modules.names(survey.scenes):
+        path = ROOT / f"survey/scenes/{name}.md"
+        assert path.exists() == (f"{name}.md" in survey.scenes.load(name).__doc__), name
+        if path.exists():
+            errata = path.read_text().partition("\n## Errata\n")[2]
+            page, errata = (
+                pages[f"scenes/{name}.md"],
+                errata.replace("../../results/", "../results/"),
+            )
+            assert errata.strip() and errata.strip() in page, name
 
 
 @pytest.mark.parametrize("name", modules.names(survey.scenes))

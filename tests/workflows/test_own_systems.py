@@ -88,7 +88,11 @@ def test_a_quadrupoles_damping_in_closed_form():
 
 @pytest.mark.parametrize(
     "delta, epsilon, zeta, verdict",
-    [(1.0, 0.42, 0.1, 0), (1.0, 0.38, 0.1, 1), (-0.5, 1.0, 0.3, 0)],
+    [
+        (1.0, 0.42, 0.1, 0),
+        pytest.param(1.0, 0.38, 0.1, 1, marks=pytest.mark.slow),
+        pytest.param(-0.5, 1.0, 0.3, 0, marks=pytest.mark.slow),
+    ],
 )  # fmt: skip
 def test_damped_multipliers_in_closed_form(delta, epsilon, zeta, verdict):
     """exp(-pi zeta) times those of Mathieu's equation at delta - zeta^2, which mpmath integrates to 30 digits."""

@@ -124,6 +124,7 @@ def stepped(P, starts, steps, state, low):
 
 
 @pytest.mark.parametrize("steps", [1, 20])
+@pytest.mark.slow
 def test_a_step_of_a_fast_motion_keeps_the_energy_within_its_bound(steps):
     """b = 0: w^2 / 2 + V(phi) is constant; there the error is seen to the last of the 23 digits."""
     rows = drawn(LANES, 11, (0, 0, 1, 1, 1, 1, 3, 1))

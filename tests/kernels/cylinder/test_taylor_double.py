@@ -29,7 +29,17 @@ def test_sine_and_cosine_have_thirty_digits():
             assert abs(mpf(cosine[0]) + mpf(cosine[1]) - mp.cos(angle)) < 1e-31
 
 
-@pytest.mark.parametrize("row", [*DRAWN, (*SIX, *NEAR), (0, 0, 0, 0, 0, 1.0, np.pi, 0.0)])
+@pytest.mark.parametrize(
+    "row",
+    [
+        *(
+            pytest.param(row, marks=[pytest.mark.slow] * (i in (1, 2)))
+            for i, row in enumerate(DRAWN)
+        ),
+        (*SIX, *NEAR),
+        (0, 0, 0, 0, 0, 1.0, np.pi, 0.0),
+    ],
+)
 def test_trajectories_lie_within_narrow_bars(row):
     """Also where float64's bar has grown by 1e13: the doubles phi and w are then as good as they can be."""
     row, times = np.array([row]), np.array([[0.5, 18.0]])
@@ -183,7 +193,8 @@ def test_thousands_beside_separatrices_rests_and_double_roots(still):
 
 @pytest.mark.parametrize("off", [0.0, 1e-12, -1e-9])
 @pytest.mark.parametrize(("six", "phi0", "w0"), [((0, 0, 1.1, 0.3, 0.5, -0.2), 1.5, 0.5145879417558026),
-                                                 ((0, 0, 0, 0, 0, 4.0), 0.25, 3.968790668917316)])  # fmt: skip
+                                                 pytest.param((0, 0, 0, 0, 0, 4.0), 0.25, 3.968790668917316,
+                                                              marks=pytest.mark.slow)])  # fmt: skip
 def test_bars_stay_narrow_from_one_passage_of_a_saddle_to_the_next(six, phi0, w0, off):
     """What errs along the flow must not come across it: at each saddle it would grow by as much as
     solutions part.

@@ -225,7 +225,7 @@ def series(row, t):
     return phi, w
 
 
-@pytest.mark.parametrize("mu", [1.5, -0.7, 0.5, 0.1, 0.0])
+@pytest.mark.parametrize("mu", [pytest.param(1.5, marks=pytest.mark.slow), -0.7, 0.5, 0.1, 0.0])
 def test_bars_hold_where_61_is_met_within_rounding(mu):
     rows = np.concatenate([curved(2, 3, mu), curved(2, 4, mu, 0.2)])
     floats, _turnings, status = solved(rows, [3.0])

@@ -100,13 +100,13 @@ def test_references_to_t_20_lie_within_narrow_bars():
     "scale",
     [
         (1, 1, 1, 1, 3, 1),
-        (1, 1, 1, 1, 3, 0),  # from rest
+        pytest.param((1, 1, 1, 1, 3, 0), marks=pytest.mark.slow),  # from rest
         (1, 1, 1, 1, 1, 1e-7),  # nearly so
         (0, 0, 0, 1, 3, 1),  # pendulum
         (1, 0, 0, 0, 3, 1),  # two wells alike
         (-1, 0, 0, 1, 0, 1),  # g = 0 at the start
-        (1, 1, 1, 1, 1e5, 1),
-        (1, 1, 1, 1, 3, 20),
+        pytest.param((1, 1, 1, 1, 1e5, 1), marks=pytest.mark.slow),
+        pytest.param((1, 1, 1, 1, 3, 20), marks=pytest.mark.slow),
     ],
 )
 def test_bars_hold_against_multiprecision(scale):
@@ -125,7 +125,7 @@ def test_bars_hold_against_multiprecision(scale):
         ((9, 9, 9, 9, 3, 3), 1.0),
         ((3, 1, 0.01, 0.01, 3, 1), 1.0),  # two wells
         ((1, 1, 1, 1, 3, 0.01), 1.0),
-        ((1, 1, 1, 1, 3, 1), 100.0),  # long
+        pytest.param((1, 1, 1, 1, 3, 1), 100.0, marks=pytest.mark.slow),  # long
         ((1e-9, 1e-9, 1e-9, 1e-9, 3, 1e-5), 1e4),
     ],
 )

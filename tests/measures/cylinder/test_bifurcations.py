@@ -16,7 +16,11 @@ PLANES = [
 ]  # fmt: skip
 SQUARE = Square(np.array([-2.1, -1.9]), np.array([2.0, 1.8]), np.array([False, False]))
 NAMES = list(curves.CLASSES)
-each = pytest.mark.parametrize(("axes", "changes"), PLANES, ids=str)
+each = pytest.mark.parametrize(
+    ("axes", "changes"),
+    [pytest.param(*plane, marks=[pytest.mark.slow] * (i == 5)) for i, plane in enumerate(PLANES)],
+    ids=str,
+)
 
 
 @pytest.fixture(autouse=True)

@@ -257,6 +257,7 @@ def test_connections_explain_where_branches_go():
     assert np.array_equal(changed, np.array(inside) > 0)
 
 
+@pytest.mark.slow
 def test_a_way_next_to_where_saddles_have_the_same_height_is_found():
     """Both saddles have the same V between the same two points of the lattice, on one line; there
     a change of labels hid the zero.
@@ -274,6 +275,7 @@ def test_a_way_next_to_where_saddles_have_the_same_height_is_found():
     assert (one != two).sum() == 1
 
 
+@pytest.mark.slow
 def test_a_cycle_is_born_in_a_homoclinic_connection():
     square = Square(np.array([-2.0, -4.0]), np.array([0.2, 4.0]), np.array([False, False]))
     found = curves.closed(square, ["s2", "d"], FIXED, {})

@@ -87,6 +87,7 @@ def test_return_maps_touch_the_identity_within_the_error(found, rotating):
     assert sorted(signs) == [-1, 1]
 
 
+@pytest.mark.slow
 def test_two_cycles_are_lost(found):
     on_folds = folds(found)
     left, right = (found.along[name][0][on_folds] for name in ("cycles_left", "cycles_right"))

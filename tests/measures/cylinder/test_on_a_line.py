@@ -22,7 +22,11 @@ LINES = [
 ]
 
 
-@pytest.mark.parametrize(("along", "system"), LINES, ids=["s2", "s3", "two_turns"])
+@pytest.mark.parametrize(
+    ("along", "system"),
+    [LINES[0], *(pytest.param(*line, marks=pytest.mark.slow) for line in LINES[1:])],
+    ids=["s2", "s3", "two_turns"],
+)
 def test_along_one_axis_the_boundaries_explain_how_many_cycles_there_are(along, system, tmp_path):
     axis = {"start": -4.0, "stop": 4.0, "num": 5}
     ds = survey.run(
@@ -61,12 +65,18 @@ def test_boundaries_that_are_not_found_show_in_the_counts(monkeypatch):
     [
         ("b12", (-2.0, 2.0), (0.8602, 0.8605), "cycle_fold",
          {"b31": -1.657403, "d": -1.052758, "c23": 1.205098, "s2": 0.328648, "s3": -1.623485}),
-        ("s3", (-2.0, 2.0), (-0.3275, -0.3265), "cycle_fold",
-         {"b12": 0.340652, "b31": -0.114761, "d": 1.093108, "c23": -1.878616, "s2": 0.82786}),
+        pytest.param(
+            "s3", (-2.0, 2.0), (-0.3275, -0.3265), "cycle_fold",
+            {"b12": 0.340652, "b31": -0.114761, "d": 1.093108, "c23": -1.878616, "s2": 0.82786},
+            marks=pytest.mark.slow,
+        ),
         ("s2", (-2.0, 2.0), (1.8235, 1.8245), "homoclinic",
          {"b12": -1.49298, "b31": -0.812969, "d": -0.028612, "c23": 1.397842, "s3": 1.860926}),
-        ("s3", (-4.0, 4.0), (0.1155, 0.1165), "cycle_fold",
-         {"b12": -0.515, "b31": -0.036, "d": 0.039, "c23": 0.714, "s2": 0.711}),
+        pytest.param(
+            "s3", (-4.0, 4.0), (0.1155, 0.1165), "cycle_fold",
+            {"b12": -0.515, "b31": -0.036, "d": 0.039, "c23": 0.714, "s2": 0.711},
+            marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_no_boundary_hides_another_beside_it(along, ends, near, kind, system):
@@ -109,7 +119,9 @@ def _junction(a, current):
     return found[0] - found[1]
 
 
-@pytest.mark.parametrize("a", [0.2, 1.15, 1.167, 1.18, 1.19])
+@pytest.mark.parametrize(
+    "a", [0.2, *(pytest.param(a, marks=pytest.mark.slow) for a in (1.15, 1.167, 1.18)), 1.19]
+)
 def test_the_homoclinic_point_of_a_junction_next_to_its_fold(a):
     """The curve ends in the fold at a = 1.193: the branches miss each other to either side of the
     point, a rotation is born in it, and there is no other.
@@ -125,7 +137,9 @@ def test_the_homoclinic_point_of_a_junction_next_to_its_fold(a):
     assert beside.rotations_plus.values.tolist() == [0, 1]
 
 
-@pytest.mark.parametrize(("a", "complete"), [(1.1930459, 0), (1.2, None)])
+@pytest.mark.parametrize(
+    ("a", "complete"), [pytest.param(1.1930459, 0, marks=pytest.mark.slow), (1.2, None)]
+)
 def test_a_homoclinic_point_that_cannot_be_told_from_the_fold_is_not_denied(a, complete):
     """They meet at a = 1.1930459: (a* - a)^2 is how far apart they are, to a few percent. Beyond, the
     rotation is born in the fold.
@@ -135,6 +149,7 @@ def test_a_homoclinic_point_that_cannot_be_told_from_the_fold_is_not_denied(a, c
     assert found.attrs.get("complete") == complete
 
 
+@pytest.mark.slow
 def test_a_fold_that_a_branch_passes_explains_no_rotation(monkeypatch):
     """Without the connection 9e-6 from the fold, no rotation is said to be born in the fold."""
     monkeypatch.setattr(own_bifurcations.connections, "found", lambda plane: [])

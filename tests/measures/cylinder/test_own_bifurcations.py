@@ -199,7 +199,7 @@ def on_line(scene, along, ends, kinds, **fixed):
 
 
 @pytest.mark.parametrize("wave", [sin, cos])
-@pytest.mark.parametrize("ends", [(0.9, 1.1), (0.9, 1.13)])
+@pytest.mark.parametrize("ends", [(0.9, 1.1), pytest.param((0.9, 1.13), marks=pytest.mark.slow)])
 def test_a_line_meets_the_fold_at_1_wherever_its_angle_and_its_nodes_are(wave, ends):
     """g = I - sin phi, or I - cos phi, whose slope is 0 exactly at a node; 1 is the middle of a line."""
     scene = survey.abel(
@@ -212,7 +212,7 @@ def test_a_line_meets_the_fold_at_1_wherever_its_angle_and_its_nodes_are(wave, e
     assert abs(at - 1.0) <= bar and bar < 1e-10
 
 
-@pytest.mark.parametrize("bias", [0.0, 0.3, 0.7])
+@pytest.mark.parametrize("bias", [0.0, 0.3, pytest.param(0.7, marks=pytest.mark.slow)])
 def test_a_line_meets_hopf_points(bias):
     """f = a - cos phi, g = I - sin phi: at the rest where cos phi = sqrt(1 - I^2) = a, beyond which
     it repels.

@@ -341,7 +341,9 @@ def test_turnings_of_a_pendulum():
     assert turnings[0].tolist() == list(range(8))
 
 
-@pytest.mark.parametrize("six", [SIX, (0.4, 0.3, -0.9, 0.7, 1.1, 0.6)])
+@pytest.mark.parametrize(
+    "six", [SIX, pytest.param((0.4, 0.3, -0.9, 0.7, 1.1, 0.6), marks=pytest.mark.slow)]
+)
 def test_turnings_far_into_a_focus_are_reported(six):
     """Where w is far below rounding, down to e^-400, they are counted about the focus in polar
     coordinates.

@@ -156,6 +156,7 @@ def test_the_orbit_that_is_zero_from_a_start_that_is_not():
     assert (abs(twice.x0).max("state") > 0.1).all()  # once
 
 
+@pytest.mark.slow
 def test_the_orbit_that_is_zero_is_counted_once():
     """Newton's method ends at 0, at 2e-69, at 9e-69: without a force the energy falls, so that there is no other."""
 
@@ -244,7 +245,12 @@ def orbit_near(omega, F, zeta, x, v):
 
 @pytest.mark.parametrize(
     ("F", "near", "inward"),
-    [(0.3, 1.38, -1.0), (0.5, 1.42, 1.0), (0.5, 1.66, -1.0), (0.7, 1.9, -1.0)],
+    [
+        pytest.param(0.3, 1.38, -1.0, marks=pytest.mark.slow),
+        (0.5, 1.42, 1.0),
+        pytest.param(0.5, 1.66, -1.0, marks=pytest.mark.slow),
+        pytest.param(0.7, 1.9, -1.0, marks=pytest.mark.slow),
+    ],
 )
 def test_both_orbits_are_found_next_to_a_fold(F, near, inward):
     """Down to 1e-7 of the range, where cubics between points of the curve miss the fold by 1e-5."""

@@ -40,6 +40,7 @@ def test_two_equal_damped_oscillators_have_the_edges_of_one(q):
     assert found.edge_class.values.tolist() == [2]  # minus_one
 
 
+@pytest.mark.slow
 def test_two_equal_damped_oscillators_have_the_curves_of_one():
     """Every point has an edge of the one oscillator within its error, along an axis or the other."""
     systems = [
@@ -87,6 +88,7 @@ def test_two_equal_undamped_oscillators_have_the_edges_of_one():
     assert found.edge_class.values.tolist() == [2, 2, 1, 1]  # minus_one, plus_one
 
 
+@pytest.mark.slow
 def test_both_edges_of_a_tongue_between_two_points_of_the_lattice_are_found():
     system, given = str(ROOT / "workflows/coupled_mathieu.py"), {"epsilon": 0.3}
     found = survey.edge(system, along="Omega", Omega=(0.2, 5.0), **given)
@@ -137,11 +139,15 @@ def gyroscopes():
     )
 
 
-def test_two_equal_collisions():
+def test_two_equal_collisions_along_a_line():
     """Of one Krein sign, equal multipliers are known to be on the circle where they do not collide."""
     edge = survey.edge(gyroscopes(), along="g", g=(0.5, 4.0), k=1.0)
     assert edge.edge_class.values.tolist() == [4]  # collision
     assert abs(edge.edge[0] - 2.0) <= edge.edge_error[0] < 1e-6
+
+
+@pytest.mark.slow
+def test_two_equal_collisions_on_a_map():
     axes = {"g": {"start": 0.5, "stop": 4.0, "num": 3}, "k": {"start": 0.2, "stop": 2.0, "num": 3}}
     ds = boundaries.find(check({"scene": gyroscopes(), "axes": axes, "boundaries": {}}))
     assert ds.curve_class.values.tolist() == [4] and ds.curve_point.size > 90
@@ -161,6 +167,7 @@ def test_five_that_pass_together_are_one_edge_and_no_more_is_missing():
     assert "complete" not in found.attrs
 
 
+@pytest.mark.slow
 def test_past_a_pole_two_multipliers_jump_and_do_not_pass():
     """Both are e^(c / a), inside for a < 0 and outside for a > 0: no edge, and one is said to be missing."""
 
@@ -179,8 +186,10 @@ def test_past_a_pole_two_multipliers_jump_and_do_not_pass():
     "along, ends, given, narrow",
     [  # a collision beside another edge of the same cell; a tongue of collisions in a cell
         ("k", (0.02, 0.97), {"A": 0.45243163108538553, "B": 0.5827159089463423, "C": 1.0}, 0.96044774),
-        ("yaw_ratio", (-0.95, 0.8388771442043984), {"roll_ratio": 0.8488771442043984, "k": 0.3426454444677417},
-         0.81588),
+        pytest.param(
+            "yaw_ratio", (-0.95, 0.8388771442043984), {"roll_ratio": 0.8488771442043984, "k": 0.3426454444677417},
+            0.81588, marks=pytest.mark.slow,
+        ),
     ],
 )  # fmt: skip
 def test_every_change_of_verdict_along_a_line_has_its_edge(along, ends, given, narrow):

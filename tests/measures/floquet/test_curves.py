@@ -128,6 +128,7 @@ def test_curves_of_hamiltonian_systems_are_numbered():
     assert "edge_index" not in survey.edge(mathieu("none"), along="a", a=(-1.0, 10.0), q=1.5, c=0.0)
 
 
+@pytest.mark.slow
 def test_both_edges_of_a_tip():
     """Points of Mathieu's tongues at small q, by the series of DLMF 28.6.1 to q^4, whose rest is
     below 1e-15 here.
@@ -179,6 +180,7 @@ def test_damped_mathieus_tongues():
     assert 2 * c < first[:, 1].min() < 2 * c + 0.005
 
 
+@pytest.mark.slow
 def test_meissners_tongues():
     def K(t, p, out):
         out[0, 0] = p[0] + (p[1] if t < 1.0 else -p[1])
@@ -202,6 +204,7 @@ def test_meissners_tongues():
         assert_zero_within(off, x, errors + 1e-14)
 
 
+@pytest.mark.slow
 def test_mass_filter():
     """x'' + (a - 2 q cos 2t) x = 0 and y'' - (a - 2 q cos 2t) y = 0: the first region and its tips."""
 
@@ -288,6 +291,7 @@ def circle(t, p, out):
         out[k + 1, k] += 1.0
 
 
+@pytest.mark.slow
 def test_neimark_sacker():
     scene = survey.floquet(circle, period=PERIOD, parameters=("x", "y"), states=tuple("abcd"))
     axes = (("x", -0.7, 0.8), ("y", -0.6, 0.7))
@@ -343,7 +347,9 @@ def test_gyroscopic_stabilisation():
     assert not curves(ds, "minus_one", *axes)
 
 
-@pytest.mark.parametrize("n, rank", [(1, 1), (2, 1), (4, 3), (6, 5), (6, 6)])
+@pytest.mark.parametrize(
+    "n, rank", [(1, 1), (2, 1), (4, 3), pytest.param(6, 5, marks=pytest.mark.slow), (6, 6)]
+)
 def test_bounds_of_determinants(n, rank):
     """Of the exact determinants of matrices within E, next to singular ones."""
     rng = np.random.default_rng(10 * n + rank)

@@ -157,7 +157,9 @@ def reversible(n, number, seed):
     return B
 
 
-@pytest.mark.parametrize("n, number", [(2, 60), (4, 40), (6, 20)])
+@pytest.mark.parametrize(
+    "n, number", [(2, 60), (4, 40), pytest.param(6, 20, marks=pytest.mark.slow)]
+)
 def test_reversible_systems_in_turning_coordinates(n, number):
     check_reversible(n, number, seed=n)
 

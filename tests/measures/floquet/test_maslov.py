@@ -140,6 +140,7 @@ def test_a_tongue_of_a_millionth_of_the_map_is_drawn():
     assert (abs(np.sort(a, axis=0) - edges) <= error + 1e-11).all()  # of eigenvalues up to 3600
 
 
+@pytest.mark.slow
 def test_where_a_system_jumps_nothing_passes():
     def jumps(t, p, out):
         out[0, 0] = p[0] if p[0] + 0.1 * p[1] < 2.0 else p[0] + 30.0

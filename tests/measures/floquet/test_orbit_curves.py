@@ -78,7 +78,13 @@ def test_a_fold_of_limit_cycles_in_closed_form():
     assert (ds.curve_angle.values[fold] == 0).all() and (ds.curve_outside.values[fold] == 0).all()
 
 
-@pytest.mark.parametrize("eps, a", [(0.897, 3.718), (0.711, 3.805), (0.564, 2.929)])
+@pytest.mark.parametrize(
+    "eps, a",
+    [
+        *(pytest.param(*at, marks=pytest.mark.slow) for at in ((0.897, 3.718), (0.711, 3.805))),
+        (0.564, 2.929),
+    ],
+)
 def test_folds_of_limit_cycles_that_are_no_circles(eps, a):
     """On one side of a fold there are two cycles, on the other side none."""
 
@@ -145,6 +151,7 @@ def test_complex_pairs_in_closed_form():
     assert (ds.curve_outside.values[curve] == 0).all()
 
 
+@pytest.mark.slow
 def test_a_pitchfork_of_a_symmetric_system():
     """x = 0 loses stability where a = b^2, and two orbits, each other's mirror images, branch off."""
 
@@ -241,6 +248,7 @@ def test_the_cusp_and_the_number_of_orbits():
         ]
 
 
+@pytest.mark.slow
 def test_without_damping():
     """A conservative oscillator: one curve of folds, though v = 0 on it; det M = 1 everywhere is no
     complex pair.
@@ -316,7 +324,9 @@ def crossed(t, x, p, out):
 
 
 @pytest.mark.parametrize("start", [(0.0, 0.5), (0.6, 0.1)])
-@pytest.mark.parametrize("continuation", [None, ("l", -0.9, 0.8), ("m", -1.0, 1.0)])
+@pytest.mark.parametrize(
+    "continuation", [None, ("l", -0.9, 0.8), pytest.param(("m", -1.0, 1.0), marks=pytest.mark.slow)]
+)
 def test_a_line_shows_where_curves_of_orbits_cross(start, continuation):
     """There is no fold: on one curve each side has an orbit."""
     scene = survey.orbit(

@@ -77,6 +77,7 @@ def test_no_spike_as_wide_as_the_file_says_goes_unseen(A):
     assert unseen(A, random_points(3, 300)) == 0
 
 
+@pytest.mark.slow
 def test_no_spike_next_to_the_ends_of_the_period_goes_unseen():
     """Chebyshev coefficients alone missed 4 of these, and an error was 4e7 times its bar."""
     points = random_points(501, 2000)

@@ -63,7 +63,9 @@ def test_reference_systems(case, method):
     assert int(ds.verdict) == (1 if radius < 1 or on_circle else 0)
 
 
-@pytest.mark.parametrize("n, number", [(2, 100), (3, 60), (4, 60), (6, 25)])
+@pytest.mark.parametrize(
+    "n, number", [(2, 100), (3, 60), (4, 60), pytest.param(6, 25, marks=pytest.mark.slow)]
+)
 def test_random_systems_in_turning_coordinates(n, number):
     check_random(n, number, seed=n)
 

@@ -69,7 +69,9 @@ def around(edge, number):
 
 
 @pytest.mark.parametrize(("z", "is_even", "shift"), [(even, True, 0.0), (shifted, False, 0.3)])
-@pytest.mark.parametrize("edge", [9.047739259809374, 25.02085434544858])
+@pytest.mark.parametrize(
+    "edge", [9.047739259809374, pytest.param(25.02085434544858, marks=pytest.mark.slow)]
+)
 def test_consecutive_doubles_beside_an_edge_are_decided_as_mpmath_does(z, is_even, shift, edge):
     places = around(edge, 9)
     scene = survey.hill(z, period=pi, parameters=("a", "q"), even=is_even)

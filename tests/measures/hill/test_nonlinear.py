@@ -79,6 +79,7 @@ CASES = [
 
 
 @pytest.mark.parametrize(("body", "k", "rho"), CASES)
+@pytest.mark.slow
 def test_the_twist_is_that_of_the_full_rotation(body, k, rho):
     """d(angle per return)/dJ at one energy, by tilts of 0.02 and 0.04 and the square of the tilt
     taken to 0.

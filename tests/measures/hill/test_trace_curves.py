@@ -97,6 +97,7 @@ def test_narrow_tongues_and_bands_are_drawn_whole():
         assert (off <= ds.curve_position_error.values + 1e-13)[kind == code].all()
 
 
+@pytest.mark.slow
 def test_a_missing_curve_is_found_by_counting_or_noticed(monkeypatch):
     """By the number outside the circle; by the number of edges that verdict and rotation number count."""
     whole = curves(SHIFTED)

@@ -54,7 +54,13 @@ def rows(monkeypatch):
 
 
 @pytest.mark.parametrize("variables", [None, ["discriminant", "exponent", "verdict"]])
-@pytest.mark.parametrize(("scene", "ranges"), [m[1:] for m in MAPS], ids=[m[0] for m in MAPS])
+@pytest.mark.parametrize(
+    ("scene", "ranges"),
+    [
+        pytest.param(*m[1:], id=m[0], marks=[pytest.mark.slow] * (m[0] in ("exponential", "even")))
+        for m in MAPS
+    ],
+)
 def test_maps_agree_with_their_points(rows, scene, ranges, variables):
     axes = axes_of(ranges)
     dense = survey.evaluate(scene, **axes, variables=variables)

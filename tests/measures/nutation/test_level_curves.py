@@ -31,7 +31,11 @@ MAPS = [
     ({"epsilon": (0.1, 10.0), "p_theta0": (-3.0, 3.0)}, {}),
     ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {"p_theta0": 0.0, "epsilon": -2.0}),
 ]
-each = pytest.mark.parametrize(("axes", "fixed"), MAPS, ids=str)
+each = pytest.mark.parametrize(
+    ("axes", "fixed"),
+    [pytest.param(*m, marks=[pytest.mark.slow] * (i == 1)) for i, m in enumerate(MAPS)],
+    ids=str,
+)
 
 
 def found(axes, fixed):
@@ -191,7 +195,9 @@ def separatrices(axes, fixed):
         ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {"p_phi": 0.3}, 2),
         ({"theta0": (0.05, 3.0), "p_psi": (-1.5, 1.6)}, {"p_phi": -0.7}, 2),
         ({"p_phi": (-2.0, 1.8), "p_psi": (1.9, -2.1)}, {"theta0": 1.3}, 4),
-        ({"p_phi": (-2.0, 1.8), "p_psi": (1.9, -2.1)}, {"theta0": 1.9}, 4),
+        pytest.param(
+            {"p_phi": (-2.0, 1.8), "p_psi": (1.9, -2.1)}, {"theta0": 1.9}, 4, marks=pytest.mark.slow
+        ),
     ],
     ids=str,
 )
