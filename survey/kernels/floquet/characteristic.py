@@ -31,9 +31,6 @@ CLOSE = 1e-4  # a correction, relative to the largest root, from which they conv
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1  # as in measures.floquet.multipliers, and so are those below
 PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = 1, 2, 3, 4
 MULTIPLIERS, RADIUS, VERDICT, CROSSING, KREIN = range(5)  # columns of `asked`
-# moduli that differ by less, relative to 1 + the largest, count as equal when multipliers are
-# sorted
-TIE = 1e-9
 
 
 def blocks(number, K, d):
@@ -246,7 +243,7 @@ def answer_lanes(
             decided = UNDECIDED
         wide = _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed)
         if not missed[p] and (asked[MULTIPLIERS] or asked[CROSSING] or asked[KREIN]):
-            _sort(re, im, bar, size, sign, floats[4 * n, p], p, floats, signs, angle, order)
+            _sort(re, im, bar, size, sign, p, floats, signs, angle, order)
             crossing[p] = _crossing(re, im, bar, size, angle, sign, verdict[p], paired, K > d)
             # two of one modulus, as in systems of equal damping, stay so at any accuracy
             missed[p] = (wide and asked[CROSSING] and crossing[p] == UNDECIDED) or (
@@ -628,9 +625,9 @@ def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, 
 
 
 @kernel
-def _sort(re, im, bar, size, sign, most, p, floats, signs, angle, order):
+def _sort(re, im, bar, size, sign, p, floats, signs, angle, order):
     """Write the multipliers of the point p in order, and fill `angle` with their arguments."""
-    n, unit = len(re), TIE * (1.0 + most)
+    n = len(re)
     for i in range(n):
         order[i] = i
         if i > 0 and im[i] != 0.0 and im[i] == -im[i - 1] and re[i] == re[i - 1]:
@@ -639,7 +636,7 @@ def _sort(re, im, bar, size, sign, most, p, floats, signs, angle, order):
             angle[i] = math.atan2(im[i], re[i])
     for i in range(1, n):
         own, k = order[i], i
-        while k > 0 and _before(own, order[k - 1], size, angle, unit):
+        while k > 0 and _before(own, order[k - 1], size, angle):
             order[k] = order[k - 1]
             k -= 1
         order[k] = own
@@ -651,10 +648,19 @@ def _sort(re, im, bar, size, sign, most, p, floats, signs, angle, order):
 
 
 @kernel
-def _before(i, j, size, angle, unit):
+def _before(i, j, size, angle):
     """Does the multiplier i come before j: by descending modulus, then angle?"""
-    one, two = round(size[i] / unit), round(size[j] / unit)
+    one, two = to_30_bits(size[i]), to_30_bits(size[j])
     return one > two or (one == two and angle[i] < angle[j])
+
+
+@inline
+def to_30_bits(modulus):
+    """The modulus, or an array of them, rounded to 30 bits: those of conjugates, and on the unit circle, which
+    differ by rounding errors alone, are equal then.
+    """
+    scaled = (2.0**23 + 1.0) * modulus
+    return scaled - (scaled - modulus)
 
 
 @kernel

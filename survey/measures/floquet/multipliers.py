@@ -17,6 +17,7 @@ Starzhinskii, Linear Differential Equations with Periodic Coefficients (1975), I
 import numpy as np
 
 from survey.kernels.floquet import discs
+from survey.kernels.floquet.characteristic import to_30_bits
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet.monodromy import inverse
 
@@ -57,7 +58,7 @@ class Discs:
                 self._coordinates(left[finite], M, E, near[finite])
         self.together = self._touching()
         self._narrow()
-        self._sort()
+        self.reorder(order(self.centre))
 
     def _doubtful(self):
         """Where another V may serve better: discs that are far wider than what M asks for."""
@@ -120,15 +121,6 @@ class Discs:
             clear = self.isolated & (gap.min(axis=2) > 2.0 * t * off)
             self.radius = np.where(clear, (own + t * off) * (1 + 8 * EPS), self.radius)
 
-    def _sort(self):
-        modulus = abs(self.centre)
-        # what cannot be told apart counts as equal: pairs of conjugates, and all on the unit circle
-        angle = np.angle(self.centre)
-        order = np.lexsort(
-            (angle, -np.round(modulus / (1e-9 * (1 + modulus)).max(axis=1, keepdims=True))), axis=1
-        )
-        self.reorder(order)
-
     def reorder(self, order):
         """Put the discs into this order (N, n)."""
         rows = np.arange(len(order))[:, None]
@@ -175,6 +167,11 @@ class Discs:
             gap[:, np.arange(n), np.arange(n)] = np.inf
             # z and 1 / conj(z) are apart by | |z| - 1 / |z| | <= 2.2 | |z| - 1 | near the circle
             return self.isolated & (off < 0.05) & (gap.min(axis=2) > 2.2 * off)
+
+
+def order(centre):
+    """The order (N, n) by descending modulus, then angle."""
+    return np.lexsort((np.angle(centre), -to_30_bits(abs(centre))), axis=1)
 
 
 def symplectic_form(n):

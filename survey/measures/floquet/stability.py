@@ -145,8 +145,6 @@ def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
         )
         signs = np.where(together != 0, together, signs).astype(np.int8)
     found.crossing = multipliers.crossing(discs, found.verdict, paired, signs)
-    if signs is not None:
-        found.signs[:] = signs.T
     centre, bars = multipliers.symmetric(discs) if paired else (discs.centre, discs.bars)
     if not paired and growth is not None:
         centre, bars = multipliers.by_determinant(discs, centre, bars, growth)
@@ -155,6 +153,10 @@ def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
         strong = found.verdict == STABLE
         value, bar = np.where(strong, 1.0, value), np.where(strong, 0.0, bar)
     real = discs.isolated & (centre.imag == 0)  # its conjugate would be in the same disc
+    order = multipliers.order(centre)  # small ones are known better now
+    centre, bars, real = (np.take_along_axis(of, order, axis=1) for of in (centre, bars, real))
+    if signs is not None:
+        found.signs[:] = np.take_along_axis(signs, order, axis=1).T
     for k, part in enumerate((centre.real, centre.imag, bars, np.where(real, 0.0, bars))):
         found.floats[k * n : (k + 1) * n] = part.T
     found.floats[4 * n], found.floats[4 * n + 1] = value, bar

@@ -63,6 +63,28 @@ def test_reference_systems(case, method):
     assert int(ds.verdict) == (1 if radius < 1 or on_circle else 0)
 
 
+@pytest.mark.parametrize("number", [1, 40], ids=["points", "map"])
+def test_small_multipliers_beside_huge_ones_are_in_order(number):
+    """e^p, e^-1 exp(+-2i) and e^-20, of a system in coordinates of its own."""
+
+    def A(t, p, out):
+        out[0, 0], out[3, 3] = p[0], -20.0
+        out[1, 1] = out[2, 2] = -1.0
+        out[1, 2], out[2, 1] = 2.0, -2.0
+        out[0, 3] = p[1] * math.cos(2 * math.pi * t)
+
+    scene = survey.floquet(A, period=1.0, parameters=("p", "q"), states=("a", "b", "c", "d"))
+    p = np.linspace(20.0, 24.0, 5 * number)
+    q = np.linspace(0.0, 1.0, number)
+    ds = survey.evaluate(scene, p=p, q=q, variables=["multiplier_re", "multiplier_im"])
+    found = ds.multiplier_re + 1j * ds.multiplier_im
+    bars = ds.multiplier_re_error + ds.multiplier_im_error
+    right = [np.exp(-1 - 2j), np.exp(-1 + 2j), np.exp(-20.0)]
+    assert (abs(found[..., 1:] - right) <= bars[..., 1:]).all()
+    assert (abs(found[..., 0] - np.exp(ds.p)) <= bars[..., 0]).all()
+    assert (bars[..., 1:] < 1e-3).all()
+
+
 @pytest.mark.parametrize(
     "n, number", [(2, 100), (3, 60), (4, 60), pytest.param(6, 25, marks=pytest.mark.slow)]
 )
@@ -95,6 +117,16 @@ def check_random(n, number, seed):
         # it open
         undecided += verdict < 0 and k % 5 in (0, 1) and abs(radius - 1) > 1e-7
     assert undecided == 0
+
+
+@pytest.mark.parametrize("rtol", [1e-12, 1e-10, 1e-7, 1e-5])
+def test_mirror_images_of_huge_multipliers_are_in_order(rtol):
+    ds = survey.evaluate("satellite_triaxial", direction="-1", A=0.3384699246342947, B=1.2516617395988563,
+                         C=0.998397894253457, k=0.9999503168487293, rtol=rtol)  # fmt: skip
+    found, bars = ds.multiplier_re.values, ds.multiplier_re_error.values
+    assert (ds.multiplier_im == 0).all() and (np.diff(abs(found)) < 0).all()
+    assert abs(found[0] * found[3] - 1) <= bars[0] / found[0] + bars[3] * found[0] + 1e-15
+    assert abs(found[1] * found[2] - 1) < 1e-3 and (found[1:3] < 0).all()
 
 
 @pytest.mark.parametrize("steps", [3, 7, 50])
