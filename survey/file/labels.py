@@ -383,7 +383,7 @@ def error_bars(ds):
 @cache
 def provenance():
     """Versions, commit and dirty flag of the source, kernel hash and processor."""
-    from survey.kernels.jit import KERNEL_HASH
+    from survey.kernels.jit import HAS_FMA, KERNEL_HASH
 
     commit, dirty = _commit()
     return {
@@ -395,7 +395,7 @@ def provenance():
         "commit": commit,
         "dirty": dirty,
         "kernel_hash": KERNEL_HASH,
-        "cpu": _cpu(),
+        "cpu": f"{_cpu()}, {'with' if HAS_FMA else 'without'} fused multiply-adds",
     }
 
 
