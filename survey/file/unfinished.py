@@ -95,6 +95,10 @@ def drift(path, old, new, changed, workflow):
     if CODE & set(changed):
         causes.append(f"from another version of the code ({_code(old, new)})")
         ways_back.append("that version")
+    if "fused_multiply_adds" in changed:
+        words = "without" if new["fused_multiply_adds"] else "with"
+        causes.append(f"from a processor {words} fused multiply-adds, which decide last bits")
+        ways_back.append("such a processor")
     if "scene_hash" in changed:
         causes.append("from a different z(u, p) (or f and g)")
         ways_back.append("those functions")

@@ -194,7 +194,9 @@ def fma(a, b, c):
         return a * b + c
     symbols = [x for x in given if isinstance(x, _Number)]
     if not symbols:
-        return _rounded_once(a, b, c) if np.ndim(a * b + c) == 0 else _each_rounded_once(a, b, c)
+        return (
+            _rounded_once(a, b, c) if max(map(np.ndim, given)) == 0 else _each_rounded_once(*given)
+        )
     first, *others = _alike(symbols[0].builder, *given)
     return _called(_Number(symbols[0].builder, first), "fma", *others)
 
@@ -206,9 +208,9 @@ def _rounded_once(a, b, c):
         return c  # also where the rounded product overflows
     exact = Fraction(a) * Fraction(b) + Fraction(c)
     try:
-        return float(exact) if exact else a * b + c  # the zero that has the right sign
+        return np.float64(exact) if exact else a * b + c  # the zero that has the right sign
     except OverflowError:
-        return math.inf if exact > 0 else -math.inf
+        return np.float64(math.inf if exact > 0 else -math.inf)
 
 
 _each_rounded_once = np.vectorize(_rounded_once, otypes=[float])

@@ -14,13 +14,15 @@ from survey.errors import Stopped
 from survey.kernels import jit
 from survey.sweep.cost import block_geometry
 
+FUSED = "fused_multiply_adds"  # of the processor: the last bits of trajectories depend on them
+
 
 @cache
 def code_version():
-    """What identifies the code that solves blocks: it must be the same on every worker, but not the
-    processor.
+    """What identifies the code that solves blocks: it must be the same on every worker, of the processor
+    this alone.
     """
-    return {"survey": __version__, "sources": jit.deciding_hash()}
+    return {"survey": __version__, "sources": jit.deciding_hash(), FUSED: jit.HAS_FMA}
 
 
 def compilers():
@@ -31,6 +33,12 @@ def compilers():
 def refuse_other_code(code):
     """Raise Stopped unless this process runs the code that the run was started with."""
     own = code_version()
+    if own[FUSED] != code.get(FUSED, own[FUSED]):
+        has, other = ("has", "has none") if own[FUSED] else ("has no", "has them")
+        raise Stopped(
+            f"the processor of the worker on {socket.gethostname()} {has} fused multiply-adds, which decide last bits, "
+            f"and the one that the run was started on {other}; run the command again to resume without this worker"
+        )
     for what, value in code.items():
         if own[what] != value:
             raise Stopped(
@@ -54,6 +62,7 @@ def fingerprint(workflow):
         "variables": sorted(request.variables),
         "block_geometry": block_geometry(workflow),
         "kernels": jit.deciding_hash(),
+        FUSED: jit.HAS_FMA,
         "scene_hash": getattr(workflow.scene, "HASH", "") or _hash_of_plugin(workflow.scene),
     } | ({"proves": True} if workflow.proves else {})
 

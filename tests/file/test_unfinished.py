@@ -104,14 +104,18 @@ def test_drift_names_the_keys_and_the_ways_on(left, small):
     assert survey.open("small.nc").attrs["blocks_reused"] == 0
 
 
-def test_other_code_is_reported_plainly(left, small):
-    manifest = json.loads((left / "manifest.json").read_text())
-    manifest["code"]["survey"], manifest["kernels"] = "0.0.9", "old"
+def _of_another_run(left, manifest):
     (left / "manifest.json").write_text(json.dumps(manifest))
     for file in left.glob("*.block"):
         arrays = blocks.unpack(file.read_bytes())
         with open(file, "wb") as opened:
             blocks.pack(arrays, opened, "of that version")
+
+
+def test_other_code_is_reported_plainly(left, small):
+    manifest = json.loads((left / "manifest.json").read_text())
+    manifest["code"]["survey"], manifest["kernels"] = "0.0.9", "old"
+    _of_another_run(left, manifest)
     now = manifest["code"] | {"survey": survey.__version__}
     assert (
         f"blocks from another version of the code (survey 0.0.9 -> {now['survey']}); go back to that"
@@ -119,6 +123,14 @@ def test_other_code_is_reported_plainly(left, small):
     )
     answer = refusal(small, "solver.rtol=1e-6")
     assert "-> 1e-06)" in answer and "go back to that version and that workflow" in answer
+
+
+def test_a_processor_of_other_arithmetic_is_reported_plainly(left, small):
+    manifest = json.loads((left / "manifest.json").read_text())
+    manifest["fused_multiply_adds"] = not manifest["fused_multiply_adds"]
+    _of_another_run(left, manifest)
+    answer = refusal(small)
+    assert "fused multiply-adds, which decide last bits; go back to such a processor" in answer
 
 
 @pytest.mark.parametrize("damage", ["flipped", "gone", "another"])

@@ -311,7 +311,6 @@ def test_points_without_series_are_shown_as_they_are(folder, driver):
 
 
 @browsed
-@pytest.mark.slow
 def test_along_a_logarithmic_axis_the_nearest_point_is_that_of_the_least_ratio(tmp_path, driver):
     """Up to the ends of the map, half a step beyond the last points; three a decade."""
     ds = survey.evaluate(
@@ -403,7 +402,6 @@ def touch(driver, kind, *places):
 
 
 @browsed
-@pytest.mark.slow
 def test_fingers_read_move_and_zoom_the_map(folder, driver):
     """A tap tells the value there, a finger moves the map, and two of them zoom it: what is under
     each stays there.
@@ -479,7 +477,6 @@ go()
 
 
 @browsed
-@pytest.mark.slow
 def test_a_moving_view_is_moved_by_the_compositor(folder, driver):
     """No script touches pixels while the picture covers the view; when it rests it is drawn afresh,
     in its place.

@@ -20,6 +20,7 @@ import survey
 from survey.errors import Stopped
 from survey.file import reading
 from survey.file.blocks import Blocks
+from survey.kernels.jit import HAS_FMA
 from survey.request import workflow
 from survey.sweep import cost, engine, fingerprint
 
@@ -342,19 +343,26 @@ def test_a_cluster_with_an_edited_survey_is_refused(scheduler, small):
     ), stderr
 
 
-def test_a_worker_with_other_code_is_refused(small, tmp_path):
+@pytest.mark.parametrize(
+    "other, words",
+    [
+        (
+            {"sources": "other"},
+            r"runs different code \(sources: \w+, this run: other\); install the same survey",
+        ),
+        ({fingerprint.FUSED: not HAS_FMA}, "fused multiply-adds, .* resume without this worker"),
+    ],
+)
+def test_a_worker_with_other_code_is_refused(small, tmp_path, other, words):
     checked = workflow.read(small, output=tmp_path / "o.nc")
     job = engine.Job(
         checked.scene,
         checked.request,
         checked.grid,
         None,
-        fingerprint.code_version() | {"sources": "other"},
+        fingerprint.code_version() | other,
     )
-    with pytest.raises(
-        Stopped,
-        match=r"runs different code \(sources: \w+, this run: other\); install the same survey",
-    ):
+    with pytest.raises(Stopped, match=words):
         job(engine.numbered(0, cost.blocks_of(checked)[0]))
 
 

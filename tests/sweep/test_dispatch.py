@@ -276,7 +276,6 @@ def fill(share):
     sys.modules.setdefault("filled", []).append(b"x" * max(int(missing), 0))
 
 
-@pytest.mark.slow
 def test_a_task_that_needs_too_much_memory_costs_itself_alone(short_of_memory, in_time):
     def greedy(number):
         if number == 4:

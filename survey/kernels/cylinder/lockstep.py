@@ -368,10 +368,11 @@ def carried_on(carried, jacobian, dt, v, cut, most_f, most_g):
     g = cut + ROUNDOFF_UP * (1.5 * abs(v) + 8.0 * dt * speed)
     first, second = fma(u1, saa, u2 * sab), fma(u1, sab, u2 * sbb)
     third, fourth = fma(z1, saa, z2 * sab), fma(z1, sab, z2 * sbb)
-    return (
-        fma(u1, first, fma(u2, second, e * e)),
+    e, g = e * e, g * g
+    return (  # squares that cancel leave rounding of either sign
+        largest(fma(u1, first, fma(u2, second, e)), e),
         fma(z1, first, z2 * second),
-        fma(z1, third, fma(z2, fourth, g * g)),
+        largest(fma(z1, third, fma(z2, fourth, g)), g),
     )
 
 

@@ -31,6 +31,7 @@ CLOSE = 1e-4  # a correction, relative to the largest root, from which they conv
 UNDECIDED, UNSTABLE, STABLE = -1, 0, 1  # as in measures.floquet.multipliers, and so are those below
 PLUS_ONE, MINUS_ONE, NEIMARK_SACKER, COLLISION = 1, 2, 3, 4
 MULTIPLIERS, RADIUS, VERDICT, CROSSING, KREIN = range(5)  # columns of `asked`
+TIE = 1e-9  # moduli that differ by a smaller share are not told apart when multipliers are sorted
 
 
 def blocks(number, K, d):
@@ -626,7 +627,9 @@ def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, 
 
 @kernel
 def _sort(re, im, bar, size, sign, p, floats, signs, angle, order):
-    """Write the multipliers of the point p in order, and fill `angle` with their arguments."""
+    """Write the multipliers of the point p in order, as `measures.floquet.multipliers.order` does, and fill
+    `angle` with their arguments.
+    """
     n = len(re)
     for i in range(n):
         order[i] = i
@@ -636,7 +639,17 @@ def _sort(re, im, bar, size, sign, p, floats, signs, angle, order):
             angle[i] = math.atan2(im[i], re[i])
     for i in range(1, n):
         own, k = order[i], i
-        while k > 0 and _before(own, order[k - 1], size, angle):
+        while k > 0 and size[own] > size[order[k - 1]]:
+            order[k] = order[k - 1]
+            k -= 1
+        order[k] = own
+    least, first = math.inf, 0  # of those whose moduli cannot be told apart
+    for i in range(n):
+        own, k = order[i], i
+        if size[own] + bar[own] < least:
+            least, first = math.inf, i
+        least = min(least, (size[own] - bar[own]) * (1.0 - TIE))
+        while k > first and angle[own] < angle[order[k - 1]]:
             order[k] = order[k - 1]
             k -= 1
         order[k] = own
@@ -645,22 +658,6 @@ def _sort(re, im, bar, size, sign, p, floats, signs, angle, order):
         floats[i, p], floats[n + i, p], floats[2 * n + i, p] = re[k], im[k], bar[k]
         floats[3 * n + i, p] = bar[k] if im[k] != 0.0 else 0.0
         signs[i, p] = sign[k]
-
-
-@kernel
-def _before(i, j, size, angle):
-    """Does the multiplier i come before j: by descending modulus, then angle?"""
-    one, two = to_30_bits(size[i]), to_30_bits(size[j])
-    return one > two or (one == two and angle[i] < angle[j])
-
-
-@inline
-def to_30_bits(modulus):
-    """The modulus, or an array of them, rounded to 30 bits: those of conjugates, and on the unit circle, which
-    differ by rounding errors alone, are equal then.
-    """
-    scaled = (2.0**23 + 1.0) * modulus
-    return scaled - (scaled - modulus)
 
 
 @kernel

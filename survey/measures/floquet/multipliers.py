@@ -17,7 +17,7 @@ Starzhinskii, Linear Differential Equations with Periodic Coefficients (1975), I
 import numpy as np
 
 from survey.kernels.floquet import discs
-from survey.kernels.floquet.characteristic import to_30_bits
+from survey.kernels.floquet.characteristic import TIE
 from survey.kernels.math.roundoff import EPS
 from survey.measures.floquet.monodromy import inverse
 
@@ -58,7 +58,7 @@ class Discs:
                 self._coordinates(left[finite], M, E, near[finite])
         self.together = self._touching()
         self._narrow()
-        self.reorder(order(self.centre))
+        self.reorder(order(self.centre, self.bars))
 
     def _doubtful(self):
         """Where another V may serve better: discs that are far wider than what M asks for."""
@@ -169,9 +169,19 @@ class Discs:
             return self.isolated & (off < 0.05) & (gap.min(axis=2) > 2.2 * off)
 
 
-def order(centre):
-    """The order (N, n) by descending modulus, then angle."""
-    return np.lexsort((np.angle(centre), -to_30_bits(abs(centre))), axis=1)
+def order(centre, bars):
+    """The order (N, n) by descending modulus, then angle: where bars, or rounding, leave open which modulus is
+    larger, they count as equal.
+    """
+    order = np.argsort(-abs(centre), axis=1, kind="stable")
+    size, bars, angle = (
+        np.take_along_axis(of, order, axis=1) for of in (abs(centre), bars, np.angle(centre))
+    )
+    with np.errstate(invalid="ignore"):
+        least = np.minimum.accumulate((size - bars) * (1 - TIE), axis=1)
+        lower = size[:, 1:] + bars[:, 1:] < least[:, :-1]
+    group = np.pad(np.cumsum(lower, axis=1), ((0, 0), (1, 0)))
+    return np.take_along_axis(order, np.lexsort((angle, group), axis=1), axis=1)
 
 
 def symplectic_form(n):

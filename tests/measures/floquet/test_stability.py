@@ -119,6 +119,31 @@ def check_random(n, number, seed):
     assert undecided == 0
 
 
+@pytest.mark.parametrize("rtol", [1e-6, 1e-8])
+def test_of_conjugates_of_a_map_the_negative_angle_comes_first(rtol):
+    """Of modulus 0.009 beside a multiplier of 500: their bars are wider than rounding."""
+
+    def A(t, p, out):
+        out[0, 0], out[0, 1] = p[0] + 0.3 * math.cos(t), 0.5 * math.sin(t)
+        out[1, 0], out[1, 1], out[1, 2] = 0.2, -0.75, p[1]
+        out[2, 1], out[2, 2] = -p[1] + 0.3 * math.cos(t), -0.75
+
+    scene = survey.floquet(A, period=2 * math.pi, parameters=("g", "a"), states=("x", "y", "z"))
+    names, g, a = (
+        ["multiplier_re", "multiplier_im"],
+        np.linspace(0.9, 1.1, 40),
+        np.linspace(0.3, 2.3, 60),
+    )
+    ds = survey.evaluate(scene, g=g, a=a, rtol=rtol, variables=names)
+    im = ds.multiplier_im.values
+    assert (im[..., 1] != 0).sum() > 2000 and not ((im[..., 1] > 0) & (im[..., 2] < 0)).any()
+    other = survey.evaluate(scene, g=g[::8], a=a[::6], rtol=1e-9, variables=names, method="dop853")
+    some = ds.isel(g=slice(None, None, 8), a=slice(None, None, 6))
+    for name in names:
+        bars = some[f"{name}_error"].astype(float) + other[f"{name}_error"]
+        assert (abs(some[name] - other[name]) <= bars).all(), name
+
+
 @pytest.mark.parametrize("rtol", [1e-12, 1e-10, 1e-7, 1e-5])
 def test_mirror_images_of_huge_multipliers_are_in_order(rtol):
     ds = survey.evaluate("satellite_triaxial", direction="-1", A=0.3384699246342947, B=1.2516617395988563,
