@@ -173,15 +173,15 @@ def order(centre, bars):
     """The order (N, n) by descending modulus, then angle: where bars, or rounding, leave open which modulus is
     larger, they count as equal.
     """
-    order = np.argsort(-abs(centre), axis=1, kind="stable")
+    by_size = np.argsort(-abs(centre), axis=1, kind="stable")
     size, bars, angle = (
-        np.take_along_axis(of, order, axis=1) for of in (abs(centre), bars, np.angle(centre))
+        np.take_along_axis(of, by_size, axis=1) for of in (abs(centre), bars, np.angle(centre))
     )
     with np.errstate(invalid="ignore"):
         least = np.minimum.accumulate((size - bars) * (1 - TIE), axis=1)
         lower = size[:, 1:] + bars[:, 1:] < least[:, :-1]
     group = np.pad(np.cumsum(lower, axis=1), ((0, 0), (1, 0)))
-    return np.take_along_axis(order, np.lexsort((angle, group), axis=1), axis=1)
+    return np.take_along_axis(by_size, np.lexsort((angle, group), axis=1), axis=1)
 
 
 def symplectic_form(n):

@@ -153,9 +153,8 @@ def by_discs(matrices, structure, rtol, asked, period=None, growth=None):
         strong = found.verdict == STABLE
         value, bar = np.where(strong, 1.0, value), np.where(strong, 0.0, bar)
     real = discs.isolated & (centre.imag == 0)  # its conjugate would be in the same disc
-    order = multipliers.order(
-        centre, bars
-    )  # which `symmetric` and `by_determinant` may have changed
+    # again: `symmetric` and `by_determinant` know small ones better
+    order = multipliers.order(centre, bars)
     centre, bars, real = (np.take_along_axis(of, order, axis=1) for of in (centre, bars, real))
     if signs is not None:
         found.signs[:] = np.take_along_axis(signs, order, axis=1).T
