@@ -11,7 +11,7 @@ import numpy as np
 from survey.errors import BadInput
 from survey.file import unfinished
 from survey.file.disk import digest_of
-from survey.file.labels import counts_in
+from survey.file.labels import counts_in, other_processor
 from survey.file.reading import attributes_of
 from survey.grid import coordinates
 
@@ -80,8 +80,10 @@ def refuse(path, found, workflow, code, scene_hash):
             for name, old in versions.items()
             if name in code and code[name] != old
         ]
+        processor = "" if other else other_processor(found)
         causes.append(
-            f"from another version of the code ({', '.join(other) or 'its sources differ'})"
+            processor
+            or f"from another version of the code ({', '.join(other) or 'its sources differ'})"
         )
     extend = (
         f", or extend it with --reuse {path}, which says if values can be taken"

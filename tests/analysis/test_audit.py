@@ -117,3 +117,29 @@ def test_boundaries_on_one_axis_of_a_linear_system_are_no_factors_of_hills_equat
     ds = survey.run(workflow, output=tmp_path / "pair.nc")
     report = audit(ds, 4)
     assert ds.sizes["edge"] > 2 and report["points"] == 4 and report["complaints"] == []
+
+
+def test_multipliers_are_compared_whatever_their_order(tmp_path):
+    """Moduli that differ by 1e-7 are equal within the bars of a coarse map, and come by their angles; its audit
+    tells which is larger.
+    """
+    (tmp_path / "apart.py").write_text(
+        "from math import pi\nPARAMETERS = ('c',)\nSTATES = ('x', 'y', 'u', 'v')\nPERIOD = pi\n\n"
+        "def A(t, p, out):\n    out[0, 2] = out[1, 3] = 1.0\n    out[2, 0], out[3, 1] = -1.7, -2.7\n"
+        "    out[2, 2], out[3, 3] = -p[0], -p[0] - 1e-7\n"
+    )
+    axes = {"c": {"start": 0.1, "stop": 0.3, "num": 9}}
+    solver = {"method": "rk4", "rtol": 1e-4}
+    ds = survey.run(
+        {"scene": str(tmp_path / "apart.py"), "axes": axes, "solver": solver},
+        output=tmp_path / "apart.nc",
+    )
+    report = audit(ds, 9)
+    assert report["points"] == 9 and report["complaints"] == []
+    sharp = survey.evaluate(
+        str(tmp_path / "apart.py"), method="dop853", rtol=1e-6, c=ds.c.values
+    ).multiplier_im
+    assert (np.sign(sharp) != np.sign(ds.multiplier_im)).any()  # in another order
+    planted = ds.copy(deep=True)
+    planted.multiplier_im[4, 2] *= 1.001
+    assert [line.split(" at ")[0] for line in audit(planted, 9)["complaints"]] == ["multiplier_im"]

@@ -10,7 +10,8 @@ import xarray as xr
 import survey
 from survey.errors import BadInput
 from survey.file import finished, reading
-from survey.request import workflow
+from survey.kernels.jit import HAS_FMA
+from survey.request import earlier, workflow
 from survey.sweep import engine
 
 
@@ -94,6 +95,18 @@ def test_other_code_is_reported(ran, small, monkeypatch):
         BadInput, match=r"24 points from another version of the code \(numba 0\.1 -> \d"
     ):
         engine.run(workflow.read(small))
+
+
+def test_a_processor_of_other_arithmetic_is_reported(ran, small, monkeypatch):
+    monkeypatch.chdir(ran.parent)
+    other = "without" if HAS_FMA else "with"
+    _change(ran, fingerprint="old", cpu=f"Other, {other} fused multiply-adds")
+    with pytest.raises(
+        BadInput, match=rf"24 points from a processor {other} fused multiply-adds, "
+    ):
+        engine.run(workflow.read(small))
+    told = earlier.find(workflow.read(small, output="new.nc"), "small.nc")[1]
+    assert f"taken from this file: it is from a processor {other} fused multiply-adds" in told
 
 
 def test_files_of_other_programs_are_not_lost(small, tmp_path, monkeypatch):
