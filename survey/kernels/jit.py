@@ -31,6 +31,10 @@ from numba.extending import intrinsic, overload
 HAS_FMA = not llvm.get_process_triple().startswith(
     ("x86", "i686")
 ) or llvm.get_host_cpu_features().get("fma", False)
+# Intel's processors from Sapphire Rapids on: LLVM takes half of their vectors, since older ones slowed down with
+# whole ones.
+HAS_WIDE = llvm.get_host_cpu_features().get("avx512fp16", False)
+WIDE = '"prefer-vector-width"="512"'
 COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
 # What decides no number of the output: all other sources do, those that are yet to be written
 # included.
@@ -124,7 +128,7 @@ class _Compiling(event.TimingListener):
             if self._ours:
                 _set_options(_NO_UNROLLING)
                 cpu_target.target_context.get_preferred_array_alignment = _of_cache_lines
-                cpu_target.target_context.declare_function = _with_aligned_stack
+                cpu_target.target_context.declare_function = _declared
         super().on_start(start)
 
     def on_end(self, end):
@@ -159,15 +163,17 @@ def _of_cache_lines(_type):
     return 64
 
 
-def _with_aligned_stack(module, fndesc):
-    """Declare a function whose stack begins with a cache line, see `_of_cache_lines`: what registers cannot
-    hold is put there in vectors of 32 bytes.
+def _declared(module, fndesc):
+    """Declare a function whose stack begins with a cache line, see `_of_cache_lines`, as what registers cannot
+    hold is put there in whole vectors, and whose vectors are WIDE where that was measured to gain.
     """
     context = cpu_target.target_context
     function = type(context).declare_function(context, module, fndesc)
     # changes nothing, but llvmlite does not write an alignstack that stands alone
     function.attributes.add("nonlazybind")
     function.attributes.alignstack = 64
+    if HAS_WIDE:
+        set.add(function.attributes, WIDE)  # past llvmlite's list of names, which has no such
     return function
 
 

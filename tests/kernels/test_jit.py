@@ -102,16 +102,21 @@ def test_arrays_that_kernels_make_begin_with_a_cache_line_and_those_of_others_as
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
-@pytest.mark.parametrize("module, aligned", [("survey.kernels.some", True), ("other", False)])
-def test_stacks_of_kernels_begin_with_a_cache_line_and_those_of_others_as_before(module, aligned):
+@pytest.mark.parametrize("module, ours", [("survey.kernels.some", True), ("other", False)])
+@pytest.mark.parametrize("wide", [True, False])
+def test_kernels_have_an_aligned_stack_and_wide_vectors_and_functions_of_others_what_they_had(
+    module, ours, wide, monkeypatch
+):
     def half(x):
         return 0.5 * x
 
+    monkeypatch.setattr(jit, "HAS_WIDE", wide)
     half.__module__ = module
     kernel = jit.fresh(half)
     assert kernel(3.0) == 1.5
     (code,) = kernel.inspect_llvm().values()
-    assert ("alignstack=64" in code) == aligned
+    assert ("alignstack=64" in code) == ours
+    assert ('"prefer-vector-width"="512"' in code) == (ours and wide)
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
