@@ -81,13 +81,14 @@ FIXED = 10
 (DT, CUT) = range(2)
 STEP = 2
 # Where the tables begin in the work space of all lanes: the series, the states after and before the
-# step, what stays fixed, the step, and what has become of the lane.
+# step, what stays fixed, the step, what has become of the lane, and times served in a row too short.
 AFTER = TABLE
 BEFORE = AFTER + STATE
 WHAT_STAYS = BEFORE + STATE
 OF_STEP = WHAT_STAYS + FIXED
 FATE = OF_STEP + STEP
-ROWS = FATE + 1
+SPARE = FATE + 1
+ROWS = SPARE + 1
 
 # what a step has made of a lane, or the sum of both: it has passed its next time
 PASSED, LOST = 1.0, 2.0
@@ -98,6 +99,10 @@ SHORT = 1.0 / 8.0
 COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 _MANY = -1e9  # a count that stays below zero
+# bits of numbers: those of the exponent, those of 1, and 15 / 16 of the latter
+_EXPONENT, _ONE, _ROOT_OF_1 = (
+    np.uint64(bits) for bits in (0x7FF0000000000000, 0x3FF0000000000000, 0x3BF1000000000000)
+)
 
 # Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4,
 # pi/4].
@@ -268,6 +273,15 @@ def step(T, state, before, fixed, taken, fate, tolerance):
 
 
 @inline
+def sixteenth_root(x):
+    """The 16th root of x > 0, to 1 %: the bits of a number are nearly its logarithm."""
+    bits = (np.float64(x).view(np.uint64) >> np.uint64(4)) + _ROOT_OF_1
+    power = np.uint64(bits & _EXPONENT).view(np.float64)
+    rest = np.uint64((bits & ~_EXPONENT) | _ONE).view(np.float64)
+    return power * (0.68632 + rest * (0.34316 * rest - 0.02948))
+
+
+@inline
 def advance(T, state, before, fixed, taken, fate, tolerance):
     """One step of every lane; `before` keeps the state before it."""
     for k in range(STATE):
@@ -284,7 +298,7 @@ def advance(T, state, before, fixed, taken, fate, tolerance):
         size = size / (tolerance * (1.0 + abs(w)))
         # within `flow.longest_step` w has one zero at most
         square = fixed[PDG, i] + fixed[PF, i] * (abs(w) + 0.25 * fixed[PF, i])
-        rate = math.sqrt(max(math.sqrt(math.sqrt(math.sqrt(size))), square) + 1e-300)
+        rate = max(sixteenth_root(size) if size > 0.0 else 0.0, math.sqrt(square)) + 1e-150
         dt = 1.0 / rate
         due = (fixed[NEXT, i] - state[TIME, i]) - state[TIME_LOW, i] <= dt
         high = state[TIME, i] + dt
@@ -483,9 +497,11 @@ def _block(work, i, times, k, first, planes):
 @kernel
 def _last_block(work, i, times, k, first, count, planes):
     """As `_block`, where fewer than BLOCK times are left."""
-    own, found = np.full((1, BLOCK), math.inf), np.zeros((rc.STATE, 1, BLOCK))
-    for j in range(count):
-        own[0, j] = times[k, first + j]
+    spare = work[LANES * SPARE :]  # making arrays would take a tenth of a trajectory's time
+    own = spare[:BLOCK].reshape(1, BLOCK)
+    found = spare[BLOCK : BLOCK + rc.STATE * BLOCK].reshape(rc.STATE, 1, BLOCK)
+    for j in range(BLOCK):
+        own[0, j] = times[k, first + j] if j < count else math.inf
     fine = _block(work, i, own, 0, 0, found)
     for n in range(rc.STATE):
         for j in range(count):
@@ -590,6 +606,15 @@ def record(work, times, row, column, sizes, planes, turnings):
                 work[LANES * FATE + i] = LOST
 
 
+@inline
+def due(fate, state, limit):
+    """Has a lane passed its next time, or come to its end? As a rule none has."""
+    number = 0
+    for i in range(LANES):
+        number += np.int64((fate[i] != 0.0) | (state[STEPS, i] >= limit))
+    return number > 0
+
+
 @kernel
 def free(limit, times, row, column, sizes, state, fixed, fate, planes, status):
     """Note the next time of each lane, and free those that have ended; returns whether any has."""
@@ -639,6 +664,8 @@ def trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     while busy(row):
         step(T, state, before, fixed, taken, fate, tolerance)
         steps += LANES
+        if not due(fate, state, limit):
+            continue
         record(flat, times, row, column, sizes, planes, turnings)
         if free(limit, times, row, column, sizes, state, fixed, fate, planes, status):
             waiting = _refill(P, starts, times, waiting, state, fixed, row, column, sizes, status)

@@ -46,6 +46,7 @@ from survey.kernels.cylinder.lockstep import (
     left_out,
     polynomial,
     sine_cosine,
+    sixteenth_root,
 )
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, finite, row_of, unturned
 from survey.kernels.jit import inline, kernel, splice
@@ -88,10 +89,6 @@ _END, _TURNS = LANES * (AFTER + AT), LANES * (BEFORE + TURNED)  # in one row
 FAR = 2.0  # phi is the variable while w^2 is greater than this times the bound of |g|, ...
 SURE = 1e-3  # and while the error bound of w is smaller than this share of it
 BLOCK = 16  # targets at once: two vectors
-# bits of numbers: those of the exponent, those of 1, and 15 / 16 of the latter
-_EXPONENT, _ONE, _ROOT_OF_1 = (
-    np.uint64(bits) for bits in (0x7FF0000000000000, 0x3FF0000000000000, 0x3BF1000000000000)
-)
 
 
 @unroll
@@ -281,15 +278,6 @@ def _contracted(q, r, h):
 
 
 @inline
-def _root(x):
-    """The 16th root of x > 0, to 1 %: the bits of a number are nearly its logarithm."""
-    bits = (np.float64(x).view(np.uint64) >> np.uint64(4)) + _ROOT_OF_1
-    power = np.uint64(bits & _EXPONENT).view(np.float64)
-    rest = np.uint64((bits & ~_EXPONENT) | _ONE).view(np.float64)
-    return power * (0.68632 + rest * (0.34316 * rest - 0.02948))
-
-
-@inline
 def _advance(T, state, before, step, fixed, tolerance):
     """One step of every lane; `before` keeps the state before it."""
     for k in range(STATE):
@@ -306,7 +294,7 @@ def _advance(T, state, before, step, fixed, tolerance):
         size = max(max(ends[0], ends[2] * guess * guess) * relative, ends_r[0])
         size = max(size, max(max(ends[1], ends[3] * guess * guess) * relative, ends_r[1]) * guess)
         size = size * max(1.0, SHORT * guess) / tolerance
-        rate = max(_root(size), max(least, 0.25))
+        rate = max(sixteenth_root(size), max(least, 0.25))
         end = psi + 1.0 / rate
         h = end - psi
         step[CUT, i], step[CUT_TIME, i] = w * left_out(ends, h), left_out(ends_r, h)

@@ -508,7 +508,7 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
     """As `lockstep.trajectories`, of the rows of P that have the program `lead`: see `grouped`."""
     work = np.zeros((lockstep.ROWS, LANES))
     T, state, before, fixed, taken, fate = lockstep.split(work)
-    p, tolerance = P[lead], min(tolerance, lockstep.COARSEST)
+    flat, p, tolerance = work.reshape(-1), P[lead], min(tolerance, lockstep.COARSEST)
     circle, limited = p[ON_CIRCLE] > 0.0, p[RADIUS] < UNLIMITED
     operations, numbers, S, K, degree = _tables(p, ORDER)
     N, width = numbers.ravel(), min(LANES, (len(P) - lead + VECTOR - 1) // VECTOR * VECTOR)
@@ -539,8 +539,12 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
                 state[SIGN, i] = 0.0 if still else (1.0 if start > 0.0 else -1.0)
         lockstep.advance(T, state, before, fixed, taken, fate, tolerance)
         lockstep.note_turnings(state)
-        lockstep.record(work.reshape(-1), times, row, column, sizes, planes, turnings)
-        free = lockstep.free(limit, times, row, column, sizes, state, fixed, fate, planes, status)
+        free = lockstep.due(fate, state, limit)
+        if free:
+            lockstep.record(flat, times, row, column, sizes, planes, turnings)
+            free = lockstep.free(
+                limit, times, row, column, sizes, state, fixed, fate, planes, status
+            )
 
 
 @splice
