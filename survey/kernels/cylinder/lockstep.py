@@ -469,7 +469,8 @@ _fixed_at, _step_at = at_lane(WHAT_STAYS, FIXED), at_lane(OF_STEP, STEP)
 @unroll
 def _block(work, i, times, k, first, planes):
     """Record phi, w and their bars of lane i at BLOCK times of row k, from the `first` on; returns how many of
-    those that lie in the step have bars narrow enough. What is recorded of the others means nothing.
+    them lie in the step, and how many of these have bars narrow enough. What is recorded of the others means
+    nothing.
     """
     after, before, fixed = _after_at(work, i), _before_at(work, i), _fixed_at(work, i)
     end, cut = _step_at(work, i)
@@ -491,7 +492,7 @@ def _block(work, i, times, k, first, planes):
     put(planes, (rc.W, k, first), v)
     put(planes, (rc.PHI_BAR, k, first), wide + _slip(turns, angle))
     put(planes, (rc.W_BAR, k, first), high)
-    return counted(both(within, narrow))
+    return counted(within), counted(both(within, narrow))
 
 
 @kernel
@@ -502,11 +503,11 @@ def _last_block(work, i, times, k, first, count, planes):
     found = spare[BLOCK : BLOCK + rc.STATE * BLOCK].reshape(rc.STATE, 1, BLOCK)
     for j in range(BLOCK):
         own[0, j] = times[k, first + j] if j < count else math.inf
-    fine = _block(work, i, own, 0, 0, found)
+    within, fine = _block(work, i, own, 0, 0, found)
     for n in range(rc.STATE):
         for j in range(count):
             planes[n, k, first + j] = found[n, 0, j]
-    return fine
+    return within, fine
 
 
 @inline
@@ -514,22 +515,19 @@ def _serve(work, i, times, k, first, size, planes):
     """Record lane i of the work space, in one row, at the times of row k, from the `first` on, within the step;
     returns the next, and whether all bars were narrow enough.
     """
-    at, at_low = work[LANES * (BEFORE + TIME) + i], work[LANES * (BEFORE + TIME_LOW) + i]
-    last, end = first, work[LANES * (OF_STEP + DT) + i]
-    while last < size and (times[k, last] - at) - at_low <= end:
-        last += 1
-    for j in range(first, last, BLOCK):
-        count = min(last - j, BLOCK)
-        if j + BLOCK <= times.shape[1]:
-            fine = _block(work, i, times, k, j, planes)
+    last, within = first, 1.0 * BLOCK
+    while within == BLOCK and last < size:  # how many lie in the step is not asked before: no branch foresees it
+        if last + BLOCK <= times.shape[1]:
+            within, fine = _block(work, i, times, k, last, planes)
         else:
-            fine = _last_block(work, i, times, k, j, count, planes)
-        if fine < count:
+            within, fine = _last_block(work, i, times, k, last, size - last, planes)
+        beyond = last + int(within)
+        if fine < within:
             slip = _slip(work[LANES * (AFTER + TURNS) + i], work[LANES * (WHAT_STAYS + TURN) + i])
-            last, beyond = j, j + count
             while last < beyond and narrow(planes, k, last, slip):
                 last += 1
             return last, False
+        last = beyond
     return last, True
 
 
