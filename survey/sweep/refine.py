@@ -67,10 +67,10 @@ def plan(workflow, cost, threads):
     """
     measure, panels = _measure(workflow), _panels(workflow)
     most = min(sum(1 << x.depth + y.depth for x, y in panels), measure.MOST)
-    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, each
-    # cell is solved
+    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, blocks of
+    # few cells are solved
     usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
-    blocks = sum(16 + 2 * ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y))
+    blocks = sum(16 + ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y)) // 2
                  for x, y in panels)  # fmt: skip
     seconds = (
         getattr(measure, "CELL_SECONDS", CELL_SECONDS) * usual
