@@ -266,6 +266,28 @@ def spread(number, like):
     return _Number(like.builder, _alike(like.builder, number, like)[0])
 
 
+def element(numbers, i):
+    """The number i of those that follow each other."""
+    if isinstance(numbers, _Unknown):
+        return numbers
+    if not isinstance(numbers, _Number):
+        return numbers[i]
+    value = numbers.builder.extract_element(numbers.value, ir.IntType(32)(i))
+    return _Number(numbers.builder, value)
+
+
+def rotated(numbers, order, factors):
+    """The numbers in another order, each times a constant."""
+    if isinstance(numbers, _Unknown):
+        return numbers
+    if not isinstance(numbers, _Number):
+        return numbers[list(order)] * np.array(factors)
+    builder, value = numbers.builder, numbers.value
+    places = ir.Constant(ir.VectorType(ir.IntType(32), len(order)), list(order))
+    moved = builder.shuffle_vector(value, ir.Constant(value.type, ir.Undefined), places)
+    return _Number(builder, builder.fmul(moved, ir.Constant(value.type, list(factors))))
+
+
 def selected(where, numbers):
     """The numbers for which `where` holds, and 0 for the others."""
     if isinstance(where, _Unknown):

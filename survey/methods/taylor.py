@@ -39,6 +39,7 @@ from survey.kernels.cylinder.flow import ORDER as _ORDER
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.cylinder.records import EXACT_START, STATE
 from survey.kernels.jit import inline, kernel, part
+from survey.kernels.math.roots import exp2, log2
 
 ORDER = 20
 SERVES = ("abel", "body", "cylinder")
@@ -65,13 +66,16 @@ def flow_begin(p, phi, w, tolerance, T):
     """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance."""
     series(p, phi, w, T, _ORDER)
     scale = 1.0 / (1.0 + abs(w))
-    h = math.inf
+    allowed, longest = log2(tolerance), math.inf
     for n in range(_ORDER - 3, _ORDER + 1):
         # a last term that happens to vanish proves nothing, so the two before it count too, less
         # strictly
         share = 1.0 if n > _ORDER - 2 else _FALL
         term = share * max(abs(T[n, PHI]), scale * abs(T[n, W])) + 1e-300
-        h = min(h, (tolerance / term) ** (1.0 / n))
+        if not term < 1e300:
+            return 0.0
+        longest = min(longest, (allowed - log2(term)) / n)
+    h = 0.999 * exp2(longest)  # rounded down
     # the last terms, and what follows them, at the step that is taken
     shorter = min(1.0, longest_step(p, w) / h)
     fourth = (shorter * shorter) ** 2

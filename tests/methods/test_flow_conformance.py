@@ -40,9 +40,8 @@ def widened(function, **names):
     coarse and rounding.
     """
     plain = getattr(function, "py_func", function)
-    source = (
-        inspect.getsource(plain).partition("\n")[2].replace("1.0 / (n + 1)", "mp.mpf(1) / (n + 1)")
-    )
+    source = inspect.getsource(plain).replace("1.0 / (n + 1)", "mp.mpf(1) / (n + 1)")
+    source = source.partition("\n")[2] if source.startswith("@") else source
     scope = {**plain.__globals__, "math": mp, "mp": mp, **names}
     exec(source, scope)
     return scope[function.__name__]
@@ -52,7 +51,9 @@ def wide_end(method, span, steps):
     """The state after equal steps of the widened method."""
     gyrostat = widened(flow.gyrostat)
     values = widened(flow.values, gyrostat=gyrostat)
-    series = widened(flow._series_of_gyrostat)
+    expansion = widened(flow._to_order, unroll=lambda expand: expand)
+    orders = {"_to_full": expansion(flow.ORDER), "_to_low": expansion(flow.LOW)}
+    series = widened(flow._series_of_gyrostat, **orders)
     inner = {"gyrostat": gyrostat, "values": values, "inside": widened(flow.inside)}
     if hasattr(method, "_flow_at"):
         inner["_flow_at"] = widened(method._flow_at)
@@ -72,7 +73,7 @@ def wide_end(method, span, steps):
         mp.mpf(span) / steps,
     )
     for _ in range(steps):
-        series(p, phi, w, T, flow.ORDER if method.ORDER > flow.LOW else 1)
+        series(p, phi, w, T, flow.ORDER if method.ORDER > flow.LOW else flow.LOW)
         phi, w, _e, _y = at(p, T, h)
     return np.array([phi, w])
 

@@ -23,6 +23,7 @@ from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.records import GIVEN, PHI0, SIX, START_PHI, START_W, W0
 from survey.kernels.jit import for_constants, inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
+from survey.kernels.unroll import consecutive, element, put, rotated, summed, unroll
 
 # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba &
 # Zou)
@@ -136,38 +137,51 @@ def potential(p, phi):
     return 0.5 * p[D] * s * s + p[C23] * s * c - p[S2] * s - p[S3] * c
 
 
+def _to_order(order):
+    """What adds the coefficients 1 to `order` of the series in T to those of order 0.
+
+    (sin phi)' = w cos phi and the like: SIN to COS2 as one vector. Sums begin with the products that are known
+    first, and end with those of the latest coefficients.
+    """
+
+    @unroll
+    def expand(p, T):
+        b12, b31, d, c23, s2, s3 = (p[i] for i in range(SIX))
+        waves, w = [consecutive(T, (0, SIN), 4)], [T[0, W]]
+        for n in range(order):
+            known_first = sorted(range(n + 1), key=lambda k, n=n: max(k, n - k))
+            total = summed(w[k] * waves[n - k] for k in known_first)
+            r = 1.0 / (n + 1)
+            sn, cn, sin2, cos2 = (element(waves[n], i) for i in range(4))
+            y = (-0.5 * d * sin2 - c23 * cos2 + s2 * cn - s3 * sn) * r
+            new = rotated(total, (1, 0, 3, 2), (r, -r, 2.0 * r, -2.0 * r))
+            w.append(b12 * element(new, 0) + b31 * element(new, 1) + y)  # w = F + y
+            waves.append(new)
+            put(T, (n + 1, SIN), new)
+            T[n + 1, PHI], T[n + 1, W], T[n + 1, Y] = w[n] * r, w[n + 1], y
+            T[n + 1, E] = (b12 * cn - b31 * sn) * r
+
+    return expand
+
+
+_to_full, _to_low = _to_order(ORDER), _to_order(LOW)
+
+
 @kernel
 def _series_of_gyrostat(p, phi, w, T, order):
     s, c = math.sin(phi), math.cos(phi)
     T[0, PHI], T[0, W], T[0, SIN], T[0, COS] = phi, w, s, c
     T[0, SIN2], T[0, COS2] = 2.0 * s * c, (c - s) * (c + s)
     T[0, E] = T[0, Y] = 0.0
-    for n in range(order):
-        a0 = a1 = a2 = a3 = 0.0
-        for k in range(n + 1):  # (sin phi)' = w cos phi and the like, Cauchy products
-            wk = T[k, W]
-            a0 += wk * T[n - k, SIN]
-            a1 += wk * T[n - k, COS]
-            a2 += wk * T[n - k, SIN2]
-            a3 += wk * T[n - k, COS2]
-        r = 1.0 / (n + 1)
-        sn, cn = T[n, SIN], T[n, COS]
-        T[n + 1, E] = (p[B12] * cn - p[B31] * sn) * r
-        y = (-0.5 * p[D] * T[n, SIN2] - p[C23] * T[n, COS2] + p[S2] * cn - p[S3] * sn) * r
-        s, c = a1 * r, -a0 * r
-        T[n + 1, PHI], T[n + 1, Y] = T[n, W] * r, y
-        T[n + 1, SIN], T[n + 1, COS], T[n + 1, SIN2], T[n + 1, COS2] = (
-            s,
-            c,
-            2.0 * a3 * r,
-            -2.0 * a2 * r,
-        )
-        T[n + 1, W] = p[B12] * s + p[B31] * c + y  # w = F + y
+    if order == LOW:
+        _to_low(p, T)
+    else:
+        _to_full(p, T)
 
 
 @for_constants(_series_of_gyrostat)
 def series(p, phi, w, T, order):
-    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order."""
+    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order, of the gyrostat LOW or ORDER."""
     if len(p) == COLUMNS:
         _series_of_gyrostat(p, phi, w, T, order)
         return

@@ -48,6 +48,7 @@ from survey.kernels.cylinder.steps import (
     start_sign,
 )
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roots import sixteenth_root
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import (
     both,
@@ -99,10 +100,6 @@ SHORT = 1.0 / 8.0
 COARSEST = 1e-11  # per step: above, the terms that follow the last two may be no smaller than these
 FALL = 1.0 / 50.0  # by more, two terms further on, no series is trusted to fall
 _MANY = -1e9  # a count that stays below zero
-# bits of numbers: those of the exponent, those of 1, and 15 / 16 of the latter
-_EXPONENT, _ONE, _ROOT_OF_1 = (
-    np.uint64(bits) for bits in (0x7FF0000000000000, 0x3FF0000000000000, 0x3BF1000000000000)
-)
 
 # Cody and Waite's reduction, and the polynomials of fdlibm's kernels for sin and cos in [-pi/4,
 # pi/4].
@@ -270,15 +267,6 @@ def step(T, state, before, fixed, taken, fate, tolerance):
     series(T, state, fixed)
     advance(T, state, before, fixed, taken, fate, tolerance)
     note_turnings(state)
-
-
-@inline
-def sixteenth_root(x):
-    """The 16th root of x > 0, to 1 %: the bits of a number are nearly its logarithm."""
-    bits = (np.float64(x).view(np.uint64) >> np.uint64(4)) + _ROOT_OF_1
-    power = np.uint64(bits & _EXPONENT).view(np.float64)
-    rest = np.uint64((bits & ~_EXPONENT) | _ONE).view(np.float64)
-    return power * (0.68632 + rest * (0.34316 * rest - 0.02948))
 
 
 @inline

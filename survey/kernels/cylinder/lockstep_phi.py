@@ -46,10 +46,10 @@ from survey.kernels.cylinder.lockstep import (
     left_out,
     polynomial,
     sine_cosine,
-    sixteenth_root,
 )
 from survey.kernels.cylinder.steps import OK, STEP_LIMIT, finite, row_of, unturned
 from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.math.roots import sixteenth_root
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import (
     consecutive,
