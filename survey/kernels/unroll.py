@@ -190,7 +190,8 @@ def fma(a, b, c):
     given = (a, b, c)
     if any(isinstance(x, _Unknown) for x in given):
         return _Unknown()
-    if not HAS_FMA:
+    known = all(isinstance(x, (float, int, np.ndarray, _Number)) for x in given)
+    if not (HAS_FMA and known):  # others count their operations
         return a * b + c
     symbols = [x for x in given if isinstance(x, _Number)]
     if not symbols:

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from survey.kernels.cylinder.lockstep import ORDER
 from survey.precision import flops
-from survey.precision.cases import satellite
+from survey.precision.cases import gyrostat, satellite
 
 
 def test_operations_on_the_number_are_counted_and_no_others():
@@ -20,6 +21,11 @@ def test_a_step_of_midpoint_taylor_is_some_hundred_operations():
         < flops.operations(satellite._one_step)
         < 1000
     )
+
+
+def test_a_step_of_a_trajectory_is_a_thousand_operations():
+    # three products of series of sin, cos and w, with their sums, alone
+    assert 2 * 3 * ORDER * (ORDER + 1) / 2 < gyrostat._one_step() < 2000
 
 
 def test_the_rates_are_those_of_a_core(monkeypatch):

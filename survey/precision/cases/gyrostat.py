@@ -100,7 +100,7 @@ class _Counted(Counted):
     def __lt__(self, other):
         return False
 
-    __gt__ = __lt__
+    __gt__ = __le__ = __ge__ = __lt__
 
 
 def operations_of(run):
