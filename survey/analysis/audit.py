@@ -61,7 +61,7 @@ def audit(ds, points, seed=0):
     wanted = [o.name for o in outputs]
     for method in used:
         solved = evaluate(name, method=method, rtol=rtol, variables=wanted, **options, **arrays)
-        solved = _in_order(flat, solved.transpose("_point", ...))
+        solved = _in_order(flat, solved.transpose("_point", ...), wanted)
         answered |= (solved.status == status.OK).values | (solved.status == flat.status).values
         for output, wrong, describe in _differences(flat, solved, outputs, decided):
             for i in np.flatnonzero(wrong.reshape(len(wrong), -1).any(axis=1)):
@@ -209,35 +209,31 @@ def _chosen(ds, module, points, random):
     return flat.transpose("_point", ...), given
 
 
-def _in_order(flat, solved):
-    """`solved` with its multipliers in the order of those of `flat`: which of two moduli is larger may be
-    beyond the bars of one answer, and within those of the other.
+def _in_order(flat, solved, names):
+    """`solved` with its multipliers, if they are among the outputs `names`, in the order of those of `flat`: which of
+    two moduli is larger may be beyond the bars of one answer, and within those of the other.
     """
-    if (
-        not {"multiplier_re", "multiplier_im"} <= set(flat.data_vars)
-        or not flat.sizes["multiplier"]
-    ):
+    parts = [f"multiplier_{part}" for part in ("re", "im")]
+    if not set(parts) <= set(names):
         return solved
-    (one, bars), (other, other_bars) = map(_multipliers, (flat, solved))
-    with np.errstate(invalid="ignore"):
-        off = abs(one[:, :, None] - other[:, None, :]) / (bars[:, :, None] + other_bars[:, None, :])
-    order = np.tile(np.arange(one.shape[1]), (len(one), 1))
-    beyond = np.diagonal(off, axis1=1, axis2=2) > 1.0
-    for i in np.flatnonzero(beyond.any(axis=1) & np.isfinite(off).all(axis=(1, 2))):
-        order[i] = linear_sum_assignment(off[i])[1]
+    apart = False
+    for name in parts:
+        (one, bar), (other, other_bar) = (
+            (ds[name].values, ds[f"{name}_error"].values.astype(float)) for ds in (flat, solved)
+        )
+        with np.errstate(invalid="ignore"):
+            apart |= ~(
+                abs(one[:, :, None] - other[:, None, :]) <= bar[:, :, None] + other_bar[:, None, :]
+            )
+    order = np.tile(np.arange(apart.shape[1]), (len(apart), 1))
+    for i in np.flatnonzero(np.diagonal(apart, axis1=1, axis2=2).any(axis=1)):
+        order[i] = linear_sum_assignment(apart[i])[1]  # as few of them apart as possible
     ordered = {
         name: v.copy(data=np.take_along_axis(v.values, order, axis=1))
         for name, v in solved.data_vars.items()
         if v.dims == ("_point", "multiplier")
     }
     return solved.assign(ordered)
-
-
-def _multipliers(ds):
-    """The multipliers and bars of their distance (points, multipliers) each."""
-    parts = [ds[f"multiplier_{part}"].values for part in ("re", "im")]
-    bars = [ds[f"multiplier_{part}_error"].values.astype(float) for part in ("re", "im")]
-    return parts[0] + 1j * parts[1], np.hypot(*bars) + 1e-300
 
 
 def _differences(flat, solved, outputs, decided):

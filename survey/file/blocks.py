@@ -17,6 +17,7 @@ from isal import isal_zlib
 from survey.errors import BadInput, Damaged, Stopped
 from survey.file import finished, lock, unfinished
 from survey.file.disk import digest_of, refused, sync, write_atomically
+from survey.file.unfinished import FUSED, from_processor
 
 FORMAT = 3
 
@@ -240,7 +241,8 @@ class Blocks:
         if found.get("fingerprint") != self.of_output or finished.changes(found, self.text):
             if not begun:
                 code, own = self.about.get("code", {}), self.fingerprint.get("scene_hash", "")
-                finished.refuse(self.path, found, self.text, code, own)
+                processor = other_processor(self.fingerprint, found)
+                finished.refuse(self.path, found, self.text, code, own, processor)
             return False
         digest = digest_of(self.path)
         # the run ended between file and digest
@@ -256,6 +258,15 @@ class Blocks:
 def of_output(fingerprint):
     """Hash of what decides the values of an output, which does not depend on how it was cut into blocks."""
     return _hash({key: value for key, value in fingerprint.items() if key != "block_geometry"})
+
+
+def other_processor(fingerprint, attributes):
+    """`from a processor ...` where a file of these attributes differs from an output of this fingerprint in that
+    alone; else "".
+    """
+    fused = not fingerprint.get(FUSED)
+    alone = attributes.get("fingerprint") == of_output(fingerprint | {FUSED: fused})
+    return from_processor(fused) if alone else ""
 
 
 def _hash(table):

@@ -11,7 +11,7 @@ import numpy as np
 from survey.errors import BadInput
 from survey.file import unfinished
 from survey.file.disk import digest_of
-from survey.file.labels import counts_in, other_processor
+from survey.file.labels import counts_in
 from survey.file.reading import attributes_of
 from survey.grid import coordinates
 
@@ -63,11 +63,11 @@ def changes(found, workflow):
         return ["workflow unknown -> this one"]
 
 
-def refuse(path, found, workflow, code, scene_hash):
+def refuse(path, found, workflow, code, scene_hash, processor=""):
     """Raise BadInput: the file at `path` is of another workflow, or of other code than this
-    (`code`: its versions).
+    (`code`: its versions), or from another `processor` alone (see `unfinished.from_processor`).
     """
-    causes = []
+    causes = [processor] if processor else []
     differences = changes(found, workflow)
     if differences:
         causes.append(f"of another workflow ({unfinished.listed(differences)})")
@@ -80,10 +80,8 @@ def refuse(path, found, workflow, code, scene_hash):
             for name, old in versions.items()
             if name in code and code[name] != old
         ]
-        processor = "" if other else other_processor(found)
         causes.append(
-            processor
-            or f"from another version of the code ({', '.join(other) or 'its sources differ'})"
+            f"from another version of the code ({', '.join(other) or 'its sources differ'})"
         )
     extend = (
         f", or extend it with --reuse {path}, which says if values can be taken"

@@ -383,7 +383,7 @@ def error_bars(ds):
 @cache
 def provenance():
     """Versions, commit and dirty flag of the source, kernel hash and processor."""
-    from survey.kernels.jit import KERNEL_HASH
+    from survey.kernels.jit import HAS_FMA, KERNEL_HASH
 
     commit, dirty = _commit()
     return {
@@ -395,25 +395,8 @@ def provenance():
         "commit": commit,
         "dirty": dirty,
         "kernel_hash": KERNEL_HASH,
-        "cpu": f"{_cpu()}, {_arithmetic()}",
+        "cpu": f"{_cpu()}, {'with' if HAS_FMA else 'without'} fused multiply-adds",
     }
-
-
-def _arithmetic():
-    """What of this processor decides last bits, in words."""
-    from survey.kernels.jit import HAS_FMA
-
-    return f"{'with' if HAS_FMA else 'without'} fused multiply-adds"
-
-
-def other_processor(attributes):
-    """`from a processor ...` where the file of these attributes was computed on one that has fused
-    multiply-adds and this one has none, or the other way round; else "".
-    """
-    arithmetic = str(attributes.get("cpu", "")).rpartition(", ")[2]
-    if arithmetic == _arithmetic() or not arithmetic.endswith("fused multiply-adds"):
-        return ""
-    return f"from a processor {arithmetic}, which decide last bits"
 
 
 def now():

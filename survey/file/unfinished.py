@@ -17,6 +17,7 @@ SHOWN = 3  # changes that are listed one by one
 # keys of a workflow on which blocks do not depend
 INDEPENDENT = ("title", "output.path", "output.figures", "output.style", "boundaries", "refine")
 CODE = {"format", "kernels"}  # parts of a fingerprint that do not come from the workflow
+FUSED = "fused_multiply_adds"  # another: has the processor some? The last bits of trajectories depend on them
 
 
 def folder_of(path):
@@ -95,9 +96,8 @@ def drift(path, old, new, changed, workflow):
     if CODE & set(changed):
         causes.append(f"from another version of the code ({_code(old, new)})")
         ways_back.append("that version")
-    if "fused_multiply_adds" in changed:
-        words = "without" if new["fused_multiply_adds"] else "with"
-        causes.append(f"from a processor {words} fused multiply-adds, which decide last bits")
+    if FUSED in changed:
+        causes.append(from_processor(not new[FUSED]))
         ways_back.append("such a processor")
     if "scene_hash" in changed:
         causes.append("from a different z(u, p) (or f and g)")
@@ -114,6 +114,11 @@ def drift(path, old, new, changed, workflow):
         f"{folder} contains {done} {' and '.join(causes)}; go back to {' and '.join(ways_back)}, "
         f"or write to another file with -o, or start again with --fresh, which deletes {done}"
     )
+
+
+def from_processor(fused):
+    """`from a processor ...`, which has fused multiply-adds or none."""
+    return f"from a processor {'with' if fused else 'without'} fused multiply-adds, which decide last bits"
 
 
 def _differences(folder, workflow):

@@ -7,8 +7,7 @@ import numpy as np
 
 from survey.errors import BadInput
 from survey.file import finished, reading
-from survey.file.blocks import of_output
-from survey.file.labels import other_processor
+from survey.file.blocks import of_output, other_processor
 from survey.request import workflow as workflows
 from survey.sweep import reuse
 from survey.sweep.fingerprint import fingerprint
@@ -76,7 +75,7 @@ def _unlike(workflow, attributes):
     if "fingerprint" not in attributes:
         return "several surveys were joined in it; name one of their files"
     if attributes.get("fingerprint") != of_output(before):
-        return f"it is {other_processor(attributes) or 'from another version of the code'}"
+        return f"it is {other_processor(before, attributes) or 'from another version of the code'}"
     return ""
 
 

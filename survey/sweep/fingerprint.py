@@ -11,10 +11,9 @@ import numpy as np
 
 from survey import __version__
 from survey.errors import Stopped
+from survey.file.unfinished import FUSED
 from survey.kernels import jit
 from survey.sweep.cost import block_geometry
-
-FUSED = "fused_multiply_adds"  # of the processor: the last bits of trajectories depend on them
 
 
 @cache

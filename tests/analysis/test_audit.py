@@ -143,3 +143,7 @@ def test_multipliers_are_compared_whatever_their_order(tmp_path):
     planted = ds.copy(deep=True)
     planted.multiplier_im[4, 2] *= 1.001
     assert [line.split(" at ")[0] for line in audit(planted, 9)["complaints"]] == ["multiplier_im"]
+    assert any(
+        "multiplier_re" in line
+        for line in audit(ds.drop_vars("multiplier_re_error"), 9)["complaints"]
+    )

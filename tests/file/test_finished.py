@@ -10,9 +10,12 @@ import xarray as xr
 import survey
 from survey.errors import BadInput
 from survey.file import finished, reading
+from survey.file.blocks import of_output
+from survey.file.unfinished import FUSED
 from survey.kernels.jit import HAS_FMA
 from survey.request import earlier, workflow
 from survey.sweep import engine
+from survey.sweep.fingerprint import fingerprint
 
 
 def test_the_same_workflow_computes_nothing_and_draws_again(ran, small, monkeypatch):
@@ -100,7 +103,8 @@ def test_other_code_is_reported(ran, small, monkeypatch):
 def test_a_processor_of_other_arithmetic_is_reported(ran, small, monkeypatch):
     monkeypatch.chdir(ran.parent)
     other = "without" if HAS_FMA else "with"
-    _change(ran, fingerprint="old", cpu=f"Other, {other} fused multiply-adds")
+    there = fingerprint(workflow.read(small)) | {FUSED: not HAS_FMA}
+    _change(ran, fingerprint=of_output(there))
     with pytest.raises(
         BadInput, match=rf"24 points from a processor {other} fused multiply-adds, "
     ):

@@ -504,9 +504,8 @@ def _serve(work, i, times, k, first, size, planes):
     returns the next, and whether all bars were narrow enough.
     """
     last, within = first, 1.0 * BLOCK
-    while (
-        within == BLOCK and last < size
-    ):  # how many lie in the step is not asked before: no branch foresees it
+    # how many lie in the step is not asked before: no processor foresees such a branch
+    while within == BLOCK and last < size:
         if last + BLOCK <= times.shape[1]:
             within, fine = _block(work, i, times, k, last, planes)
         else:
