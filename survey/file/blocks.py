@@ -256,8 +256,11 @@ class Blocks:
 
 
 def of_output(fingerprint):
-    """Hash of what decides the values of an output, which does not depend on how it was cut into blocks."""
-    return _hash({key: value for key, value in fingerprint.items() if key != "block_geometry"})
+    """Hash of what decides the values of an output, which does not depend on the format of its blocks, or on how
+    it was cut into them.
+    """
+    apart = ("format", "block_geometry")
+    return _hash({key: value for key, value in fingerprint.items() if key not in apart})
 
 
 def other_processor(fingerprint, attributes):
