@@ -31,8 +31,8 @@ from numba.extending import intrinsic, overload
 HAS_FMA = not llvm.get_process_triple().startswith(
     ("x86", "i686")
 ) or llvm.get_host_cpu_features().get("fma", False)
-# Intel's processors from Sapphire Rapids on: LLVM takes half of their vectors, since older ones slowed down with
-# whole ones.
+# Intel's processors from Sapphire Rapids on: LLVM uses vectors of half their width, since older ones slow down
+# with whole ones.
 HAS_WIDE = llvm.get_host_cpu_features().get("avx512fp16", False)
 WIDE = '"prefer-vector-width"="512"'
 COMPILED = ("kernels", "methods", "measures", "scenes")  # the packages whose functions are compiled
@@ -165,7 +165,7 @@ def _of_cache_lines(_type):
 
 def _declared(module, fndesc):
     """Declare a function whose stack begins with a cache line, see `_of_cache_lines`, as what registers cannot
-    hold is put there in whole vectors, and whose vectors are WIDE where that was measured to gain.
+    hold is put there in whole vectors, and whose vectors are WIDE where most kernels gain by that.
     """
     context = cpu_target.target_context
     function = type(context).declare_function(context, module, fndesc)

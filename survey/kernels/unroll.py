@@ -191,7 +191,9 @@ def fma(a, b, c):
     if any(isinstance(x, _Unknown) for x in given):
         return _Unknown()
     known = all(isinstance(x, (float, int, np.ndarray, _Number)) for x in given)
-    if not (HAS_FMA and known):  # others count their operations
+    if not (
+        HAS_FMA and known
+    ):  # numbers of other classes, as those that count operations, have no exact product
         return a * b + c
     symbols = [x for x in given if isinstance(x, _Number)]
     if not symbols:
@@ -277,7 +279,7 @@ def element(numbers, i):
     return _Number(numbers.builder, value)
 
 
-def rotated(numbers, order, factors):
+def permuted(numbers, order, factors):
     """The numbers in another order, each times a constant."""
     if isinstance(numbers, _Unknown):
         return numbers

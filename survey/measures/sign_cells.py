@@ -15,7 +15,6 @@ from survey.kernels.hill.cells import (
     AXIS,
     BLOCK,
     ENOUGH,
-    FEWEST,
     HALVED_X,
     HALVED_Y,
     INDEX_X,
@@ -50,7 +49,7 @@ def _descend(series, doubts, blocks, depth, halves, minors):
     of = np.arange(len(blocks))
     while len(where):
         verdict = decided(own, slack[of], minors)
-        # a block whose own series is too loose is solved again, unless few cells are left; not where a
+        # a block whose own series is too loose is solved again, if it can be halved; not where a
         # function is 0 but for the errors of its values
         tails, other = doubts[of][:, :, [TAIL_X, TAIL_Y]].sum(axis=2), doubts[of][:, :, OTHER]
         loose = (verdict == UNDECIDED) & (tails > np.maximum(ENOUGH * _sizes(own), other)).any(
@@ -59,7 +58,7 @@ def _descend(series, doubts, blocks, depth, halves, minors):
         to_split = (
             (where == blocks[of]).all(axis=1)
             & loose
-            & ((depth - where[:, [HALVED_X, HALVED_Y]]).sum(axis=1) > FEWEST)
+            & (where[:, [HALVED_X, HALVED_Y]] < depth).any(axis=1)
         )
         left = np.maximum(depth[0] - where[:, HALVED_X], depth[1] - where[:, HALVED_Y])
         done = ~to_split & ((verdict != UNDECIDED) | (left == 0))

@@ -63,7 +63,7 @@ def flow_setting(p, w, tolerance):
 
 @kernel
 def flow_begin(p, phi, w, tolerance, T):
-    """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance."""
+    """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance, 0 where they overflow."""
     series(p, phi, w, T, _ORDER)
     scale = 1.0 / (1.0 + abs(w))
     allowed, longest = log2(tolerance), math.inf

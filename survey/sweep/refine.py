@@ -67,8 +67,8 @@ def plan(workflow, cost, threads):
     """
     measure, panels = _measure(workflow), _panels(workflow)
     most = min(sum(1 << x.depth + y.depth for x, y in panels), measure.MOST)
-    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, blocks of
-    # few cells are solved
+    # measured: some twenty curves' widths of cells; along a value that a parameter excludes, blocks down
+    # to a few cells are solved
     usual = min(sum(20 << max(x.depth, y.depth) for x, y in panels), most)
     blocks = sum(16 + ((1 << y.depth) * _cut(workflow, 0, x) + (1 << x.depth) * _cut(workflow, 1, y)) // 2
                  for x, y in panels)  # fmt: skip

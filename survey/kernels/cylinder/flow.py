@@ -23,7 +23,7 @@ from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.records import GIVEN, PHI0, SIX, START_PHI, START_W, W0
 from survey.kernels.jit import for_constants, inline, kernel
 from survey.kernels.math.roundoff import ROUNDOFF_UP
-from survey.kernels.unroll import consecutive, element, put, rotated, summed, unroll
+from survey.kernels.unroll import consecutive, element, permuted, put, summed, unroll
 
 # of the Taylor series in t; near -ln(eps)/2 + 1 = 19 the work per unit of time is least (Jorba &
 # Zou)
@@ -154,7 +154,7 @@ def _to_order(order):
             r = 1.0 / (n + 1)
             sn, cn, sin2, cos2 = (element(waves[n], i) for i in range(4))
             y = (-0.5 * d * sin2 - c23 * cos2 + s2 * cn - s3 * sn) * r
-            new = rotated(total, (1, 0, 3, 2), (r, -r, 2.0 * r, -2.0 * r))
+            new = permuted(total, (1, 0, 3, 2), (r, -r, 2.0 * r, -2.0 * r))
             w.append(b12 * element(new, 0) + b31 * element(new, 1) + y)  # w = F + y
             waves.append(new)
             put(T, (n + 1, SIN), new)
@@ -181,7 +181,7 @@ def _series_of_gyrostat(p, phi, w, T, order):
 
 @for_constants(_series_of_gyrostat)
 def series(p, phi, w, T, order):
-    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order, of the gyrostat LOW or ORDER."""
+    """Fill rows PHI..Y of T with the series through (phi, w) up to t^order; that of a gyrostat is LOW or ORDER."""
     if len(p) == COLUMNS:
         _series_of_gyrostat(p, phi, w, T, order)
         return

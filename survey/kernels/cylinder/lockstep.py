@@ -1,8 +1,8 @@
 """Many trajectories of a flow on the cylinder in lock step: Taylor series in t, one lane a
 solution, its own steps.
 
-Order 16: its 16th root is four square roots, so no lane calls libm, and the loops over lanes are
-vector code. In axes turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys,
+The 16th root that limits a step is taken from the bits of a number, so no lane calls libm, and the loops over
+lanes are vector code. In axes turned by a (symmetry S4 of `gyrostat.md`) c23 = 0, and psi = phi - a obeys,
 with S = sin psi, C = cos psi,
 
     psi' = w,  S' = C w,  C' = -S w,  w' = b12 S' + b31 C' - d C S + s2 C - s3 S        (57):
@@ -82,7 +82,8 @@ FIXED = 10
 (DT, CUT) = range(2)
 STEP = 2
 # Where the tables begin in the work space of all lanes: the series, the states after and before the
-# step, what stays fixed, the step, what has become of the lane, and times served in a row too short.
+# step, what stays fixed, the step, what has become of the lane, and one row for the last times of a solution,
+# fewer than BLOCK, and what is recorded of them.
 AFTER = TABLE
 BEFORE = AFTER + STATE
 WHAT_STAYS = BEFORE + STATE
@@ -510,6 +511,7 @@ def _serve(work, i, times, k, first, size, planes):
             within, fine = _block(work, i, times, k, last, planes)
         else:
             within, fine = _last_block(work, i, times, k, last, size - last, planes)
+        within = min(within, 1.0 * (size - last))  # a row ends at its first infinity
         beyond = last + int(within)
         if fine < within:
             slip = _slip(work[LANES * (AFTER + TURNS) + i], work[LANES * (WHAT_STAYS + TURN) + i])
@@ -594,11 +596,12 @@ def record(work, times, row, column, sizes, planes, turnings):
 
 
 @inline
-def due(fate, state, limit):
-    """Has a lane passed its next time, or come to its end? As a rule none has."""
+def due(row, fate, state, limit):
+    """Has a lane that has a row passed its next time, or come to its end? As a rule none has."""
     number = 0
     for i in range(LANES):
-        number += np.int64((fate[i] != 0.0) | (state[STEPS, i] >= limit))
+        ended = (fate[i] != 0.0) | (state[STEPS, i] >= limit)
+        number += np.int64((row[i] >= 0) & ended)
     return number > 0
 
 
@@ -651,7 +654,7 @@ def trajectories(P, starts, times, tolerance, limit, planes, turnings, status):
     while busy(row):
         step(T, state, before, fixed, taken, fate, tolerance)
         steps += LANES
-        if not due(fate, state, limit):
+        if not due(row, fate, state, limit):
             continue
         record(flat, times, row, column, sizes, planes, turnings)
         if free(limit, times, row, column, sizes, state, fixed, fate, planes, status):

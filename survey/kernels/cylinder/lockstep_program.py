@@ -539,8 +539,8 @@ def trajectories(P, leads, lead, starts, times, tolerance, limit, planes, turnin
                 state[SIGN, i] = 0.0 if still else (1.0 if start > 0.0 else -1.0)
         lockstep.advance(T, state, before, fixed, taken, fate, tolerance)
         lockstep.note_turnings(state)
-        free = lockstep.due(fate, state, limit)
-        if free:
+        free = False
+        if lockstep.due(row, fate, state, limit):
             lockstep.record(flat, times, row, column, sizes, planes, turnings)
             free = lockstep.free(
                 limit, times, row, column, sizes, state, fixed, fate, planes, status

@@ -21,9 +21,6 @@ UNSOLVED = 3  # no verdict: a cell whose factors must be solved first
 ENOUGH = 1e-4
 # It serves a cell no more where its tail is more than this share.
 BLURRED = 0.1
-# A block of fewer than 2^FEWEST cells is not solved: along excluded values those took two thirds of the time and
-# decided none of 138,000 cells.
-FEWEST = 3
 # Of a block's slack, for each degree that its cells drop.
 DROPPED = 0.02
 CORNERS = 12  # of a square cut by four lines, at most 8
@@ -41,12 +38,12 @@ CONSTANT, REST = range(2)
 
 
 @kernel
-def descend(series, doubts, blocks, depth, halves):
+def descend(series, doubts, blocks, depth, halves, fewest):
     """Halve B blocks until a cell is decided or `depth` halvings small: leaves (>= M, LEAF), and M.
 
     `series` (B, 4, n, n); `doubts` (B, 4, 3): of each factor TAIL_X to OTHER; `blocks` (B, BLOCK);
     `halves` (2, depth, 2, n, n): per axis and number of halvings the matrices to the lower and to
-    the upper half.
+    the upper half. No block of fewer than 2^fewest cells is to be solved, but where factors are undefined.
     """
     n, most = series.shape[2], depth[0] + depth[1] + 2
     stack, slack = np.empty((most, 4, n, n)), np.empty((most, 4))
@@ -65,7 +62,7 @@ def descend(series, doubts, blocks, depth, halves):
             left = max(depth[0] - here[HALVED_X], depth[1] - here[HALVED_Y])
             short_x, short_y = False, False
             if verdict == UNDECIDED:
-                short_x, short_y = _too_short(sums, bars, doubts[b], here, blocks[b], depth)
+                short_x, short_y = _too_short(sums, bars, doubts[b], here, blocks[b], depth, fewest)
             if short_x or short_y:
                 count, top = _children(here, blocks[b], short_x, short_y, leaves, count), top - 1
             elif verdict != UNDECIDED or left == 0:
@@ -144,7 +141,7 @@ def decide(sums, bars):
 
 
 @inline
-def _too_short(sums, bars, doubt, here, block, depth):
+def _too_short(sums, bars, doubt, here, block, depth, fewest):
     """Along which axes is the series too short for the unsure factors of this cell, so that solving
     its halves helps?
 
@@ -167,7 +164,7 @@ def _too_short(sums, bars, doubt, here, block, depth):
             hidden_x |= not doubt[f, TAIL_X] <= size
             hidden_y |= not doubt[f, TAIL_Y] <= size
             undefined |= bars[f] != bars[f]  # at some of its points
-    fewest = 0 if undefined else FEWEST
+    fewest = 0 if undefined else fewest
     if not full:
         many = left_x + left_y >= fewest
         x &= many and here[HALVED_X] > block[HALVED_X]

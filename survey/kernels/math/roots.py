@@ -17,7 +17,7 @@ _BIAS = 1023
 
 @inline
 def sixteenth_root(x):
-    """The 16th root of x > 0, to 1 %."""
+    """The 16th root of a normal number x > 0, to 1 %."""
     bits = (np.float64(x).view(np.uint64) >> np.uint64(4)) + _ROOT_OF_1
     power = np.uint64(bits & _EXPONENT).view(np.float64)
     rest = np.uint64((bits & ~_EXPONENT) | _ONE).view(np.float64)

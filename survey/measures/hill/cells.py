@@ -4,8 +4,8 @@ is missed.
 The half-period factors are analytic in the parameters, so on blocks small enough each is its tensor
 Chebyshev series to within a bound: the bounds at its nodes times the Lebesgue constants, the tails
 of the series, and rounding. A series that misses the factor between its nodes has that in its
-tails. Where a series no longer serves, the halves of its block are solved; all other halving is
-done on the series alone (`survey.kernels.hill.cells`).
+tails. Where a series no longer serves, the halves of its block are solved, unless they are of few cells; all
+other halving is done on the series alone (`survey.kernels.hill.cells`).
 
 Sources: W. Magnus, S. Winkler, Hill's Equation (1966), theorem 1.1; L. N. Trefethen, Approximation
 Theory and Approximation Practice (2013), chapters 3, 8, 15.
@@ -43,6 +43,9 @@ CHECK = 0.539  # near an extremum of T_16, and of no period with it
 START = 2  # halvings of the first blocks
 BATCH = 16  # blocks of one task
 MOST = 10_000_000  # cells
+# On maps of more than 2^LARGE cells no block of fewer than 2^FEWEST cells is solved again: in `satellite_areas` those
+# beside the excluded inertia ratio took half of the time and decided none of 138,000 cells. Smaller maps have fewer.
+FEWEST, LARGE = 3, 12
 # A cell between two of the smallest parts of each side; its VERDICT is where a leaf has it.
 LOW_X, HIGH_X, LOW_Y, HIGH_Y = range(4)
 MERGED = VERDICT + 1
@@ -121,7 +124,13 @@ def serves(scene):
     return has_factors(scene)
 
 
-def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=descend):
+def by_factors(series, doubts, blocks, depth, halves):
+    """The cells of blocks, and their number: see `kernels.hill.cells.descend`."""
+    fewest = int(np.clip(depth.sum() - LARGE, 0, FEWEST))
+    return descend(series, doubts, blocks, depth, halves, fewest)
+
+
+def find(solve, x, y, each=in_turn, report=None, values=_factors, descend=by_factors):
     """The Cells of the rectangle of the Sides x and y.
 
     `solve(x, y)` gives the four factors with their error bounds at broadcast arrays of both

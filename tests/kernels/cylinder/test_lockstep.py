@@ -147,12 +147,16 @@ def test_a_row_of_nan_costs_itself_alone(place):
 
 def test_a_row_of_times_ends_at_its_first_infinity_and_a_budget_ends_a_row():
     rows = drawn(TURN, 8)
-    floats, _turnings, status = solved(rows, [2.0, np.inf, 3.0])
-    assert (
-        np.isfinite(floats[:, 0]).all()
-        and np.isnan(floats[:, 1:]).all()
-        and (status == steps.OK).all()
-    )
+    for times in (
+        [2.0, np.inf, 3.0],
+        [0.01, np.inf, 0.02, 0.03, 0.04],
+    ):  # less than a block, and more
+        floats, _turnings, status = solved(rows, times)
+        assert (
+            np.isfinite(floats[:, 0]).all()
+            and np.isnan(floats[:, 1:]).all()
+            and (status == steps.OK).all()
+        )
     assert (solved(rows, [np.inf])[2] == steps.OK).all()
     assert (solved(rows, [1e9], limit=5)[2] == steps.STEP_LIMIT).all()
 
