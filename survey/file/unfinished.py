@@ -17,7 +17,7 @@ SHOWN = 3  # changes that are listed one by one
 # keys of a workflow on which blocks do not depend
 INDEPENDENT = ("title", "output.path", "output.figures", "output.style", "boundaries", "refine")
 CODE = {"format", "kernels"}  # parts of a fingerprint that do not come from the workflow
-FUSED = "fused_multiply_adds"  # another: has the processor some? The last bits of trajectories depend on them
+FUSED = "fused_multiply_adds"  # has the processor some? The last bits of trajectories depend on them
 
 
 def folder_of(path):

@@ -190,10 +190,9 @@ def fma(a, b, c):
     given = (a, b, c)
     if any(isinstance(x, _Unknown) for x in given):
         return _Unknown()
+    # numbers of other classes, as those that count operations, have no exact product
     known = all(isinstance(x, (float, int, np.ndarray, _Number)) for x in given)
-    if not (
-        HAS_FMA and known
-    ):  # numbers of other classes, as those that count operations, have no exact product
+    if not (HAS_FMA and known):
         return a * b + c
     symbols = [x for x in given if isinstance(x, _Number)]
     if not symbols:
