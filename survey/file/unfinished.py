@@ -17,7 +17,8 @@ SHOWN = 3  # changes that are listed one by one
 # keys of a workflow on which blocks do not depend
 INDEPENDENT = ("title", "output.path", "output.figures", "output.style", "boundaries", "refine")
 CODE = {"format", "kernels"}  # parts of a fingerprint that do not come from the workflow
-FUSED = "fused_multiply_adds"  # has the processor some? The last bits of trajectories depend on them
+# does the processor have fused multiply-adds? The last bits of trajectories depend on that
+FUSED = "fused_multiply_adds"
 
 
 def folder_of(path):
