@@ -504,9 +504,10 @@ def _serve(work, i, times, k, first, size, planes):
     """Record lane i of the work space, in one row, at the times of row k, from the `first` on, within the step;
     returns the next, and whether all bars were narrow enough.
     """
-    last, within = first, 1.0 * BLOCK
-    # how many lie in the step is not asked before: no processor foresees such a branch
-    while within == BLOCK and last < size:
+    at, at_low = work[LANES * (BEFORE + TIME) + i], work[LANES * (BEFORE + TIME_LOW) + i]
+    last, within, end = first, 1.0 * BLOCK, work[LANES * (OF_STEP + DT) + i]
+    # how many of a block lie in the step is not asked before: no processor foresees such a branch
+    while within == BLOCK and last < size and (times[k, last] - at) - at_low <= end:
         if last + BLOCK <= times.shape[1]:
             within, fine = _block(work, i, times, k, last, planes)
         else:
