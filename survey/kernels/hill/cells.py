@@ -165,16 +165,17 @@ def _too_short(sums, bars, doubt, here, block, depth, fewest):
             hidden_y |= not doubt[f, TAIL_Y] <= size
             undefined |= bars[f] != bars[f]  # at some of its points
     fewest = 0 if undefined else fewest
+    left = left_x + left_y  # halvings of what would be solved
     if not full:
-        many = left_x + left_y >= fewest
-        x &= many and here[HALVED_X] > block[HALVED_X]
-        return x, y and many and here[HALVED_Y] > block[HALVED_Y]
-    if (hidden_x and left_x == 0) or (hidden_y and left_y == 0):
+        x &= here[HALVED_X] > block[HALVED_X]
+        y &= here[HALVED_Y] > block[HALVED_Y]
+    elif (hidden_x and left_x == 0) or (hidden_y and left_y == 0):
         return False, False
-    x &= left_x > 0 and hidden_x >= hidden_y
-    y &= left_y > 0 and hidden_y >= hidden_x
-    many = left_x + left_y - x - y >= fewest
-    return x and many, y and many
+    else:
+        x &= left_x > 0 and hidden_x >= hidden_y
+        y &= left_y > 0 and hidden_y >= hidden_x
+        left -= x + y
+    return x and left >= fewest, y and left >= fewest
 
 
 @inline

@@ -147,10 +147,8 @@ def test_a_row_of_nan_costs_itself_alone(place):
 
 def test_a_row_of_times_ends_at_its_first_infinity_and_a_budget_ends_a_row():
     rows = drawn(TURN, 8)
-    for times in (
-        [2.0, np.inf, 3.0],
-        [0.01, np.inf, 0.02, 0.03, 0.04],
-    ):  # less than a block, and more
+    fewer_than_a_block, more = [2.0, np.inf, 3.0], [0.01, np.inf, 0.02, 0.03, 0.04]
+    for times in (fewer_than_a_block, more):
         floats, _turnings, status = solved(rows, times)
         assert (
             np.isfinite(floats[:, 0]).all()
