@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from survey.kernels.body import motion
-from survey.kernels.cylinder import fate, returns, steps
+from survey.kernels.cylinder import borders, fate, returns, steps
 from survey.kernels.cylinder.flow import (
     BOUND_DG,
     BOUND_F,
@@ -198,10 +198,20 @@ def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
 
 
 @kernel
-def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
+def flow_borders(kind, p, eqs, count, section, tolerance, out):
+    """See `borders.borders`."""
+    return borders.borders(
+        flow_setting, flow_begin, flow_at, kind, p, eqs, count, section, tolerance, out
+    )
+
+
+@kernel
+def flow_cycles(
+    kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
+):
     """See `returns.fixed_points`."""
     return returns.fixed_points(
-        _image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+        _image, kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
     )
 
 

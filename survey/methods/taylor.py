@@ -13,6 +13,7 @@ from survey import waiting
 from survey.kernels.body import motion
 from survey.kernels.cylinder import (
     basins,
+    borders,
     connections,
     fate,
     gyrostat,
@@ -207,10 +208,20 @@ def flow_image(kind, p, eqs, count, anchor, x, tolerance, node):
 
 
 @kernel
-def flow_cycles(kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges):
+def flow_borders(kind, p, eqs, count, section, tolerance, out):
+    """See `borders.borders`."""
+    return borders.borders(
+        flow_setting, flow_begin, flow_at, kind, p, eqs, count, section, tolerance, out
+    )
+
+
+@kernel
+def flow_cycles(
+    kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
+):
     """See `returns.fixed_points`."""
     return returns.fixed_points(
-        _image, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+        _image, kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
     )
 
 

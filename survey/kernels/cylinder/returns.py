@@ -19,7 +19,7 @@ from survey.kernels.cylinder.creeping import (
     stands_still,
     trapped,
 )
-from survey.kernels.cylinder.equilibria import ANGLE, captured
+from survey.kernels.cylinder.equilibria import ANGLE, FOCUS, KIND, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import (
@@ -59,9 +59,11 @@ EDGES = 7
 MOST_CYCLES = 16
 MOST_NODES = 400
 LIMIT = 40_000
+APART = 1e4  # times its bar, |D| at nodes between which slopes of the map are compared
 # error up to which a motion beside a saddle that creeps counts as on the side where it is: borders of
 # classes are found no more exactly than that
 SIDES = 1e-10
+TINY = 1e-9  # rad: beside the angle of an equilibrium
 
 
 @inline
@@ -126,13 +128,18 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
 
 @inline
 def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
-    """From the right turning point x0 to the next, which must lie below `high`, the next equilibrium."""
+    """From the right turning point x0 to the next, which must lie below `high`, the next equilibrium.
+
+    Where the motion is certain to run into the focus before x0, its angle stands for the image, which
+    lies between it and x0; then SLOPE is 0.
+    """
     T = table()
     how = setting(p, 0.0, tolerance)
     phi, w, saa, sab, sbb, e, t, right = x0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False
     far, slow = np.empty(PASSAGE), False
     doubt = 0.0
     node[X], node[CLASS], node[SLOPE] = x0, UNKNOWN, 0.0
+    focus, rest = focus_before(eqs, count, x0)
     for n in range(1, LIMIT):
         h = expand(begin, p, phi, w, how, T)
         x1, w1, de, _dy = at(p, T, h)
@@ -154,6 +161,12 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             slow, saa, sab, sbb = narrowed(f, g, w, saa, sab, sbb)
         if n % 4 == 0:
             bar_phi, bar_w = bar(n, saa), bar(n, sbb)
+            beside = focus >= 0 and abs(phi - rest) < math.pi
+            if beside and captured(eqs[focus : focus + 1], 1, phi, w, bar_phi + bar_w) >= 0:
+                low = node[LEFT] if right else rest - TINY
+                node[CLASS] = between(eqs, count, low, rest + TINY)
+                node[CHANGE], node[TIME], node[ERROR] = rest - x0, t, 0.0
+                return
             if runs_in(p, eqs, count, phi, w, bar_phi + bar_w):
                 node[CLASS] = NO_IMAGE
                 return
@@ -184,6 +197,18 @@ def runs_in(p, eqs, count, phi, w, bar):
 
 
 @kernel
+def focus_before(eqs, count, x):
+    """The number of the next equilibrium to the left of the angle x if that is a focus, or -1; its angle."""
+    at, least = -1, math.inf
+    for i in range(count):
+        gap = x - eqs[i, ANGLE]
+        gap -= TWO_PI * math.floor(gap / TWO_PI)
+        if gap < least:
+            at, least = i, gap
+    return at if at >= 0 and eqs[at, KIND] == FOCUS else -1, x - least
+
+
+@kernel
 def between(eqs, count, low, high):
     """How many equilibria lie between the unwrapped angles low and high."""
     inside = 0
@@ -207,16 +232,16 @@ def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
 
 @splice
 def fixed_points(
-    image_of, kind, p, eqs, count, anchor, interval, xs, tolerance, cycles, found, edges
+    image_of, kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
 ):
     """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
 
-    Borders of a class are bisected, so that a fixed point beside one is not lost; where D has no
-    change of sign but dips towards 0, the dip is followed down (a pair of cycles near its fold).
-    edges: those of the scan.
+    Borders of a class, which are looked for at the `guesses` (ascending, see `borders`) first, are
+    bisected, so that a fixed point beside one is not lost; where D has no change of sign but dips
+    towards 0, the dip is followed down (a pair of cycles near its fold). edges: those of the scan.
     """
     nodes = np.zeros((MOST_NODES, NODE_SIZE))
-    size = scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes)
+    size = scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes)
     edges[BORDER], edges[IMAGE], edges[LAST_CHANGE], edges[LAST_ERROR] = (
         math.nan,
         math.nan,
@@ -228,10 +253,12 @@ def fixed_points(
         nodes[0, ERROR],
         1.0 * (nodes[0, CLASS] == UNKNOWN),
     )
-    m = np.zeros(NODE_SIZE)
+    m, grain = np.zeros(NODE_SIZE), 4e-15 * (xs[-1] - xs[0])
     for i in range(1, size):
         a, b = nodes[i - 1], nodes[i]
-        edges[UNANSWERED] += b[CLASS] == UNKNOWN
+        # the scan has found both ends of what is unknown: at a border alone nothing is lost
+        wide = b[X] - a[X] > 8e-15 * abs(b[X]) + grain
+        edges[UNANSWERED] += a[CLASS] == UNKNOWN and b[CLASS] == UNKNOWN and wide
         if b[CLASS] == 1.0 and a[CLASS] != 1.0:
             edges[BORDER], edges[IMAGE] = b[X], b[X] + b[CHANGE]
         if found + 2 > len(cycles) or b[X] <= a[X]:
@@ -283,19 +310,31 @@ def copy(target, source):
 
 
 @splice
-def scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes):
-    """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number."""
+def scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
+    """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number.
+
+    Rotations have no image below their border, and librations none between two borders if they have none
+    behind the first: there nodes of the lattice are left out.
+    """
     a, c, d = np.zeros(NODE_SIZE), np.zeros(NODE_SIZE), np.zeros(NODE_SIZE)
     grain = 1e-15 * (xs[-1] - xs[0])
-    image_of(kind, p, eqs, count, anchor, xs[0], tolerance, nodes[0])
-    size, i, x, step = 1, 1, xs[0], 0.0
+    last = len(guesses) - 1
+    i = last_before(xs, guesses[last]) if kind == ROTATION and last >= 0 else 0
+    image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
+    if i > 0 and nodes[0, CLASS] != NO_IMAGE:
+        i = 0
+        image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
+    size, x, step = 1, xs[i], 0.0
+    i += 1
+    skips = kind == LIBRATION and not (last >= 0 and math.isnan(guesses[last]))
     while i < len(xs):
         near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
         image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
         copy(a, nodes[size - 1])
         crossed = c[CLASS] != a[CLASS]
+        guess, reach = first_beyond(a[X], guesses), 0.45 * (2e-15 * abs(a[X]) + grain)
         while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
-            middle = 0.5 * (a[X] + c[X])
+            middle = next_place(a[X], c[X], guess, reach)
             if not a[X] < middle < c[X]:
                 break
             image_of(kind, p, eqs, count, anchor, middle, tolerance, d)
@@ -315,7 +354,41 @@ def scan(image_of, kind, p, eqs, count, anchor, xs, tolerance, nodes):
                 size += 1
             step *= 10.0
             i += not near
+            if skips and c[CLASS] == NO_IMAGE:
+                i, step = max(i, last_before(xs, first_beyond(c[X], guesses))), 0.0
     return size
+
+
+@kernel
+def last_before(xs, place):
+    """The index of the last of xs before a place, 0 if that is NaN."""
+    i = 0
+    while i + 1 < len(xs) and xs[i + 1] < place:
+        i += 1
+    return i
+
+
+@kernel
+def first_beyond(x, guesses):
+    """The first of the guesses beyond x, or infinity."""
+    for guess in guesses:
+        if guess > x:
+            return guess
+    return math.inf
+
+
+@kernel
+def next_place(low, high, guess, reach):
+    """Where to look for a border between low and high: `reach` to either side of the guess, then ever
+    further on the side where it is, or else in the middle.
+    """
+    middle = 0.5 * (low + high)
+    if low < guess < high:
+        if low < guess - reach:
+            return guess - reach
+        return guess + reach if guess + reach < high else middle
+    ahead = high - 15.0 * (guess - high) if guess >= high else low + 15.0 * (low - guess)
+    return ahead if low < ahead < high else middle
 
 
 @inline
@@ -365,24 +438,32 @@ def followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
 def solved(image_of, kind, p, eqs, count, anchor, interval, a, b, tolerance, row):
     """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
     low, high, m = a[X], b[X], np.zeros(NODE_SIZE)
+    left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)  # about the cycle, at a distance
+    copy(left, a)
+    copy(right, b)
     rising = b[CHANGE] > 0.0
+    below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]  # is the sign of D certain?
     share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
     x = low + min(max(share, 0.02), 0.98) * (high - low)
     for _ in range(60):
         image_of(kind, p, eqs, count, anchor, x, tolerance, m)
         if m[CLASS] != a[CLASS]:
             break
+        slope, certain = m[SLOPE] - 1.0, abs(m[CHANGE]) > m[ERROR]
+        apart = abs(m[CHANGE]) > APART * m[ERROR]
         if (m[CHANGE] > 0.0) == rising:
-            high = x
+            high, above = x, above or certain
+            if apart:
+                copy(right, m)
         else:
-            low = x
-        slope = m[SLOPE] - 1.0
+            low, below = x, below or certain
+            if apart:
+                copy(left, m)
         new = x - m[CHANGE] / slope if slope != 0.0 else low
         if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
             break
         x = new if low < new < high else 0.5 * (low + high)
-    write_cycle(a, b, m, interval, steepness(kind, p, m[X]), row)
-    below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]
+    write_cycle(left, right, m, interval, steepness(kind, p, m[X]), row)
     if not (below and above):  # D may change sign by its rounding alone
         row[CYCLE_CLASS], row[BELOW], row[ABOVE] = -m[CLASS], row[BELOW] * below, row[ABOVE] * above
 

@@ -65,6 +65,10 @@ METHODS = {
             "fill `node` with the image of x under one return map, see `kernels.cylinder.returns.image`",
             ("kind", "p", "eqs", "count", "anchor", "x", "tolerance", "node"),
         ),
+        "flow_borders": Function(
+            "fill `out` with places where a return map ends, see `kernels.cylinder.borders.borders`",
+            ("kind", "p", "eqs", "count", "section", "tolerance", "out"),
+        ),
         "flow_cycles": Function(
             "append the fixed points of a return map to `cycles`, see `kernels.cylinder.returns.fixed_points`",
             (
@@ -75,6 +79,7 @@ METHODS = {
                 "anchor",
                 "interval",
                 "xs",
+                "guesses",
                 "tolerance",
                 "cycles",
                 "found",

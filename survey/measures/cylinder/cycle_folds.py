@@ -86,7 +86,10 @@ class Maps:
             steep = 1.0 / size
         change, slope, error = node[rt.CHANGE], node[rt.SLOPE], node[rt.ERROR]
         bar = 1e-14 * (1.0 + slope) + 20.0 * error + 2.0 * slope * steep * (abs(change) + error)
-        return int(node[rt.CLASS]), change / size, slope - 1.0, error / size, bar
+        own = (
+            int(node[rt.CLASS]) if slope > 0.0 else rt.NO_IMAGE
+        )  # of motions into a focus only the sign is known
+        return own, change / size, slope - 1.0, error / size, bar
 
     @staticmethod
     def _end(eqs, coordinate):

@@ -14,6 +14,7 @@ from functools import lru_cache, partial
 import numpy as np
 
 from survey import waiting
+from survey.kernels.cylinder import borders as bo
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
@@ -385,7 +386,9 @@ def _rotations(method, p, eqs, section, end, K, L, above):
     fine = max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(LEAST, 30.0, 80)
     xs = xs[min(max(np.searchsorted(xs, above) - 1, 0), len(xs) - 2) :]
-    found = method.flow_cycles(rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, 0, edges)
+    guesses = borders(method, rt.ROTATION, p, eqs, section, fine)[:, bo.PLACE].copy()
+    given = rt.ROTATION, p, eqs, len(eqs), section, 0
+    found = method.flow_cycles(*given, xs, guesses, fine, table, 0, edges)
     border, image = edges[rt.BORDER], edges[rt.IMAGE]
     start, unknown = edges[rt.FIRST_CHANGE], edges[rt.UNANSWERED]
     top, change, error, last = xs[-1], edges[rt.LAST_CHANGE], edges[rt.LAST_ERROR], 0.0
@@ -398,9 +401,7 @@ def _rotations(method, p, eqs, section, end, K, L, above):
         last = np.sign(change)
         xs = top * np.array([1.0, 1.3, 1.7, 2.2, 3.0])
         before = found
-        found = method.flow_cycles(
-            rt.ROTATION, p, eqs, len(eqs), section, 0, xs, fine, table, found, edges
-        )
+        found = method.flow_cycles(*given, xs, guesses, fine, table, found, edges)
         unknown += edges[rt.UNANSWERED]
         if found > before and (found - before) % 2:
             break
@@ -417,6 +418,17 @@ def _rotations(method, p, eqs, section, end, K, L, above):
     sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
     fit = unknown == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1]
     return Cycles(cycles, (border, image), bool(fit))
+
+
+def borders(method, kind, p, eqs, section, tolerance):
+    """Where a return map of the flow p ends, as in `kernels.cylinder.borders`, ascending."""
+    back, rests = p.copy(), eqs.copy()  # in reversed time
+    back[OF_F] *= -1.0
+    rests[:, eq.F] *= -1.0
+    back.flags.writeable = p.flags.writeable
+    out = np.empty((3 * len(eqs), bo.BORDER))
+    found = method.flow_borders(kind, back, rests, len(eqs), section, tolerance, out)
+    return out[np.argsort(out[:found, bo.PLACE])]
 
 
 def _far_cycle(p, section, K, L, scale):
@@ -455,14 +467,17 @@ def _librations(method, p, eqs, folded):
     found = 0
     share = 1.0 / (1.0 + np.exp(-np.linspace(-11.0, 11.0, 56)))
     sure = True
+    places = borders(method, rt.LIBRATION, p, eqs, 0.0, fine)
     for i, row in enumerate(eqs):
         if row[eq.DG] < 0.0 and row[eq.KIND] != eq.DEGENERATE:
             if folded and eq.blurred(p, row[eq.ANGLE], row[eq.DG])[1]:
                 continue  # in float64 motions beside it stand still
             high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
             xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
+            here = (places[:, bo.INTERVAL] == i) | np.isnan(places[:, bo.PLACE])
+            guesses = places[here, bo.PLACE]
             found = method.flow_cycles(
-                rt.LIBRATION, p, eqs, len(eqs), high, i, xs, fine, table, found, edges
+                rt.LIBRATION, p, eqs, len(eqs), high, i, xs, guesses, fine, table, found, edges
             )
             against = (
                 row[eq.KIND] == eq.FOCUS
