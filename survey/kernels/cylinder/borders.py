@@ -17,14 +17,15 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.branches import FURTHEST, unstable
-from survey.kernels.cylinder.equilibria import ANGLE, DEGENERATE, KIND, NODE
+from survey.kernels.cylinder.equilibria import ANGLE, DEGENERATE, KIND, NODE, SADDLE
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, TWO_PI, longest_step, table
 from survey.kernels.cylinder.returns import ROTATION
 from survey.kernels.cylinder.steps import passage, until_turning
 from survey.kernels.jit import inline
 
-# a place: w > 0 on the section, or a right turning point, and the number of its interval
-PLACE, INTERVAL = range(2)
+# a place: w > 0 on the section and the number of the saddle among the saddles, or a right turning point and
+# that of its interval
+PLACE, OF = range(2)
 BORDER = 2
 LIMIT = 400  # steps
 STOPPED = 1e-10  # velocity, in those of the system, from which on a branch is not followed
@@ -38,13 +39,13 @@ def borders(setting, begin, at, kind, p, eqs, count, section, tolerance, out):
     p, eqs: of the flow reversed in time; section: the angle that rotations pass.
     """
     starts = np.zeros((2 * count, rc.START))
-    size, found, T = unstable(p, eqs, count, starts), 0, table()
+    size, found, T = unstable(p, eqs, count, starts, FURTHEST, SADDLE), 0, table()
     if kind != ROTATION:
         size += unstable(p, eqs, count, starts[size:], FURTHEST, NODE)
     least = STOPPED * (p[BOUND_F] + math.sqrt(p[BOUND_DG]))
     for i in range(count):
         if eqs[i, KIND] == DEGENERATE:
-            out[found, PLACE], out[found, INTERVAL] = math.nan, -1.0
+            out[found, PLACE], out[found, OF] = math.nan, -1.0
             found += 1
     for k in range(size):
         phi, w = starts[k, rc.START_PHI], starts[k, rc.START_W]
@@ -71,7 +72,7 @@ def borders(setting, begin, at, kind, p, eqs, count, section, tolerance, out):
             phi, w = x1, 0.0 if turned else w1
             sign = -sign if turned else sign
         if lost or not math.isnan(place):
-            out[found, PLACE], out[found, INTERVAL] = place, -1.0
+            out[found, PLACE], out[found, OF] = place, k // 2
             if kind != ROTATION and not lost:
                 write(eqs, count, out[found])
             found += 1
@@ -85,4 +86,4 @@ def write(eqs, count, row):
     i = 0
     while i + 1 < count and eqs[i + 1, ANGLE] <= row[PLACE]:
         i += 1
-    row[INTERVAL] = i
+    row[OF] = i

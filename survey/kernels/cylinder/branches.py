@@ -53,7 +53,7 @@ def forces(p, phi, f, g):
 
 
 @kernel
-def unstable(p, eqs, count, starts, furthest=FURTHEST, kind=SADDLE):
+def unstable(p, eqs, count, starts, furthest, kind):
     """Fill `starts` (START_PHI to START_W_BAR) with a point of each unstable branch, two per
     saddle; their number.
 
@@ -94,3 +94,8 @@ def unstable(p, eqs, count, starts, furthest=FURTHEST, kind=SADDLE):
             )
             size += 1
     return size
+
+
+def of_saddles(p, eqs, starts):
+    """As `unstable`, of the saddles among all equilibria."""
+    return unstable(p, eqs, len(eqs), starts, FURTHEST, SADDLE)

@@ -272,7 +272,7 @@ def connections(setting, begin, at, P, wanted, tolerance, cut, out):
                 if wanted[system, label] > 0.0:
                     # a start behind the next equilibrium would be taken for the passage of it
                     reach = min(FURTHEST, 0.5 * row[OFFSETS])
-                    unstable(like(P[i], q), turned[k : k + 1], 1, starts, reach)
+                    unstable(like(P[i], q), turned[k : k + 1], 1, starts, reach, SADDLE)
                     first_turn(
                         setting,
                         begin,

@@ -52,14 +52,24 @@ NODE_SIZE = 7
     ABOVE,
 ) = range(10)
 CYCLE_SIZE = 10
-# edges of a scan: w_c and w_d of a rotation, D and its bar at the last node and at the first, the
+# edges of a scan: w_c and w_d of a rotation and the bar of that, D and its bar at the last node and at the first, the
 # number of nodes without an answer
-BORDER, IMAGE, LAST_CHANGE, LAST_ERROR, FIRST_CHANGE, FIRST_ERROR, UNANSWERED = range(7)
-EDGES = 7
+(
+    BORDER,
+    IMAGE,
+    IMAGE_ERROR,
+    LAST_CHANGE,
+    LAST_ERROR,
+    FIRST_CHANGE,
+    FIRST_ERROR,
+    UNANSWERED,
+) = range(8)
+EDGES = 8
 MOST_CYCLES = 16
 MOST_NODES = 400
+STRIDE = 4  # nodes of a lattice of which three are left out where D is plain
 LIMIT = 40_000
-APART = 1e4  # times its bar, |D| at nodes between which slopes of the map are compared
+APART = 1e4  # times its bar, the distance from a cycle at which slopes of the map are compared
 # error up to which a motion beside a saddle that creeps counts as on the side where it is: borders of
 # classes are found no more exactly than that
 SIDES = 1e-10
@@ -259,8 +269,12 @@ def fixed_points(
         # the scan has found both ends of what is unknown: at a border alone nothing is lost
         wide = b[X] - a[X] > 8e-15 * abs(b[X]) + grain
         edges[UNANSWERED] += a[CLASS] == UNKNOWN and b[CLASS] == UNKNOWN and wide
+        if kind == LIBRATION and a[CLASS] != b[CLASS]:  # does a cycle hide beside the border?
+            below, above = nodes[max(i - 2, 0)], nodes[min(i + 1, size - 1)]
+            hidden = is_open(a) and not rises_from(below, a)
+            edges[UNANSWERED] += hidden or (is_open(b) and not falls_to(b, above))
         if b[CLASS] == 1.0 and a[CLASS] != 1.0:
-            edges[BORDER], edges[IMAGE] = b[X], b[X] + b[CHANGE]
+            edges[BORDER], edges[IMAGE], edges[IMAGE_ERROR] = b[X], b[X] + b[CHANGE], b[ERROR]
         if found + 2 > len(cycles) or b[X] <= a[X]:
             continue
         if jumps(a, b) or jumps(b, a):  # of the cycle there its place is known, and no more
@@ -317,6 +331,7 @@ def scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
     behind the first: there nodes of the lattice are left out.
     """
     a, c, d = np.zeros(NODE_SIZE), np.zeros(NODE_SIZE), np.zeros(NODE_SIZE)
+    further = np.zeros(NODE_SIZE)
     grain = 1e-15 * (xs[-1] - xs[0])
     last = len(guesses) - 1
     i = last_before(xs, guesses[last]) if kind == ROTATION and last >= 0 else 0
@@ -324,15 +339,27 @@ def scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
     if i > 0 and nodes[0, CLASS] != NO_IMAGE:
         i = 0
         image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
-    size, x, step = 1, xs[i], 0.0
+    size, x, step, between = 1, xs[i], 0.0, 0
     i += 1
     skips = kind == LIBRATION and not (last >= 0 and math.isnan(guesses[last]))
     while i < len(xs):
-        near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
-        image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
         copy(a, nodes[size - 1])
-        crossed = c[CLASS] != a[CLASS]
-        guess, reach = first_beyond(a[X], guesses), 0.45 * (2e-15 * abs(a[X]) + grain)
+        guess = first_beyond(a[X], guesses)
+        if between == 0 and a[CLASS] > 0.0:
+            between, at, to, wide = ahead(xs, x, step, i, guess)
+            if between > 1:
+                image_of(kind, p, eqs, count, anchor, at, tolerance, further)
+                if is_plain(a, further) and size < len(nodes):
+                    copy(nodes[size], further)
+                    size, step, i, between = size + 1, wide, to, 0
+                    continue
+        near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
+        if between == 1 and further[X] > a[X]:
+            copy(c, further)
+        else:
+            image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
+        between = max(between - 1, 0)
+        crossed, reach = c[CLASS] != a[CLASS], 0.45 * (2e-15 * abs(a[X]) + grain)
         while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
             middle = next_place(a[X], c[X], guess, reach)
             if not a[X] < middle < c[X]:
@@ -342,10 +369,14 @@ def scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
                 copy(a, d)
             else:
                 copy(c, d)
-        if crossed and size + 2 < len(nodes):
+        if crossed and size + 3 < len(nodes):
+            beside = a[X] - 1e5 * reach
+            if kind == LIBRATION and is_open(a) and beside > nodes[size - 1, X]:  # see `rises_from`
+                image_of(kind, p, eqs, count, anchor, beside, tolerance, nodes[size])
+                size += nodes[size, CLASS] == a[CLASS]
             copy(nodes[size], a)
             copy(nodes[size + 1], c)
-            size, x, step = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain)
+            size, x, step, between = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain), 0
             if c[X] >= xs[i]:
                 i += 1
         else:
@@ -357,6 +388,54 @@ def scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
             if skips and c[CLASS] == NO_IMAGE:
                 i, step = max(i, last_before(xs, first_beyond(c[X], guesses))), 0.0
     return size
+
+
+@kernel
+def ahead(xs, x, step, i, guess):
+    """How many places of the scan, STRIDE at most, lie before the guess, the last of them, and the index and
+    the step behind it.
+    """
+    n, at = 0, x
+    while n < STRIDE and i < len(xs):
+        near = step > 0.0 and x + step < xs[i]
+        new = x + step if near else xs[i]
+        if not new < guess:
+            break
+        n, at, step, i = n + 1, new, step * 10.0, i + (not near)
+    return n, at, i, step
+
+
+@inline
+def is_open(a):
+    """Has the node an image, but may D have either sign?"""
+    return a[CLASS] > 0.0 and not abs(a[CHANGE]) > a[ERROR]
+
+
+@inline
+def rises_from(a, b):
+    """Is D > 0 from the node a to behind b? Maps increase, so D falls no faster than x rises."""
+    return a[CLASS] == b[CLASS] and a[CHANGE] - a[ERROR] > 1.01 * (b[X] - a[X])
+
+
+@inline
+def falls_to(a, b):
+    """Is D < 0 from before the node a to b, which is further from a border?"""
+    return a[CLASS] == b[CLASS] and b[CHANGE] + b[ERROR] < -1.01 * (b[X] - a[X])
+
+
+@inline
+def is_plain(a, b):
+    """Do two nodes of one class show a D that keeps its sign between them: does D' change by one way alone,
+    as far as the chord tells, and |D| have no minimum?
+    """
+    if a[SLOPE] == b[SLOPE] == 0.0:  # motions that run into a focus, up to the last one
+        return a[CLASS] == b[CLASS]
+    chord = (b[CHANGE] - a[CHANGE]) / (b[X] - a[X])
+    low, high = a[SLOPE] - 1.0, b[SLOPE] - 1.0
+    dips = low < 0.0 < high if a[CHANGE] > 0.0 else high < 0.0 < low
+    monotone = min(low, high) < chord < max(low, high)
+    certain = not (is_open(a) or is_open(b) or differ(a, b))
+    return a[CLASS] == b[CLASS] and certain and monotone and not dips
 
 
 @kernel
@@ -438,9 +517,7 @@ def followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
 def solved(image_of, kind, p, eqs, count, anchor, interval, a, b, tolerance, row):
     """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
     low, high, m = a[X], b[X], np.zeros(NODE_SIZE)
-    left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)  # about the cycle, at a distance
-    copy(left, a)
-    copy(right, b)
+    left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)
     rising = b[CHANGE] > 0.0
     below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]  # is the sign of D certain?
     share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
@@ -450,19 +527,23 @@ def solved(image_of, kind, p, eqs, count, anchor, interval, a, b, tolerance, row
         if m[CLASS] != a[CLASS]:
             break
         slope, certain = m[SLOPE] - 1.0, abs(m[CHANGE]) > m[ERROR]
-        apart = abs(m[CHANGE]) > APART * m[ERROR]
         if (m[CHANGE] > 0.0) == rising:
             high, above = x, above or certain
-            if apart:
-                copy(right, m)
         else:
             low, below = x, below or certain
-            if apart:
-                copy(left, m)
         new = x - m[CHANGE] / slope if slope != 0.0 else low
         if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
             break
         x = new if low < new < high else 0.5 * (low + high)
+    bar = cycle_bar(
+        m
+    )  # how much the slope changes within it shows the map at so many times the bar
+    apart = min(APART * bar, 0.1 * (m[X] - a[X]), 0.1 * (b[X] - m[X]))
+    for side in (-1.0, 1.0):
+        beside, end = (left, a) if side < 0.0 else (right, b)
+        image_of(kind, p, eqs, count, anchor, m[X] + side * apart, tolerance, beside)
+        if beside[CLASS] != m[CLASS] or apart < bar:
+            copy(beside, end)
     write_cycle(left, right, m, interval, steepness(kind, p, m[X]), row)
     if not (below and above):  # D may change sign by its rounding alone
         row[CYCLE_CLASS], row[BELOW], row[ABOVE] = -m[CLASS], row[BELOW] * below, row[ABOVE] * above
@@ -474,13 +555,19 @@ def steepness(kind, p, x):
     return 1.0 / x if kind == ROTATION else p[BOUND_DG] / (abs(values(p, x)[1]) + 1e-300)
 
 
+@inline
+def cycle_bar(m):
+    """The error bound of a cycle's place, from that of D at the node m."""
+    change = abs(m[CHANGE]) + m[ERROR]
+    return 1.2 * change / max(abs(m[SLOPE] - 1.0), 1e-12) + 4e-16 * abs(m[X])
+
+
 @kernel
 def write_cycle(a, b, m, interval, steep, row):
     """Note the cycle at node m between a and b; its bar from those of D and of the slope."""
-    slope = m[SLOPE] - 1.0
     away = abs((b[CHANGE] - a[CHANGE]) / (b[X] - a[X]))
     row[CYCLE_X], row[MULTIPLIER], row[PERIOD], row[CYCLE_LEFT] = m[X], m[SLOPE], m[TIME], m[LEFT]
-    row[CYCLE_BAR] = 1.2 * (abs(m[CHANGE]) + m[ERROR]) / max(abs(slope), 1e-12) + 4e-16 * abs(m[X])
+    row[CYCLE_BAR] = cycle_bar(m)
     bend = (abs(a[SLOPE] - m[SLOPE]) + abs(b[SLOPE] - m[SLOPE])) / max(b[X] - a[X], 1e-300) + away
     row[MULTIPLIER_BAR] = 1e-14 * (1.0 + m[SLOPE]) + 20.0 * m[ERROR] + 3.0 * bend * row[CYCLE_BAR]
     row[MULTIPLIER_BAR] += 2.0 * m[SLOPE] * steep * (abs(m[CHANGE]) + m[ERROR])

@@ -47,6 +47,7 @@ OK, OVERFLOW, NO_CONVERGENCE, STEP_LIMIT = 0, 2, 3, 4  # as in survey/status.py
 TURNING, EQUILIBRIUM, SEPARATRIX = 16, 17, 18  # as in the STATUS of scenes/gyrostat.py
 # error bounds above this share of the scale of the system no longer hold to first order
 TRUST = 0.02
+CANCELLED = 2e-15  # rounding of sums of squares, relative to their largest terms
 UNDETERMINED = -2  # a count that the error bound leaves open
 
 
@@ -72,10 +73,11 @@ def carried(p, T, dt, w, saa, sab, sbb):
     """The error ellipse S after dt of the current step."""
     a, b, c, d = jacobian(T, dt)
     e, f = local_error(p, T, w, dt)
-    return (
-        a * a * saa + 2.0 * a * b * sab + b * b * sbb + e * e,
+    wide, tall = a * a * saa + b * b * sbb, c * c * saa + d * d * sbb
+    return (  # as at a turning point beside a saddle, terms of opposite sign may leave their rounding alone
+        max(wide + 2.0 * a * b * sab, 0.0) + CANCELLED * wide + e * e,
         a * c * saa + (a * d + b * c) * sab + b * d * sbb,
-        c * c * saa + 2.0 * c * d * sab + d * d * sbb + f * f,
+        max(tall + 2.0 * c * d * sab, 0.0) + CANCELLED * tall + f * f,
     )
 
 

@@ -61,7 +61,7 @@ def table(method, s, rtol):
         return end, limit
     for first, flow in ((0, s), (2, backward(s))):
         starts = np.zeros((2 * len(saddles), rc.START))
-        branches.unstable(flow.p, flow.equilibria, len(flow.equilibria), starts)
+        branches.of_saddles(flow.p, flow.equilibria, starts)
         for i, found in enumerate(followed(method, flow, starts, rtol)):
             at = saddles[i // 2], first + i % 2
             kind = _OF_FATES.get(int(found[rc.VERDICT]), UNDECIDED)

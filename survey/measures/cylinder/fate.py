@@ -54,6 +54,7 @@ COLUMNS_OF = {
     "status": rc.STATUS,
 }
 LIMITS = [name + end for name in ("limit_phi", "limit_w", "multiplier") for end in ("", "_error")]
+SAME = 1e-10  # relative: up to there w_c and w_d count as equal
 FINE = 1e-16  # truncation per step for cycles, or the finest of the method
 
 
@@ -386,10 +387,15 @@ def _rotations(method, p, eqs, section, end, K, L, above):
     fine = max(FINE, method.FLOW_FINEST)
     xs = scale * np.geomspace(LEAST, 30.0, 80)
     xs = xs[min(max(np.searchsorted(xs, above) - 1, 0), len(xs) - 2) :]
-    guesses = borders(method, rt.ROTATION, p, eqs, section, fine)[:, bo.PLACE].copy()
+    places = borders(method, rt.ROTATION, p, eqs, section, fine)
+    guesses = places[:, bo.PLACE].copy()
     given = rt.ROTATION, p, eqs, len(eqs), section, 0
     found = method.flow_cycles(*given, xs, guesses, fine, table, 0, edges)
-    border, image = edges[rt.BORDER], edges[rt.IMAGE]
+    border, image, image_error = edges[rt.BORDER], edges[rt.IMAGE], edges[rt.IMAGE_ERROR]
+    if border > 0.0 and len(places) and abs(places[-1, bo.PLACE] - border) <= SAME * border:
+        border = places[-1, bo.PLACE]
+        behind = _behind(method, p, eqs, section, int(places[-1, bo.OF]), fine)
+        image, image_error = (behind, 0.0) if behind >= 0.0 else (image, image_error)
     start, unknown = edges[rt.FIRST_CHANGE], edges[rt.UNANSWERED]
     top, change, error, last = xs[-1], edges[rt.LAST_CHANGE], edges[rt.LAST_ERROR], 0.0
     while (
@@ -413,11 +419,28 @@ def _rotations(method, p, eqs, section, end, K, L, above):
         cycles = np.vstack([cycles, _far_cycle(p, section, K, L, scale)])
     # where every turn is completed, D tends to w_d > 0 as w -> 0: cycles below the lattice need w_d
     # below it too
-    near = np.sign(image - border) if border > 0.0 else np.sign(start)
+    near = np.sign(start)
+    if border > 0.0:
+        error = image_error + SAME * border
+        near = np.sign(image - border) if abs(image - border) > error else math.nan
     sure = border > 0.0 or start > LEAST * scale
     sides = [near, *(cycles[:, rt.ABOVE])], [*cycles[:, rt.BELOW], end]
     fit = unknown == 0.0 and sure and found < len(table) - 2 and sides[0] == sides[1]
     return Cycles(cycles, (border, image), bool(fit))
+
+
+def _behind(method, p, eqs, section, saddle, tolerance):
+    """w_d, the limit of the images from above w_c, whose orbit tends to a saddle: w of its unstable branch
+    on the section; NaN where that is lost.
+    """
+    angle = eqs[eqs[:, eq.KIND] == eq.SADDLE, eq.ANGLE][saddle]
+    if abs(math.remainder(angle - section, 2.0 * math.pi)) < 1e-9:
+        return 0.0
+    out = np.empty((3 * len(eqs), bo.BORDER))
+    mirrored = flow_of(signed(p, MIRROR)), mirrored_equilibria(eqs), len(eqs), -section
+    found = method.flow_borders(rt.ROTATION, *mirrored, tolerance, out)
+    own = out[:found, bo.PLACE][out[:found, bo.OF] == saddle]
+    return own[0] if len(own) else math.nan
 
 
 def borders(method, kind, p, eqs, section, tolerance):
@@ -474,7 +497,7 @@ def _librations(method, p, eqs, folded):
                 continue  # in float64 motions beside it stand still
             high = eqs[i + 1, eq.ANGLE] if i + 1 < len(eqs) else eqs[0, eq.ANGLE] + 2.0 * math.pi
             xs = row[eq.ANGLE] + share * (high - row[eq.ANGLE])
-            here = (places[:, bo.INTERVAL] == i) | np.isnan(places[:, bo.PLACE])
+            here = (places[:, bo.OF] == i) | np.isnan(places[:, bo.PLACE])
             guesses = places[here, bo.PLACE]
             found = method.flow_cycles(
                 rt.LIBRATION, p, eqs, len(eqs), high, i, xs, guesses, fine, table, found, edges

@@ -95,7 +95,7 @@ def _branches(s, time):
     """
     for kind, flow, sign in ((0, s, 1.0), (1, backward(s), -1.0)):
         starts = np.zeros((2 * len(s.equilibria), rc.START))
-        size = branches.unstable(flow.p, flow.equilibria, len(flow.equilibria), starts)
+        size = branches.of_saddles(flow.p, flow.equilibria, starts)
         states = starts[:size, [rc.START_PHI, rc.START_W]] * [1.0, sign]
         yield states, sign * np.linspace(0.0, time, ALONG)[None], kind
 

@@ -162,7 +162,7 @@ def _branches(window, s):
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE]
     if not len(saddles):
         return found, cut
-    size = unstable(p, s.equilibria, len(s.equilibria), starts, window.reach(saddles))
+    size = unstable(p, s.equilibria, len(s.equilibria), starts, window.reach(saddles), eq.SADDLE)
     for i, start in enumerate(starts[:size]):
         saddle = saddles[i // 2]
         known = {"equilibrium_phi": (saddle[eq.ANGLE], saddle[eq.BAR])}

@@ -65,7 +65,7 @@ def _end(method, six, angle, rtol, left):
         reached = destinations.level_end(s, at, -1.0 if left else 1.0)
         return s, at, None, reached if reached >= 0 else None
     starts = np.zeros((2 * len(saddles), rc.START))
-    branches.unstable(s.p, s.equilibria, len(s.equilibria), starts)
+    branches.of_saddles(s.p, s.equilibria, starts)
     own = starts[2 * int(np.argmin(off)) + (0 if left else 1)]
     return s, at, fate.followed(method, s, own[None], rtol)[0], None
 

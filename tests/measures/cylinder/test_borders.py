@@ -64,7 +64,7 @@ def test_every_border_of_librations():
             classes = [_image(rt.LIBRATION, s, high, x)[rt.CLASS] for x in xs]
             for k in np.flatnonzero(np.diff(classes)):
                 border = _bisected(rt.LIBRATION, s, high, xs[k], xs[k + 1])
-                here = places[places[:, bo.INTERVAL] == i, bo.PLACE]
+                here = places[places[:, bo.OF] == i, bo.PLACE]
                 if s.equilibria[i, eq.KIND] == eq.NODE and border < here.min(initial=np.inf):
                     continue  # up to there orbits are proved to run into the node
                 assert np.abs(here - border).min() < 1e-10
@@ -89,7 +89,7 @@ def test_scans_that_know_no_border_find_the_same_cycles(kind):
             tables = []
             here = places[:, bo.PLACE]
             if kind == rt.LIBRATION:
-                here = here[places[:, bo.INTERVAL] == i]
+                here = here[places[:, bo.OF] == i]
             for guesses in (here.copy(), np.array([np.nan])):
                 table, edges = np.zeros((rt.MOST_CYCLES, rt.CYCLE_SIZE)), np.zeros(rt.EDGES)
                 given = kind, p, eqs, len(eqs), anchor, i, xs, guesses, fate.FINE
@@ -102,3 +102,19 @@ def test_scans_that_know_no_border_find_the_same_cycles(kind):
             np.testing.assert_array_equal(known[:, rt.ABOVE], unknown[:, rt.ABOVE])
             found += len(known)
     assert found > 3
+
+
+def test_a_cycle_that_hides_at_the_border_is_not_denied():
+    """The unstable branch meets the section below the stable one, but D > 0 from 1e-13 behind that on: about
+    as far as doubles tell, the cycle between lies at the border itself.
+    """
+    s = fate.skeleton(
+        taylor,
+        [0.6581494849637273, 5.137133460086418, 1.2152447154396184, 0.10764041873729935, -0.14386793899862532,
+         0.8686703417067414],
+    )  # fmt: skip
+    cycles = s.cycles(fate.PLUS)
+    w_c, w_d = cycles.threshold
+    assert w_d < w_c - 1e-3
+    assert _image(rt.ROTATION, s, s.section, w_c + 1e-12)[rt.CHANGE] > 1e-3
+    assert not len(cycles.table) and not cycles.conclusive

@@ -358,7 +358,7 @@ def test_unstable_branches_satisfy_the_flow():
     """Backward in time, by DOP853, the start of each branch runs into its saddle."""
     s = cf.remembered(taylor, SIX)
     starts = np.zeros((8, 4))
-    assert branches.unstable(s.p, s.equilibria, len(s.equilibria), starts) == 4
+    assert branches.of_saddles(s.p, s.equilibria, starts) == 4
     saddles = s.equilibria[s.equilibria[:, eq.KIND] == eq.SADDLE, eq.ANGLE]
     for phi, w, bar_phi, bar_w in starts[:4]:
         nearest = saddles[np.argmin(np.abs(saddles - phi))]
