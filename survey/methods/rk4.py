@@ -205,13 +205,16 @@ def flow_borders(kind, p, eqs, count, section, tolerance, out):
     )
 
 
+_fixed_points = returns.fixed_points_of(_image)
+
+
 @kernel
 def flow_cycles(
     kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
 ):
-    """See `returns.fixed_points`."""
-    return returns.fixed_points(
-        _image, kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
+    """See `fixed_points` in `returns`."""
+    return _fixed_points(
+        kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
     )
 
 

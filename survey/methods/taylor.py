@@ -23,7 +23,6 @@ from survey.kernels.cylinder import (
     lockstep_phi,
     lockstep_program,
     returns,
-    steps,
     winding,
 )
 from survey.kernels.cylinder.flow import (
@@ -186,14 +185,6 @@ def _abels_in_time(P, starts, targets, tolerance, limit, ahead, planes, status):
     lockstep_abel.abels(P, starts, targets, tolerance, limit, ahead, planes, status)
 
 
-@kernel
-def flow_abels_by_row(P, starts, targets, tolerance, limit, planes, status):
-    """See `steps.abels`."""
-    steps.abels(
-        flow_setting, flow_begin, flow_at, P, starts, targets, tolerance, limit, planes, status
-    )
-
-
 @part
 def _image(kind, p, eqs, count, anchor, x, tolerance, node):
     returns.image(
@@ -215,13 +206,16 @@ def flow_borders(kind, p, eqs, count, section, tolerance, out):
     )
 
 
+_fixed_points = returns.fixed_points_of(_image)
+
+
 @kernel
 def flow_cycles(
     kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
 ):
-    """See `returns.fixed_points`."""
-    return returns.fixed_points(
-        _image, kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
+    """See `fixed_points` in `returns`."""
+    return _fixed_points(
+        kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
     )
 
 

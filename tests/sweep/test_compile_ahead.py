@@ -118,7 +118,7 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
         (GYROSTAT.format(more='question="fate", phi0=0.1, w0=2.0'), [FLOWS + "flow_fates"]),
         (
             GYROSTAT.format(more='question="portrait"'),
-            [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
+            [FLOWS + "flow_fates"],
         ),
         (
             OWN.format(more='question="abel", phi0=0.0, w0=1.0, phi=1.0'),
@@ -130,7 +130,7 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
         ),
         (
             OWN.format(more='question="portrait"'),
-            [FLOWS + "flow_fates", FLOWS + "flow_abels_by_row"],
+            [FLOWS + "flow_fates"],
         ),
         (STATE.format(more=""), [f"survey.kernels.nutation.{name}" for name in BRUN]),
         (

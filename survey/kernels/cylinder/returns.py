@@ -19,7 +19,7 @@ from survey.kernels.cylinder.creeping import (
     stands_still,
     trapped,
 )
-from survey.kernels.cylinder.equilibria import ANGLE, FOCUS, KIND, captured
+from survey.kernels.cylinder.equilibria import ANGLE, BAR, FOCUS, KIND, F, captured
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, BOUND_G, TWO_PI, table, values
 from survey.kernels.cylinder.program import COLUMNS, MEAN
 from survey.kernels.cylinder.steps import (
@@ -30,15 +30,16 @@ from survey.kernels.cylinder.steps import (
     passage,
     time_of_turning,
 )
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel, part, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ROTATION, LIBRATION = 0, 1
 NO_IMAGE, UNKNOWN = 0, -1  # classes without an image
 # a node of a scan: x, class, D, map' (of a libration without an image, as it goes beyond the end of its
-# interval, minus the number of equilibria that it has passed), bar of D, time, left
-X, CLASS, CHANGE, SLOPE, ERROR, TIME, LEFT = range(7)
-NODE_SIZE = 7
+# interval, minus the number of equilibria that it has passed), bar of D, time and its bar, and of librations
+# the left turning point and w > 0 at the equilibrium to the left of x, with its bar
+X, CLASS, CHANGE, SLOPE, ERROR, TIME, TIME_ERROR, LEFT, SPEED, SPEED_ERROR = range(10)
+NODE_SIZE = 10
 (
     CYCLE_X,
     MULTIPLIER,
@@ -50,8 +51,11 @@ NODE_SIZE = 7
     INTERVAL,
     BELOW,
     ABOVE,
-) = range(10)
-CYCLE_SIZE = 10
+    PERIOD_BAR,
+    CYCLE_SPEED,
+    SPEED_BAR,
+) = range(13)
+CYCLE_SIZE = 13
 # edges of a scan: w_c and w_d of a rotation and the bar of that, D and its bar at the last node and at the first, the
 # number of nodes without an answer
 (
@@ -74,6 +78,7 @@ APART = 1e4  # times its bar, the distance from a cycle at which slopes of the m
 # classes are found no more exactly than that
 SIDES = 1e-10
 TINY = 1e-9  # rad: beside the angle of an equilibrium
+TURN_ROUNDING = 2e-15  # rad: of angles up to two turns
 
 
 @inline
@@ -82,9 +87,9 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
     T = table()
     how = setting(p, w0, tolerance)
     phi, w, saa, sab, sbb, e, y, y_error, t = section, w0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    node[X], node[CLASS] = w0, UNKNOWN
+    node[X], node[CLASS], node[TIME_ERROR] = w0, UNKNOWN, math.inf
     target, far, slow = section + TWO_PI, np.empty(PASSAGE), False
-    doubt = 0.0
+    doubt, late = 0.0, 0.0
     balanced = len(p) == COLUMNS or p[MEAN] == 0.0  # then w - F is periodic, and y its change
     for n in range(1, LIMIT):
         h = expand(begin, p, phi, w, how, T)
@@ -121,6 +126,7 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
                 t,
             )
             node[ERROR] = (min(own, other) if fast else own) + doubt
+            node[TIME_ERROR] = late + 1.2 * bar(n, saa) / w + ROUNDOFF_UP * n * t
             return
         if slow:
             f, g, _dg = values(p, phi)
@@ -133,7 +139,7 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
             certain = bar_phi + bar_w >= SIDES
             if crept(p, eqs, count, phi, w, bar_phi, bar_w, certain, target - phi, far):
                 phi, w, t, e, sbb, doubt = after_passage(far, n, t, e, doubt)
-                saa, sab, slow, balanced = 0.0, 0.0, True, False
+                saa, sab, slow, balanced, late = 0.0, 0.0, True, False, math.inf
 
 
 @inline
@@ -147,9 +153,11 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
     how = setting(p, 0.0, tolerance)
     phi, w, saa, sab, sbb, e, t, right = x0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False
     far, slow = np.empty(PASSAGE), False
-    doubt = 0.0
+    doubt, late = 0.0, 0.0
     node[X], node[CLASS], node[SLOPE] = x0, UNKNOWN, 0.0
-    focus, rest = focus_before(eqs, count, x0)
+    node[TIME_ERROR], node[SPEED], node[SPEED_ERROR] = math.inf, math.nan, math.inf
+    before, rest = equilibrium_before(eqs, count, x0)
+    focus = before if before >= 0 and eqs[before, KIND] == FOCUS else -1
     for n in range(1, LIMIT):
         h = expand(begin, p, phi, w, how, T)
         x1, w1, de, _dy = at(p, T, h)
@@ -160,6 +168,16 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             h = time_of_turning(at, p, T, h)
             x1, w1, de, _dy = at(p, T, h)
             w1 = 0.0
+        if right and phi < rest <= x1:
+            up = passage(at, p, T, rest, True, h)
+            v = at(p, T, up)[1]
+            aa, ab, bb = carried(p, T, up, v, saa, sab, sbb)
+            f = eqs[before, F]  # dw/dphi, where g = 0
+            own = bar(n, max(bb - 2.0 * f * ab + f * f * aa, 0.0))
+            node[SPEED], node[SPEED_ERROR] = (
+                v,
+                own + 1.2 * abs(f) * (eqs[before, BAR] + TURN_ROUNDING),
+            )
         saa, sab, sbb = carried(p, T, h, w1, saa, sab, sbb)
         phi, w, e, t = x1, w1, e + de, t + h
         if phi < x0 - TWO_PI or phi > high:
@@ -183,11 +201,13 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             certain = bar_phi + bar_w >= SIDES
             if crept(p, eqs, count, phi, w, bar_phi, bar_w, certain, TWO_PI, far):
                 phi, w, t, e, sbb, doubt = after_passage(far, n, t, e, doubt)
-                saa, sab, slow = 0.0, 0.0, True
+                saa, sab, slow, late = 0.0, 0.0, True, math.inf
         if turned and right:
             inside = between(eqs, count, node[LEFT], phi)
             node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa) + doubt
-            node[SLOPE] = math.exp(e) * values(p, x0)[1] / values(p, phi)[1]
+            g = values(p, phi)[1]
+            node[SLOPE] = math.exp(e) * values(p, x0)[1] / g
+            node[TIME_ERROR] = late + 1.2 * bar(n, sbb) / abs(g) + ROUNDOFF_UP * n * t
             node[CLASS] = (
                 inside if between(eqs, count, min(phi, x0), max(phi, x0)) == 0 else NO_IMAGE
             )
@@ -207,15 +227,15 @@ def runs_in(p, eqs, count, phi, w, bar):
 
 
 @kernel
-def focus_before(eqs, count, x):
-    """The number of the next equilibrium to the left of the angle x if that is a focus, or -1; its angle."""
+def equilibrium_before(eqs, count, x):
+    """The number of the next equilibrium to the left of the angle x, or -1, and its angle."""
     at, least = -1, math.inf
     for i in range(count):
         gap = x - eqs[i, ANGLE]
         gap -= TWO_PI * math.floor(gap / TWO_PI)
         if gap < least:
             at, least = i, gap
-    return at if at >= 0 and eqs[at, KIND] == FOCUS else -1, x - least
+    return at, x - least
 
 
 @kernel
@@ -240,154 +260,11 @@ def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
         libration(setting, begin, at, p, eqs, count, anchor, x, tolerance, node)
 
 
-@splice
-def fixed_points(
-    image_of, kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
-):
-    """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
-
-    Borders of a class, which are looked for at the `guesses` (ascending, see `borders`) first, are
-    bisected, so that a fixed point beside one is not lost; where D has no change of sign but dips
-    towards 0, the dip is followed down (a pair of cycles near its fold). edges: those of the scan.
-    """
-    nodes = np.zeros((MOST_NODES, NODE_SIZE))
-    size = scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes)
-    edges[BORDER], edges[IMAGE], edges[LAST_CHANGE], edges[LAST_ERROR] = (
-        math.nan,
-        math.nan,
-        nodes[size - 1, CHANGE],
-        nodes[size - 1, ERROR],
-    )
-    edges[FIRST_CHANGE], edges[FIRST_ERROR], edges[UNANSWERED] = (
-        nodes[0, CHANGE],
-        nodes[0, ERROR],
-        1.0 * (nodes[0, CLASS] == UNKNOWN),
-    )
-    m, grain = np.zeros(NODE_SIZE), 4e-15 * (xs[-1] - xs[0])
-    for i in range(1, size):
-        a, b = nodes[i - 1], nodes[i]
-        # the scan has found both ends of what is unknown: at a border alone nothing is lost
-        wide = b[X] - a[X] > 8e-15 * abs(b[X]) + grain
-        edges[UNANSWERED] += a[CLASS] == UNKNOWN and b[CLASS] == UNKNOWN and wide
-        if kind == LIBRATION and a[CLASS] != b[CLASS]:  # does a cycle hide beside the border?
-            below, above = nodes[max(i - 2, 0)], nodes[min(i + 1, size - 1)]
-            hidden = is_open(a) and not rises_from(below, a)
-            edges[UNANSWERED] += hidden or (is_open(b) and not falls_to(b, above))
-        if b[CLASS] == 1.0 and a[CLASS] != 1.0:
-            edges[BORDER], edges[IMAGE], edges[IMAGE_ERROR] = b[X], b[X] + b[CHANGE], b[ERROR]
-        if found + 2 > len(cycles) or b[X] <= a[X]:
-            continue
-        if jumps(a, b) or jumps(b, a):  # of the cycle there its place is known, and no more
-            inner, side = (a, 1.0) if a[CLASS] > 0.0 else (b, -1.0)
-            write_cycle(a, b, inner, interval, 0.0, cycles[found])
-            cycles[found, CYCLE_BAR] = b[X] - a[X] + 4e-16 * abs(b[X])
-            cycles[found, MULTIPLIER_BAR] = math.inf
-            cycles[found, CYCLE_CLASS] = -inner[CLASS]
-            cycles[found, BELOW], cycles[found, ABOVE] = -side, side
-            found += 1
-        if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS]:
-            continue
-        copy(m, b)
-        if differ(a, b) or followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
-            touching = not differ(a, b) and not differ(a, m)
-            if touching:  # touches 0 within the error bound: one cycle or two or none
-                write_cycle(a, b, m, interval, steepness(kind, p, m[X]), cycles[found])
-                cycles[found, CYCLE_BAR] = max(cycles[found, CYCLE_BAR], 0.1 * (b[X] - a[X]))
-                cycles[found, CYCLE_CLASS] = -m[CLASS]
-                found += 1
-                continue
-            for half in range(2):
-                low, high = (a, m) if half == 0 else (m, b)
-                if high[X] > low[X] and differ(low, high):
-                    solved(
-                        image_of,
-                        kind,
-                        p,
-                        eqs,
-                        count,
-                        anchor,
-                        interval,
-                        low,
-                        high,
-                        tolerance,
-                        cycles[found],
-                    )
-                    found += 1
-    return found
-
-
 @kernel
 def copy(target, source):
     """Copy a node (an element-wise loop compiles ten times faster than an assignment of slices)."""
     for i in range(len(source)):
         target[i] = source[i]
-
-
-@splice
-def scan(image_of, kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
-    """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number.
-
-    Rotations have no image below their border, and librations none between two borders if they have none
-    behind the first: there nodes of the lattice are left out.
-    """
-    a, c, d = np.zeros(NODE_SIZE), np.zeros(NODE_SIZE), np.zeros(NODE_SIZE)
-    further = np.zeros(NODE_SIZE)
-    grain = 1e-15 * (xs[-1] - xs[0])
-    last = len(guesses) - 1
-    i = last_before(xs, guesses[last]) if kind == ROTATION and last >= 0 else 0
-    image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
-    if i > 0 and nodes[0, CLASS] != NO_IMAGE:
-        i = 0
-        image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
-    size, x, step, between = 1, xs[i], 0.0, 0
-    i += 1
-    skips = kind == LIBRATION and not (last >= 0 and math.isnan(guesses[last]))
-    while i < len(xs):
-        copy(a, nodes[size - 1])
-        guess = first_beyond(a[X], guesses)
-        if between == 0 and a[CLASS] > 0.0:
-            between, at, to, wide = ahead(xs, x, step, i, guess)
-            if between > 1:
-                image_of(kind, p, eqs, count, anchor, at, tolerance, further)
-                if is_plain(a, further) and size < len(nodes):
-                    copy(nodes[size], further)
-                    size, step, i, between = size + 1, wide, to, 0
-                    continue
-        near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
-        if between == 1 and further[X] > a[X]:
-            copy(c, further)
-        else:
-            image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
-        between = max(between - 1, 0)
-        crossed, reach = c[CLASS] != a[CLASS], 0.45 * (2e-15 * abs(a[X]) + grain)
-        while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
-            middle = next_place(a[X], c[X], guess, reach)
-            if not a[X] < middle < c[X]:
-                break
-            image_of(kind, p, eqs, count, anchor, middle, tolerance, d)
-            if d[CLASS] == nodes[size - 1, CLASS]:
-                copy(a, d)
-            else:
-                copy(c, d)
-        if crossed and size + 3 < len(nodes):
-            beside = a[X] - 1e5 * reach
-            if kind == LIBRATION and is_open(a) and beside > nodes[size - 1, X]:  # see `rises_from`
-                image_of(kind, p, eqs, count, anchor, beside, tolerance, nodes[size])
-                size += nodes[size, CLASS] == a[CLASS]
-            copy(nodes[size], a)
-            copy(nodes[size + 1], c)
-            size, x, step, between = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain), 0
-            if c[X] >= xs[i]:
-                i += 1
-        else:
-            if size < len(nodes):
-                copy(nodes[size], c)
-                size += 1
-            step *= 10.0
-            i += not near
-            if skips and c[CLASS] == NO_IMAGE:
-                i, step = max(i, last_before(xs, first_beyond(c[X], guesses))), 0.0
-    return size
 
 
 @kernel
@@ -484,71 +361,6 @@ def differ(a, b):
     return (a[CHANGE] > 0.0) != (b[CHANGE] > 0.0)
 
 
-@splice
-def followed_down(image_of, kind, p, eqs, count, anchor, a, b, tolerance, m):
-    """Follow a dip of |D| between a and b; True when D crosses 0 or touches it at the node m."""
-    left, right = np.empty(7), np.empty(7)
-    copy(left, a)
-    copy(right, b)
-    sign = 1.0 if a[CHANGE] > 0.0 else -1.0
-    for _ in range(40):
-        da, db = sign * (left[SLOPE] - 1.0), sign * (right[SLOPE] - 1.0)
-        if not (da < 0.0 < db):
-            return False
-        # tangents meet below a convex D: nothing to find while they meet above 0
-        low = (
-            sign * left[CHANGE] * db - sign * right[CHANGE] * da + da * db * (right[X] - left[X])
-        ) / (db - da)
-        if low > 0.0:
-            return False
-        image_of(kind, p, eqs, count, anchor, 0.5 * (left[X] + right[X]), tolerance, m)
-        if m[CLASS] != a[CLASS]:
-            return False
-        if sign * m[CHANGE] <= 0.0 or right[X] - left[X] < 1e-9 * abs(right[X]):
-            return sign * m[CHANGE] <= 2.0 * m[ERROR]
-        if sign * (m[SLOPE] - 1.0) < 0.0:
-            copy(left, m)
-        else:
-            copy(right, m)
-    return False
-
-
-@splice
-def solved(image_of, kind, p, eqs, count, anchor, interval, a, b, tolerance, row):
-    """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
-    low, high, m = a[X], b[X], np.zeros(NODE_SIZE)
-    left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)
-    rising = b[CHANGE] > 0.0
-    below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]  # is the sign of D certain?
-    share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
-    x = low + min(max(share, 0.02), 0.98) * (high - low)
-    for _ in range(60):
-        image_of(kind, p, eqs, count, anchor, x, tolerance, m)
-        if m[CLASS] != a[CLASS]:
-            break
-        slope, certain = m[SLOPE] - 1.0, abs(m[CHANGE]) > m[ERROR]
-        if (m[CHANGE] > 0.0) == rising:
-            high, above = x, above or certain
-        else:
-            low, below = x, below or certain
-        new = x - m[CHANGE] / slope if slope != 0.0 else low
-        if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
-            break
-        x = new if low < new < high else 0.5 * (low + high)
-    bar = cycle_bar(
-        m
-    )  # how much the slope changes within it shows the map at so many times the bar
-    apart = min(APART * bar, 0.1 * (m[X] - a[X]), 0.1 * (b[X] - m[X]))
-    for side in (-1.0, 1.0):
-        beside, end = (left, a) if side < 0.0 else (right, b)
-        image_of(kind, p, eqs, count, anchor, m[X] + side * apart, tolerance, beside)
-        if beside[CLASS] != m[CLASS] or apart < bar:
-            copy(beside, end)
-    write_cycle(left, right, m, interval, steepness(kind, p, m[X]), row)
-    if not (below and above):  # D may change sign by its rounding alone
-        row[CYCLE_CLASS], row[BELOW], row[ABOVE] = -m[CLASS], row[BELOW] * below, row[ABOVE] * above
-
-
 @inline
 def steepness(kind, p, x):
     """Relative change of map' per unit of D: of its factor w/w1, or g/g1."""
@@ -562,6 +374,14 @@ def cycle_bar(m):
     return 1.2 * change / max(abs(m[SLOPE] - 1.0), 1e-12) + 4e-16 * abs(m[X])
 
 
+@inline
+def bar_of(left, m, right, column, bar):
+    """The error bound of a number at a cycle, whose own is in the next column, from nodes about that one."""
+    change = max(abs(left[column] - m[column]), abs(right[column] - m[column]))
+    reach = min(m[X] - left[X], right[X] - m[X])
+    return 1.2 * change / reach * bar + 2.0 * m[column + 1]
+
+
 @kernel
 def write_cycle(a, b, m, interval, steep, row):
     """Note the cycle at node m between a and b; its bar from those of D and of the slope."""
@@ -572,5 +392,233 @@ def write_cycle(a, b, m, interval, steep, row):
     row[MULTIPLIER_BAR] = 1e-14 * (1.0 + m[SLOPE]) + 20.0 * m[ERROR] + 3.0 * bend * row[CYCLE_BAR]
     row[MULTIPLIER_BAR] += 2.0 * m[SLOPE] * steep * (abs(m[CHANGE]) + m[ERROR])
     row[CYCLE_CLASS], row[INTERVAL] = m[CLASS], interval
+    row[PERIOD_BAR] = row[CYCLE_SPEED] = row[SPEED_BAR] = math.inf
     row[BELOW] = 1.0 if a[CHANGE] > 0.0 else -1.0
     row[ABOVE] = 1.0 if b[CHANGE] > 0.0 else -1.0
+
+
+def fixed_points_of(image_of):
+    """What finds all fixed points of the return maps that `image_of` computes (see `image`)."""
+
+    @part
+    def scan(kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
+        """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number.
+
+        Rotations have no image below their border, and librations none between two borders if they have none
+        behind the first: there nodes of the lattice are left out.
+        """
+        a, c, d = np.zeros(NODE_SIZE), np.zeros(NODE_SIZE), np.zeros(NODE_SIZE)
+        further = np.zeros(NODE_SIZE)
+        grain = 1e-15 * (xs[-1] - xs[0])
+        last = len(guesses) - 1
+        i = last_before(xs, guesses[last]) if kind == ROTATION and last >= 0 else 0
+        image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
+        if i > 0 and nodes[0, CLASS] != NO_IMAGE:
+            i = 0
+            image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
+        size, x, step, between = 1, xs[i], 0.0, 0
+        i += 1
+        skips = kind == LIBRATION and not (last >= 0 and math.isnan(guesses[last]))
+        while i < len(xs):
+            copy(a, nodes[size - 1])
+            guess = first_beyond(a[X], guesses)
+            if between == 0 and a[CLASS] > 0.0:
+                between, at, to, wide = ahead(xs, x, step, i, guess)
+                if between > 1:
+                    image_of(kind, p, eqs, count, anchor, at, tolerance, further)
+                    if is_plain(a, further) and size < len(nodes):
+                        copy(nodes[size], further)
+                        size, step, i, between = size + 1, wide, to, 0
+                        continue
+            near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
+            if between == 1 and further[X] > a[X]:
+                copy(c, further)
+            else:
+                image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
+            between = max(between - 1, 0)
+            crossed, reach = c[CLASS] != a[CLASS], 0.45 * (2e-15 * abs(a[X]) + grain)
+            while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
+                middle = next_place(a[X], c[X], guess, reach)
+                if not a[X] < middle < c[X]:
+                    break
+                image_of(kind, p, eqs, count, anchor, middle, tolerance, d)
+                if d[CLASS] == nodes[size - 1, CLASS]:
+                    copy(a, d)
+                else:
+                    copy(c, d)
+            if crossed and size + 3 < len(nodes):
+                beside = a[X] - 1e5 * reach
+                if (
+                    kind == LIBRATION and is_open(a) and beside > nodes[size - 1, X]
+                ):  # see `rises_from`
+                    image_of(kind, p, eqs, count, anchor, beside, tolerance, nodes[size])
+                    size += nodes[size, CLASS] == a[CLASS]
+                copy(nodes[size], a)
+                copy(nodes[size + 1], c)
+                size, x, step, between = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain), 0
+                if c[X] >= xs[i]:
+                    i += 1
+            else:
+                if size < len(nodes):
+                    copy(nodes[size], c)
+                    size += 1
+                step *= 10.0
+                i += not near
+                if skips and c[CLASS] == NO_IMAGE:
+                    i, step = max(i, last_before(xs, first_beyond(c[X], guesses))), 0.0
+        return size
+
+    @part
+    def followed_down(kind, p, eqs, count, anchor, a, b, tolerance, m):
+        """Follow a dip of |D| between a and b; True when D crosses 0 or touches it at the node m."""
+        left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)
+        copy(left, a)
+        copy(right, b)
+        sign = 1.0 if a[CHANGE] > 0.0 else -1.0
+        for _ in range(40):
+            da, db = sign * (left[SLOPE] - 1.0), sign * (right[SLOPE] - 1.0)
+            if not (da < 0.0 < db):
+                return False
+            # tangents meet below a convex D: nothing to find while they meet above 0
+            low = (
+                sign * left[CHANGE] * db
+                - sign * right[CHANGE] * da
+                + da * db * (right[X] - left[X])
+            ) / (db - da)
+            if low > 0.0:
+                return False
+            image_of(kind, p, eqs, count, anchor, 0.5 * (left[X] + right[X]), tolerance, m)
+            if m[CLASS] != a[CLASS]:
+                return False
+            if sign * m[CHANGE] <= 0.0 or right[X] - left[X] < 1e-9 * abs(right[X]):
+                return sign * m[CHANGE] <= 2.0 * m[ERROR]
+            if sign * (m[SLOPE] - 1.0) < 0.0:
+                copy(left, m)
+            else:
+                copy(right, m)
+        return False
+
+    @part
+    def solved(kind, p, eqs, count, anchor, interval, a, b, tolerance, row):
+        """The fixed point between a and b, where D changes sign: Newton's method kept inside a bracket."""
+        low, high, m = a[X], b[X], np.zeros(NODE_SIZE)
+        left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)
+        rising = b[CHANGE] > 0.0
+        below, above = (
+            abs(a[CHANGE]) > a[ERROR],
+            abs(b[CHANGE]) > b[ERROR],
+        )  # is the sign of D certain?
+        share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
+        x = low + min(max(share, 0.02), 0.98) * (high - low)
+        for _ in range(60):
+            image_of(kind, p, eqs, count, anchor, x, tolerance, m)
+            if m[CLASS] != a[CLASS]:
+                break
+            slope, certain = m[SLOPE] - 1.0, abs(m[CHANGE]) > m[ERROR]
+            if (m[CHANGE] > 0.0) == rising:
+                high, above = x, above or certain
+            else:
+                low, below = x, below or certain
+            new = x - m[CHANGE] / slope if slope != 0.0 else low
+            if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
+                break
+            x = new if low < new < high else 0.5 * (low + high)
+        bar = cycle_bar(
+            m
+        )  # how much the slope changes within it shows the map at so many times the bar
+        apart = min(APART * bar, 0.1 * (m[X] - a[X]), 0.1 * (b[X] - m[X]))
+        image_of(kind, p, eqs, count, anchor, m[X] - apart, tolerance, left)
+        image_of(kind, p, eqs, count, anchor, m[X] + apart, tolerance, right)
+        lonely = left[CLASS] != m[CLASS] or right[CLASS] != m[CLASS] or apart < bar
+        if lonely:
+            copy(left, a)
+            copy(right, b)
+        write_cycle(left, right, m, interval, steepness(kind, p, m[X]), row)
+        if not lonely:
+            row[PERIOD_BAR] = bar_of(left, m, right, TIME, bar)
+            row[CYCLE_SPEED] = m[SPEED] if kind == LIBRATION else m[X]
+            row[SPEED_BAR] = bar_of(left, m, right, SPEED, bar) if kind == LIBRATION else bar
+        if not (below and above):  # D may change sign by its rounding alone
+            row[CYCLE_CLASS], row[BELOW], row[ABOVE] = (
+                -m[CLASS],
+                row[BELOW] * below,
+                row[ABOVE] * above,
+            )
+
+    @part
+    def fixed_points(
+        kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
+    ):
+        """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
+
+        Borders of a class, which are looked for at the `guesses` (ascending, see `borders`) first, are
+        bisected, so that a fixed point beside one is not lost; where D has no change of sign but dips
+        towards 0, the dip is followed down (a pair of cycles near its fold). edges: those of the scan.
+        """
+        if len(xs) == 0:
+            return found
+        nodes = np.zeros((MOST_NODES, NODE_SIZE))
+        size = scan(kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes)
+        edges[BORDER], edges[IMAGE], edges[LAST_CHANGE], edges[LAST_ERROR] = (
+            math.nan,
+            math.nan,
+            nodes[size - 1, CHANGE],
+            nodes[size - 1, ERROR],
+        )
+        edges[FIRST_CHANGE], edges[FIRST_ERROR], edges[UNANSWERED] = (
+            nodes[0, CHANGE],
+            nodes[0, ERROR],
+            1.0 * (nodes[0, CLASS] == UNKNOWN),
+        )
+        m, grain = np.zeros(NODE_SIZE), 4e-15 * (xs[-1] - xs[0])
+        for i in range(1, size):
+            a, b = nodes[i - 1], nodes[i]
+            # the scan has found both ends of what is unknown: at a border alone nothing is lost
+            wide = b[X] - a[X] > 8e-15 * abs(b[X]) + grain
+            edges[UNANSWERED] += a[CLASS] == UNKNOWN and b[CLASS] == UNKNOWN and wide
+            if kind == LIBRATION and a[CLASS] != b[CLASS]:  # does a cycle hide beside the border?
+                below, above = nodes[max(i - 2, 0)], nodes[min(i + 1, size - 1)]
+                hidden = is_open(a) and not rises_from(below, a)
+                edges[UNANSWERED] += hidden or (is_open(b) and not falls_to(b, above))
+            if b[CLASS] == 1.0 and a[CLASS] != 1.0:
+                edges[BORDER], edges[IMAGE], edges[IMAGE_ERROR] = b[X], b[X] + b[CHANGE], b[ERROR]
+            if found + 2 > len(cycles) or b[X] <= a[X]:
+                continue
+            if jumps(a, b) or jumps(b, a):  # of the cycle there its place is known, and no more
+                inner, side = (a, 1.0) if a[CLASS] > 0.0 else (b, -1.0)
+                write_cycle(a, b, inner, interval, 0.0, cycles[found])
+                cycles[found, CYCLE_BAR] = b[X] - a[X] + 4e-16 * abs(b[X])
+                cycles[found, MULTIPLIER_BAR] = math.inf
+                cycles[found, CYCLE_CLASS] = -inner[CLASS]
+                cycles[found, BELOW], cycles[found, ABOVE] = -side, side
+                found += 1
+            if a[CLASS] <= 0.0 or a[CLASS] != b[CLASS]:
+                continue
+            copy(m, b)
+            if differ(a, b) or followed_down(kind, p, eqs, count, anchor, a, b, tolerance, m):
+                touching = not differ(a, b) and not differ(a, m)
+                if touching:  # touches 0 within the error bound: one cycle or two or none
+                    write_cycle(a, b, m, interval, steepness(kind, p, m[X]), cycles[found])
+                    cycles[found, CYCLE_BAR] = max(cycles[found, CYCLE_BAR], 0.1 * (b[X] - a[X]))
+                    cycles[found, CYCLE_CLASS] = -m[CLASS]
+                    found += 1
+                    continue
+                for half in range(2):
+                    low, high = (a, m) if half == 0 else (m, b)
+                    if high[X] > low[X] and differ(low, high):
+                        solved(
+                            kind,
+                            p,
+                            eqs,
+                            count,
+                            anchor,
+                            interval,
+                            low,
+                            high,
+                            tolerance,
+                            cycles[found],
+                        )
+                        found += 1
+        return found
+
+    return fixed_points

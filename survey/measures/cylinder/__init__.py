@@ -48,10 +48,6 @@ METHODS = {
             "the same without times, whose planes may hold anything where that saves time",
             ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
         ),
-        "flow_abels_by_row": Function(
-            "the same, one row after the other, where that is compiled sooner",
-            ("P", "starts", "targets", "tolerance", "limit", "planes", "status"),
-        ),
         "flow_trajectories_ahead": Function(
             "compile `flow_trajectories` for `own` functions, while another process compiles what they need besides",
             ("own",),

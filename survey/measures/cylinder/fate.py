@@ -445,6 +445,11 @@ def _behind(method, p, eqs, section, saddle, tolerance):
 
 def borders(method, kind, p, eqs, section, tolerance):
     """Where a return map of the flow p ends, as in `kernels.cylinder.borders`, ascending."""
+    if waiting.other_compiler:  # compile what comes next, while that process compiles this
+        none, table = np.empty(0), np.empty((0, rt.CYCLE_SIZE))
+        given = kind, p, eqs, len(eqs), section, 0, none, none, tolerance
+        method.flow_cycles(*given, table, 0, np.empty(rt.EDGES))
+        waiting.wait("borders")
     back, rests = p.copy(), eqs.copy()  # in reversed time
     back[OF_F] *= -1.0
     rests[:, eq.F] *= -1.0
@@ -464,22 +469,13 @@ def _far_cycle(p, section, K, L, scale):
     b12, b31 = p[OF_F]
     w = -L / (math.pi * K) - 2.0 * b31 + b12 * math.sin(section) + b31 * math.cos(section) - b31
     w = max(w, 30.0 * scale)
-    slope = math.pi * K / w**3
-    side = np.sign(K)
-    return np.array(
-        [
-            w,
-            1.0 + slope,
-            2 * math.pi / w,
-            10.0 * scale,
-            abs(slope) + 1e-15,
-            0.0,
-            1.0,
-            0,
-            -side,
-            side,
-        ]
-    )
+    slope, side, bar = math.pi * K / w**3, np.sign(K), 10.0 * scale
+    row = np.zeros(rt.CYCLE_SIZE)
+    row[[rt.CYCLE_X, rt.CYCLE_BAR, rt.CYCLE_SPEED, rt.SPEED_BAR]] = w, bar, w, bar
+    row[[rt.MULTIPLIER, rt.MULTIPLIER_BAR]] = 1.0 + slope, abs(slope) + 1e-15
+    row[[rt.PERIOD, rt.PERIOD_BAR]] = 2.0 * math.pi / w, 2.0 * math.pi / w * bar / (w - bar)
+    row[[rt.CYCLE_CLASS, rt.BELOW, rt.ABOVE]] = 1.0, -side, side
+    return row
 
 
 def _librations(method, p, eqs, folded):

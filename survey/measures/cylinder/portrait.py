@@ -116,13 +116,15 @@ def solve(method, systems, rtol, beside=None):
         if len(cycles) > CYCLES:
             result["verdict"][i], result["status"][i] = UNDECIDED, TOO_MANY
         listed += [ListedCycle(i, at, *cycle, s, six) for at, cycle in enumerate(cycles[:CYCLES])]
-    for kinds, timed in (
+    for kinds, followed in (
         ((ROTATION_PLUS, ROTATION_MINUS), _rotations),
         ((LIBRATION,), _librations),
     ):
         some = [cycle for cycle in listed if cycle.kind in kinds]
-        if some:
-            _write(some, timed(method, some, rtol), result)
+        columns = np.array([_of_map(cycle) for cycle in some])
+        for at in np.flatnonzero([not np.isfinite(row).all() for row in columns]):
+            columns[at] = followed(method, [some[at]], rtol)
+        _write(some, columns, result)
     return result
 
 
@@ -230,6 +232,12 @@ def _far(row, K, scale):
     )
 
 
+def _of_map(cycle):
+    """w, its bound, period, its bound of a cycle, as the return map gives them; infinite where it does not."""
+    row, side = cycle.row, -1.0 if cycle.kind == ROTATION_MINUS else 1.0
+    return side * row[rt.CYCLE_SPEED], *row[[rt.SPEED_BAR, rt.PERIOD, rt.PERIOD_BAR]]
+
+
 def _rotations(method, cycles, rtol):
     """|w|, its bound, period, its bound of rotation cycles, in columns: w on the section, the
     period by one turn.
@@ -242,7 +250,7 @@ def _rotations(method, cycles, rtol):
     def period(x):
         rows = solution.rows(six, section, side * np.maximum(x, 0.0))
         floats, status = solution.abel(
-            method, rows, (section + 2.0 * math.pi * side)[:, None], rtol, by_row=True
+            method, rows, (section + 2.0 * math.pi * side)[:, None], rtol
         )
         return np.where(status[:, 0] == OK, floats[:, 0, rc.TIME], np.nan), floats[
             :, 0, rc.TIME_BAR
@@ -267,7 +275,7 @@ def _librations(method, cycles, rtol):
         rows = solution.rows(six, x, np.zeros(len(x)))
         rows[:, OF_F] *= b
         floats, status = solution.abel(
-            method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol, by_row=True
+            method, rows, np.column_stack([angle, angle - 2.0 * math.pi]), rtol
         )
         met = (status[:, 0] == OK) & (status[:, 1] == TURNING)
         return np.where(met[:, None, None], floats, np.nan)

@@ -7,7 +7,6 @@ that misses the requested accuracy is solved again with smaller steps, and the b
 
 import numpy as np
 
-from survey import waiting
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.accuracy import all_within
 from survey.kernels.cylinder.flow import BOUND_F, BOUND_G, spread, spread_programs
@@ -191,26 +190,25 @@ def _count(method, rows, times, tolerance, asked, results):
         turnings[pick] = np.where(status[pick] == OK, counted, turnings[pick])
 
 
-def abel(method, rows, targets, rtol, before=False, by_row=False, timed=True):
+def abel(method, rows, targets, rtol, before=False, timed=True):
     """VALUE to TIME_BAR of `records` (last axis) and status at phi = `targets` (rows, columns).
 
     Where w0 = 0 and g != 0 the solution starts at its turning point; it is followed forward in
     time, or backward if `before`; both branches lie to the side of g, and at targets on the other
     side it has turned at t = 0.
 
-    `by_row`: one row after the other, which is compiled 12 s sooner than lock step: for those who
-    need few. Unless `timed`, TIME and TIME_BAR need not be known, and say nothing.
+    Unless `timed`, TIME and TIME_BAR need not be known, and say nothing.
     """
-    return abel_and_met(method, rows, targets, rtol, before, by_row, timed)[0]
+    return abel_and_met(method, rows, targets, rtol, before, timed)[0]
 
 
-def abel_and_met(method, rows, targets, rtol, before=False, by_row=False, timed=True):
+def abel_and_met(method, rows, targets, rtol, before=False, timed=True):
     """As `abel`, and whether every point is known to meet the requested accuracy."""
     back = rows[:, rc.W0] == 0.0 if before else np.zeros(len(rows), bool)
     phi0, past = rows[:, rc.PHI0, None], back | (rows[:, rc.W0] < 0)
     least = distinct(targets).min(axis=1, keepdims=True, initial=np.inf)
     if targets.size and (past == past[0]).all() and (least >= phi0).all():  # as a rule
-        return _branch(method, rows, targets, rtol, 1.0, past[0], by_row, timed)
+        return _branch(method, rows, targets, rtol, 1.0, past[0], timed)
     planes = np.full((rc.STATE, *targets.shape), np.nan)
     status = np.zeros(targets.shape, dtype=np.int8)
     good = not np.isnan(least).any()
@@ -228,7 +226,7 @@ def abel_and_met(method, rows, targets, rtol, before=False, by_row=False, timed=
                 at = targets[some, columns]
             else:  # the start stands for the angles on the other side
                 columns, at = slice(None), np.where(mine, targets[some], phi0[some])
-            found, met = _branch(method, rows[some], at, rtol, side, past, by_row, timed)
+            found, met = _branch(method, rows[some], at, rtol, side, past, timed)
             good &= met
             for result, new in zip(
                 (*planes, status), (*found[0].transpose(2, 0, 1), found[1]), strict=True
@@ -239,12 +237,12 @@ def abel_and_met(method, rows, targets, rtol, before=False, by_row=False, timed=
     return (planes.transpose(1, 2, 0), status), good
 
 
-def _branch(method, rows, targets, rtol, side, past, by_row, timed):
+def _branch(method, rows, targets, rtol, side, past, timed):
     """As `abel_and_met`, for targets on one side of phi0 (1 or -1), which the motion reaches at t < 0 if `past`."""
     rows = reverse(rows) if past else rows
     rows = mirror(rows) if side < 0 else rows
     (floats, status), met = _in_phi(
-        method, rows, side * targets if side < 0 else targets, rtol, by_row, timed
+        method, rows, side * targets if side < 0 else targets, rtol, timed
     )
     if side < 0 or past:
         floats[..., rc.VALUE] *= np.where(status == TURNING, side, side * (-1.0 if past else 1.0))
@@ -255,14 +253,12 @@ def _branch(method, rows, targets, rtol, side, past, by_row, timed):
     return (floats, status), met
 
 
-def _in_phi(method, rows, targets, rtol, by_row, timed):
+def _in_phi(method, rows, targets, rtol, timed):
     targets, back = _sorted(targets)
-    solve = getattr(method, "flow_abels_by_row", method.flow_abels) if by_row else method.flow_abels
+    solve = method.flow_abels
     if not timed:
         solve = getattr(method, "flow_abels_untimed", solve)
     budget = STEPS * min(method.FLOW_WORK, 10)
-    if by_row:
-        waiting.wait("abels")
 
     def run(pick, tolerance):
         P, starts = split(rows[pick])
