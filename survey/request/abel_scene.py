@@ -76,9 +76,9 @@ class AbelScene(FunctionScene):
     def cost(self, options, sizes):
         """Seconds per point, roughly: one solution serves its dense outputs, one set of cycles all fates."""
         if options["question"] == "portrait":
-            return 1.5e-2
+            return 4e-3
         if options["question"] == "fate":
-            return basins.cost(sizes["phi0"] * sizes["w0"], 3e-4, 2e-2)
+            return basins.cost(sizes["phi0"] * sizes["w0"], 3e-4, 4e-3)
         if options["question"] == "trajectory":
             return 8e-5 / sizes["t"] + 2e-7
         return 1.5e-5 / sizes["phi"] + 2e-7

@@ -256,7 +256,7 @@ def cost(options, sizes):
     of a system.
     """
     if options["question"] == "portrait":
-        return 9e-3
+        return 3e-3
     if "separatrix" in options and options["question"] == "fate":
         return 5e-3
     if "separatrix" in options:  # in double-double arithmetic, but where b = 0
@@ -265,7 +265,7 @@ def cost(options, sizes):
         return 6.5e-6 / sizes["t"] + 2e-7
     if options["question"] == "abel":
         return 3e-6 / sizes["phi"] + 3e-7
-    return basins.cost(sizes["phi0"] * sizes["w0"], 1.3e-4, 6e-3)
+    return basins.cost(sizes["phi0"] * sizes["w0"], 1.3e-4, 1.5e-3)
 
 
 def solve(point, request):
