@@ -1,7 +1,7 @@
 """Where the orbits that have a return map (`returns`) end: at the stable branches of the saddles.
 
 Rotations: an orbit above one that completes its turn completes it too, since orbits do not cross and there is
-no equilibrium at w > 0. So the map is defined from a velocity w_c on, whose orbit tends to a saddle.
+no equilibrium at w > 0. So the map is defined from a velocity w_c on, whose orbit tends to a saddle, or for all w > 0.
 Librations: orbits of one class pass round the same equilibria. The orbits between two of a class form a strip
 without an equilibrium, so they belong to it as well. One at the border of a class tends to a saddle, or to a
 node along its steeper direction: on one side of that orbits run into the node, on the other they pass it.
@@ -17,7 +17,7 @@ import numpy as np
 
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.branches import FURTHEST, unstable
-from survey.kernels.cylinder.equilibria import ANGLE, DEGENERATE, KIND, NODE, SADDLE
+from survey.kernels.cylinder.equilibria import ANGLE, DEGENERATE, KIND, NODE, SADDLE, offset
 from survey.kernels.cylinder.flow import BOUND_DG, BOUND_F, TWO_PI, longest_step, table
 from survey.kernels.cylinder.returns import ROTATION
 from survey.kernels.cylinder.steps import passage, until_turning
@@ -28,6 +28,7 @@ from survey.kernels.jit import inline
 PLACE, OF = range(2)
 BORDER = 2
 LIMIT = 400  # steps
+NEAR = 1e-6  # rad
 STOPPED = 1e-10  # velocity, in those of the system, from which on a branch is not followed
 
 
@@ -66,8 +67,11 @@ def borders(setting, begin, at, kind, p, eqs, count, section, tolerance, out):
             if turned and (kind == ROTATION or sign > 0.0):
                 place, lost = x1 if kind != ROTATION else place, False
                 break
-            if abs(x1 - first) > 2.0 * TWO_PI or (not turned and abs(w1) < least):
+            if abs(x1 - first) > 2.0 * TWO_PI:  # winds round the cylinder, as motions beside it do
                 lost = False
+                break
+            if not turned and abs(w1) < least:
+                lost = beside_saddle(eqs, count, x1)
                 break
             phi, w = x1, 0.0 if turned else w1
             sign = -sign if turned else sign
@@ -77,6 +81,15 @@ def borders(setting, begin, at, kind, p, eqs, count, section, tolerance, out):
                 write(eqs, count, out[found])
             found += 1
     return found
+
+
+@inline
+def beside_saddle(eqs, count, phi):
+    """Is phi that of a saddle, about?"""
+    for i in range(count):
+        if eqs[i, KIND] == SADDLE and abs(offset(phi, eqs[i, ANGLE])[0]) < NEAR:
+            return True
+    return False
 
 
 @inline

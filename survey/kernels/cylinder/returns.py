@@ -12,6 +12,7 @@ import math
 import numpy as np
 
 from survey.kernels.cylinder.creeping import (
+    LEAST_EXPONENT,
     PASSAGE,
     after_passage,
     crept,
@@ -56,8 +57,8 @@ NODE_SIZE = 10
     SPEED_BAR,
 ) = range(13)
 CYCLE_SIZE = 13
-# edges of a scan: w_c and w_d of a rotation and the bar of that, D and its bar at the last node and at the first, the
-# number of nodes without an answer
+# edges of a scan: w_c and w_d of a rotation and the bar of that, D and its bar at the last node and at the first, how
+# often it stays open whether there is a cycle
 (
     BORDER,
     IMAGE,
@@ -71,9 +72,11 @@ CYCLE_SIZE = 13
 EDGES = 8
 MOST_CYCLES = 16
 MOST_NODES = 400
-STRIDE = 4  # nodes of a lattice of which three are left out where D is plain
+STRIDE = 4  # places of a scan of which three are left out where D is plain,
+BENT = 1.0  # log|D| bends by less than that between them,
+GAP = 0.05  # and places between a motion that is caught by a focus and one that is not, of those of the lattice
 LIMIT = 40_000
-APART = 1e4  # times its bar, the distance from a cycle at which slopes of the map are compared
+APART = 1e4  # times its bar, the distance from a cycle at which its slope, its period and its speed are compared
 # error up to which a motion beside a saddle that creeps counts as on the side where it is: borders of
 # classes are found no more exactly than that
 SIDES = 1e-10
@@ -122,7 +125,7 @@ def rotation(setting, begin, at, p, eqs, count, section, w0, tolerance, node):
             node[CLASS], node[CHANGE], node[SLOPE], node[TIME] = (
                 1.0,
                 change,
-                math.exp(e) * w0 / (w0 + change),
+                math.exp(max(e, LEAST_EXPONENT)) * w0 / (w0 + change),
                 t,
             )
             node[ERROR] = (min(own, other) if fast else own) + doubt
@@ -206,7 +209,7 @@ def libration(setting, begin, at, p, eqs, count, high, x0, tolerance, node):
             inside = between(eqs, count, node[LEFT], phi)
             node[CHANGE], node[TIME], node[ERROR] = phi - x0, t, bar(n, saa) + doubt
             g = values(p, phi)[1]
-            node[SLOPE] = math.exp(e) * values(p, x0)[1] / g
+            node[SLOPE] = math.exp(max(e, LEAST_EXPONENT)) * values(p, x0)[1] / g
             node[TIME_ERROR] = late + 1.2 * bar(n, sbb) / abs(g) + ROUNDOFF_UP * n * t
             node[CLASS] = (
                 inside if between(eqs, count, min(phi, x0), max(phi, x0)) == 0 else NO_IMAGE
@@ -269,8 +272,8 @@ def copy(target, source):
 
 @kernel
 def ahead(xs, x, step, i, guess):
-    """How many places of the scan, STRIDE at most, lie before the guess, the last of them, and the index and
-    the step behind it.
+    """(n, x, i, step) of the next places of a scan, STRIDE at most and before the guess: how many they are, the
+    last of them, and the scan's index and its geometric step from there on.
     """
     n, at = 0, x
     while n < STRIDE and i < len(xs):
@@ -301,18 +304,42 @@ def falls_to(a, b):
 
 
 @inline
-def is_plain(a, b):
-    """Do two nodes of one class show a D that keeps its sign between them: does D' change by one way alone,
-    as far as the chord tells, and |D| have no minimum?
+def is_plain(kind, a, b, low, high):
+    """Do two nodes suggest that D keeps its sign between them: is D' monotone, as far as the chord tells, has
+    |D| no minimum, and is it nearly a power of the distance from `low` (and `high`: see `logarithm`)?
     """
-    if a[SLOPE] == b[SLOPE] == 0.0:  # motions that run into a focus, up to the last one
-        return a[CLASS] == b[CLASS]
+    if a[CLASS] != b[CLASS] or caught(a) != caught(b):
+        return False
+    if caught(a):  # motions that run into a focus, as all do in between
+        return True
+    if is_open(a) or is_open(b) or differ(a, b):
+        return False
     chord = (b[CHANGE] - a[CHANGE]) / (b[X] - a[X])
-    low, high = a[SLOPE] - 1.0, b[SLOPE] - 1.0
-    dips = low < 0.0 < high if a[CHANGE] > 0.0 else high < 0.0 < low
-    monotone = min(low, high) < chord < max(low, high)
-    certain = not (is_open(a) or is_open(b) or differ(a, b))
-    return a[CLASS] == b[CLASS] and certain and monotone and not dips
+    first, second = a[SLOPE] - 1.0, b[SLOPE] - 1.0
+    dips = first < 0.0 < second if a[CHANGE] > 0.0 else second < 0.0 < first
+    if dips or not min(first, second) < chord < max(first, second):
+        return False
+    from_a, rate_a = logarithm(kind, a[X], low, high)
+    from_b, rate_b = logarithm(kind, b[X], low, high)
+    length, grown = from_b - from_a, math.log(b[CHANGE] / a[CHANGE])
+    bent = abs(first / (a[CHANGE] * rate_a) * length - grown)
+    return bent + abs(second / (b[CHANGE] * rate_b) * length - grown) < BENT
+
+
+@inline
+def logarithm(kind, x, low, high):
+    """What the lattice of a map is even in, log w or the log of the ratio of the distances of the angle x
+    from two equilibria, and its derivative.
+    """
+    if kind == ROTATION:
+        return math.log(x), 1.0 / x
+    return math.log((x - low) / (high - x)), 1.0 / (x - low) + 1.0 / (high - x)
+
+
+@inline
+def caught(a):
+    """Is the node's motion certain to run into the focus before it? See `libration`."""
+    return a[CLASS] > 0.0 and a[SLOPE] == 0.0
 
 
 @kernel
@@ -404,8 +431,8 @@ def fixed_points_of(image_of):
     def scan(kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):
         """Fill `nodes` with the images of xs, and more beside every border of a class; returns their number.
 
-        Rotations have no image below their border, and librations none between two borders if they have none
-        behind the first: there nodes of the lattice are left out.
+        Places of the lattice are left out where D is plain (`is_plain`) or there is no image: below the border of
+        rotations, and between two borders of librations if there is none behind the first.
         """
         a, c, d = np.zeros(NODE_SIZE), np.zeros(NODE_SIZE), np.zeros(NODE_SIZE)
         further = np.zeros(NODE_SIZE)
@@ -416,27 +443,44 @@ def fixed_points_of(image_of):
         if i > 0 and nodes[0, CLASS] != NO_IMAGE:
             i = 0
             image_of(kind, p, eqs, count, anchor, xs[i], tolerance, nodes[0])
-        size, x, step, between = 1, xs[i], 0.0, 0
+        size, x, step, places = 1, xs[i], 0.0, 0
         i += 1
+        low = equilibrium_before(eqs, count, xs[0])[1] if kind == LIBRATION else 0.0
         skips = kind == LIBRATION and not (last >= 0 and math.isnan(guesses[last]))
         while i < len(xs):
             copy(a, nodes[size - 1])
             guess = first_beyond(a[X], guesses)
-            if between == 0 and a[CLASS] > 0.0:
-                between, at, to, wide = ahead(xs, x, step, i, guess)
-                if between > 1:
+            if places == 0 and a[CLASS] > 0.0:
+                places, at, to, wide = ahead(xs, x, step, i, guess)
+                if places < 2:
+                    places = 0
+                else:
                     image_of(kind, p, eqs, count, anchor, at, tolerance, further)
-                    if is_plain(a, further) and size < len(nodes):
+                    if is_plain(kind, a, further, low, anchor) and size < len(nodes):
                         copy(nodes[size], further)
-                        size, step, i, between = size + 1, wide, to, 0
+                        size, step, i, places = size + 1, wide, to, 0
                         continue
             near = step > 0.0 and x + step < xs[i]  # geometric steps away from a border
-            if between == 1 and further[X] > a[X]:
+            if places == 1:
                 copy(c, further)
             else:
                 image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
-            between = max(between - 1, 0)
+            places = max(places - 1, 0)
             crossed, reach = c[CLASS] != a[CLASS], 0.45 * (2e-15 * abs(a[X]) + grain)
+            gap, before = GAP * (c[X] - a[X]), caught(a)
+            while caught(c) != before and not crossed and c[X] - a[X] > gap:
+                image_of(kind, p, eqs, count, anchor, 0.5 * (a[X] + c[X]), tolerance, d)
+                if caught(d) == before:
+                    copy(a, d)
+                else:
+                    copy(c, d)
+                crossed = c[CLASS] != a[CLASS]
+            if a[X] > nodes[size - 1, X] and not crossed and size + 1 < len(nodes):
+                copy(nodes[size], a)
+                copy(nodes[size + 1], c)
+                size, places = size + 2, 0
+                i += c[X] >= xs[i]
+                continue
             while crossed and c[X] - a[X] > 2e-15 * abs(c[X]) + grain:
                 middle = next_place(a[X], c[X], guess, reach)
                 if not a[X] < middle < c[X]:
@@ -455,7 +499,7 @@ def fixed_points_of(image_of):
                     size += nodes[size, CLASS] == a[CLASS]
                 copy(nodes[size], a)
                 copy(nodes[size + 1], c)
-                size, x, step, between = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain), 0
+                size, x, step, places = size + 2, c[X], 16.0 * (2e-15 * abs(c[X]) + grain), 0
                 if c[X] >= xs[i]:
                     i += 1
             else:
@@ -529,7 +573,7 @@ def fixed_points_of(image_of):
         apart = min(APART * bar, 0.1 * (m[X] - a[X]), 0.1 * (b[X] - m[X]))
         image_of(kind, p, eqs, count, anchor, m[X] - apart, tolerance, left)
         image_of(kind, p, eqs, count, anchor, m[X] + apart, tolerance, right)
-        lonely = left[CLASS] != m[CLASS] or right[CLASS] != m[CLASS] or apart < bar
+        lonely = not (left[CLASS] == right[CLASS] == m[CLASS] == a[CLASS]) or apart < bar
         if lonely:
             copy(left, a)
             copy(right, b)
@@ -568,7 +612,7 @@ def fixed_points_of(image_of):
         edges[FIRST_CHANGE], edges[FIRST_ERROR], edges[UNANSWERED] = (
             nodes[0, CHANGE],
             nodes[0, ERROR],
-            1.0 * (nodes[0, CLASS] == UNKNOWN),
+            1.0 * (nodes[0, CLASS] == UNKNOWN) + (size + 4 > len(nodes)),
         )
         m, grain = np.zeros(NODE_SIZE), 4e-15 * (xs[-1] - xs[0])
         for i in range(1, size):

@@ -1,8 +1,8 @@
 """Portraits of the flow phi' = w, w' = f w + g on the cylinder: what does not depend on the initial
 state, in numbers.
 
-Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`). Here each
-cycle is followed again for its period, and the branches of the saddles are followed to their ends
+Ends, equilibria and cycles are those of the skeleton that decides the fates (`fate`), with periods and speeds from
+the return maps. Here the branches of the saddles are followed to their ends
 (`destinations`): where no unstable one ends in a saddle there is no saddle connection.
 """
 
@@ -233,7 +233,9 @@ def _far(row, K, scale):
 
 
 def _of_map(cycle):
-    """w, its bound, period, its bound of a cycle, as the return map gives them; infinite where it does not."""
+    """w, its bound, period, its bound of a cycle, as the return map gives them; infinite or NaN
+    where it does not.
+    """
     row, side = cycle.row, -1.0 if cycle.kind == ROTATION_MINUS else 1.0
     return side * row[rt.CYCLE_SPEED], *row[[rt.SPEED_BAR, rt.PERIOD, rt.PERIOD_BAR]]
 

@@ -6,7 +6,7 @@ import pytest
 from survey.kernels.cylinder import borders as bo
 from survey.kernels.cylinder import equilibria as eq
 from survey.kernels.cylinder import returns as rt
-from survey.measures.cylinder import fate
+from survey.measures.cylinder import equation, fate
 from survey.methods import taylor
 
 SYSTEMS = np.random.default_rng(17).normal(size=(150, 6)) * [1, 1, 2, 2, 3, 3]
@@ -118,3 +118,25 @@ def test_a_cycle_that_hides_at_the_border_is_not_denied():
     assert w_d < w_c - 1e-3
     assert _image(rt.ROTATION, s, s.section, w_c + 1e-12)[rt.CHANGE] > 1e-3
     assert not len(cycles.table) and not cycles.conclusive
+
+
+def test_two_cycles_a_third_apart_are_not_left_out():
+    """D > 0 rises, falls below 0 and rises again: a pair that the nodes about it do not show by their slopes
+    alone. True roots from DOP853 at rtol = 1e-13: D changes sign in (0.24, 0.3) and (0.36, 0.4).
+    """
+
+    def f(x, q):
+        u = 1.0 - np.cos(x)
+        return q[0] * (q[1] + u * (q[2] + u * (q[3] + u * (q[4] + u))))
+
+    q = [
+        0.140046781400694,
+        2.0312865283892254e-09,
+        -2.8377530667476632e-06,
+        0.0010920041943663782,
+        -0.07012595791104377,
+    ]
+    program = equation.flows(f, lambda x, q: -np.sin(x), np.array([q]), True)[0]
+    cycles = fate.skeleton(taylor, program).cycles(fate.LIBRATIONS)
+    one, two = cycles.table[:, rt.CYCLE_X]
+    assert 0.24 < one < 0.3 and 0.36 < two < 0.4 and cycles.conclusive
