@@ -467,15 +467,15 @@ def fixed_points_of(image_of):
                 image_of(kind, p, eqs, count, anchor, x + step if near else xs[i], tolerance, c)
             places = max(places - 1, 0)
             crossed, reach = c[CLASS] != a[CLASS], 0.45 * (2e-15 * abs(a[X]) + grain)
-            gap, before = GAP * (c[X] - a[X]), caught(a)
-            while caught(c) != before and not crossed and c[X] - a[X] > gap:
+            gap, before, parted = GAP * (c[X] - a[X]), caught(a), caught(c) != caught(a)
+            while parted and not crossed and c[X] - a[X] > gap:
                 image_of(kind, p, eqs, count, anchor, 0.5 * (a[X] + c[X]), tolerance, d)
                 if caught(d) == before:
                     copy(a, d)
                 else:
                     copy(c, d)
                 crossed = c[CLASS] != a[CLASS]
-            if a[X] > nodes[size - 1, X] and not crossed and size + 1 < len(nodes):
+            if parted and not crossed and size + 1 < len(nodes):
                 copy(nodes[size], a)
                 copy(nodes[size + 1], c)
                 size, places = size + 2, 0
@@ -491,10 +491,8 @@ def fixed_points_of(image_of):
                 else:
                     copy(c, d)
             if crossed and size + 3 < len(nodes):
-                beside = a[X] - 1e5 * reach
-                if (
-                    kind == LIBRATION and is_open(a) and beside > nodes[size - 1, X]
-                ):  # see `rises_from`
+                beside = a[X] - 1e5 * reach  # see `rises_from`
+                if kind == LIBRATION and is_open(a) and beside > nodes[size - 1, X]:
                     image_of(kind, p, eqs, count, anchor, beside, tolerance, nodes[size])
                     size += nodes[size, CLASS] == a[CLASS]
                 copy(nodes[size], a)
@@ -548,10 +546,8 @@ def fixed_points_of(image_of):
         low, high, m = a[X], b[X], np.zeros(NODE_SIZE)
         left, right = np.empty(NODE_SIZE), np.empty(NODE_SIZE)
         rising = b[CHANGE] > 0.0
-        below, above = (
-            abs(a[CHANGE]) > a[ERROR],
-            abs(b[CHANGE]) > b[ERROR],
-        )  # is the sign of D certain?
+        # is the sign of D certain?
+        below, above = abs(a[CHANGE]) > a[ERROR], abs(b[CHANGE]) > b[ERROR]
         share = a[CHANGE] / (a[CHANGE] - b[CHANGE])
         x = low + min(max(share, 0.02), 0.98) * (high - low)
         for _ in range(60):
@@ -567,9 +563,8 @@ def fixed_points_of(image_of):
             if abs(new - x) <= 1e-15 * abs(x) or abs(m[CHANGE]) <= 0.02 * m[ERROR]:
                 break
             x = new if low < new < high else 0.5 * (low + high)
-        bar = cycle_bar(
-            m
-        )  # how much the slope changes within it shows the map at so many times the bar
+        # how much the slope changes within the bar shows the map at so many times the bar
+        bar = cycle_bar(m)
         apart = min(APART * bar, 0.1 * (m[X] - a[X]), 0.1 * (b[X] - m[X]))
         image_of(kind, p, eqs, count, anchor, m[X] - apart, tolerance, left)
         image_of(kind, p, eqs, count, anchor, m[X] + apart, tolerance, right)
@@ -593,7 +588,7 @@ def fixed_points_of(image_of):
     def fixed_points(
         kind, p, eqs, count, anchor, interval, xs, guesses, tolerance, cycles, found, edges
     ):
-        """All fixed points on the lattice xs (ascending), appended to `cycles`; returns their number.
+        """The fixed points that the lattice xs (ascending) shows, appended to `cycles`; returns their number.
 
         Borders of a class, which are looked for at the `guesses` (ascending, see `borders`) first, are
         bisected, so that a fixed point beside one is not lost; where D has no change of sign but dips

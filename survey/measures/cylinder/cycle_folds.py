@@ -86,9 +86,8 @@ class Maps:
             steep = 1.0 / size
         change, slope, error = node[rt.CHANGE], node[rt.SLOPE], node[rt.ERROR]
         bar = 1e-14 * (1.0 + slope) + 20.0 * error + 2.0 * slope * steep * (abs(change) + error)
-        own = (
-            int(node[rt.CLASS]) if slope > 0.0 else rt.NO_IMAGE
-        )  # of motions into a focus only the sign is known
+        # of motions into a focus only the sign is known
+        own = int(node[rt.CLASS]) if slope > 0.0 else rt.NO_IMAGE
         return own, change / size, slope - 1.0, error / size, bar
 
     @staticmethod
