@@ -425,7 +425,7 @@ def write_cycle(a, b, m, interval, steep, row):
 
 
 def fixed_points_of(image_of):
-    """What finds all fixed points of the return maps that `image_of` computes (see `image`)."""
+    """What finds the fixed points of the return maps that `image_of` computes (see `image`)."""
 
     @part
     def scan(kind, p, eqs, count, anchor, xs, guesses, tolerance, nodes):

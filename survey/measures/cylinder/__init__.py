@@ -66,7 +66,7 @@ METHODS = {
             ("kind", "p", "eqs", "count", "section", "tolerance", "out"),
         ),
         "flow_cycles": Function(
-            "append the fixed points of a return map to `cycles`, see `kernels.cylinder.returns.fixed_points`",
+            "append the fixed points of a return map to `cycles`, see `fixed_points_of` in `kernels.cylinder.returns`",
             (
                 "kind",
                 "p",

@@ -30,23 +30,25 @@ def of_functions(variables, options):
 
 def _compile(p, options, own):
     question = options.get("question")
-    if question == "trajectory" and "separatrix" not in options:
+    if "separatrix" in options:
+        return
+    if question == "trajectory":
         taylor.flow_trajectories_ahead(own)
-    if question == "abel" and "separatrix" not in options:
+    if question == "abel":
         taylor.flow_abels_ahead(own)
+    if question not in ("fate", "portrait"):
+        return
     eqs = np.empty((0, EQUILIBRIUM_SIZE))
-    fates = question in ("fate", "portrait") and "separatrix" not in options
-    if fates and (own or question == "portrait"):
+    if own or question == "portrait":
         # first what the main process needs soon, for cycles as well
         creeping.crept(p, eqs, 0, 0.0, 0.0, 0.0, 0.0, True, 0.0, np.empty(creeping.PASSAGE))
         returns.runs_in(p, eqs, 0, 0.0, 0.0, 0.0)
     for name in ("borders", "fates") if question == "portrait" else ("fates", "borders"):
-        if fates and name == "borders":
+        if name == "borders":
             taylor.flow_borders(returns.ROTATION, p, eqs, 0, 0.0, 0.0, np.empty((0, BORDER)))
-            yield name
-        elif fates:
+        else:
             tables = eqs, *[np.empty((0, returns.CYCLE_SIZE)) for _ in range(3)]
             sizes = np.zeros(kf.SIZES, np.int64)
             starts = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
             taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *starts)
-            yield name
+        yield name
