@@ -1,5 +1,6 @@
 """Axes -> exact coordinates -> blocks. A scene receives a block as its axes, not as a list of points."""
 
+from collections import Counter
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -119,21 +120,26 @@ def lines(parameters):
     `parameters` is {name: (its dimensions, its values)}; least and greatest are those of the finite
     values.
     """
-    found = {}
-    for name, (dims, values) in parameters.items():
-        if len(dims) == 1 and sum(dims[0] in other for other, _ in parameters.values()) == 1:
-            found[name] = np.size(values), *_ends(values)
-    return found
+    alone = _alone(parameters)
+    return {name: (np.size(parameters[name][1]), *_ends(parameters[name][1])) for name in alone}
 
 
 def ranges(parameters):
     """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`."""
-    alone = lines(parameters)
-    found = {}
-    for name, (dims, values) in parameters.items():
-        if dims and name not in alone:
-            found[name] = np.size(values), *_ends(values)
-    return found
+    alone = _alone(parameters)
+    return {
+        name: (np.size(values), *_ends(values))
+        for name, (dims, values) in parameters.items()
+        if dims and name not in alone
+    }
+
+
+def _alone(parameters):
+    """The names of the parameters that have an axis which no other shares."""
+    number = Counter(dim for dims, _ in parameters.values() for dim in dims)
+    return [
+        name for name, (dims, _) in parameters.items() if len(dims) == 1 and number[dims[0]] == 1
+    ]
 
 
 def _ends(values):

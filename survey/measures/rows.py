@@ -18,7 +18,11 @@ class Rows:
             axis for axis in range(len(self.shape)) if any(self._size(a, axis) > 1 for a in shared)
         ]
         of_lanes = [axis for axis in range(len(self.shape)) if axis not in of_rows]
-        self.order, self.lane_axes = of_rows + of_lanes, len(of_lanes)
+        self.order = of_rows + of_lanes
+        self.at_first = tuple(
+            slice(None) if axis in of_rows else 0 for axis in range(len(self.shape))
+        )
+        self.row_shape = tuple(self.shape[axis] for axis in of_rows)
         self.rows = prod(self.shape[axis] for axis in of_rows)
         self.lanes = prod(self.shape[axis] for axis in of_lanes)
         self.sorted_shape = [self.shape[axis] for axis in self.order]
@@ -45,7 +49,10 @@ class Rows:
 
     def _first(self, array):
         """The array at the first of the lanes, in the shape of the rows."""
-        return self._full(array)[(..., *[0] * self.lane_axes)]
+        array = np.asarray(array, dtype=float)
+        array = array.reshape((1,) * (len(self.shape) - array.ndim) + array.shape)
+        first = array[self.at_first]
+        return first if first.shape == self.row_shape else np.broadcast_to(first, self.row_shape)
 
     def per_point(self, array):
         """All values (rows, lanes), contiguous float64; a copy, as for read-only views kernels

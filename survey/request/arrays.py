@@ -89,14 +89,16 @@ def check_dimensions(module: Any, given: Mapping[str, Labelled]) -> None:
         raise BadInput(
             f"the parameters' coordinates disagree: {str(error).splitlines()[0]}; align them first"
         ) from None
+    foreign = {key: array.dims for key, array in given.items() if array.dims not in ((), (key,))}
+    if not foreign:
+        return
     outputs = {output.name for output in module.OUTPUTS} | {
         "status",
         *getattr(module, "DIMENSIONS", ()),
     }
-    for key, array in given.items():
-        for dim in set(array.dims) & (
-            outputs | {name for name, other in given.items() if not other.ndim}
-        ) - {key}:
+    clashes = outputs | {name for name, other in given.items() if not other.ndim}
+    for key, dims in foreign.items():
+        for dim in set(dims) & clashes - {key}:
             what = (
                 "an output or its dimension"
                 if dim in outputs
@@ -135,7 +137,7 @@ def grid_of(used: dict[str, Parameter], given: Mapping[str, Labelled]) -> Grid:
     """The Grid of the parameters; raises BadInput where sizes of a dimension differ."""
     sizes: dict[Hashable, int] = {}
     for key, array in given.items():
-        for dim, size in array.sizes.items():
+        for dim, size in zip(array.dims, array.shape, strict=True):
             if sizes.setdefault(dim, size) != size:
                 here = counted(size, "value")
                 raise BadInput(

@@ -3,6 +3,7 @@
 `table` is what stands before a key in a message, such as "options."; it is empty where Python asks.
 """
 
+from functools import lru_cache
 from numbers import Real
 
 import numpy as np
@@ -120,19 +121,24 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
         raise BadInput(
             f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10"
         )
-    existing = [output for output in scene.OUTPUTS if exists(output, options)]
-    outputs = [output.name for output in existing]
+    outputs, usual = _outputs(scene, tuple(options.items()))
     for variable in variables or ():
         if not isinstance(variable, str) or variable not in outputs:
             raise BadInput(
                 f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}"
             )
-    wanted = (
-        [output.name for output in existing if not output.on_request]
-        if variables is None
-        else variables
+    wanted = usual if variables is None else frozenset(variables)
+    return Request(options, method, float(rtol), wanted)
+
+
+@lru_cache(maxsize=64)
+def _outputs(scene, options):
+    """(names of the outputs that exist under these options, those that are computed unasked)."""
+    existing = [output for output in scene.OUTPUTS if exists(output, dict(options))]
+    return (
+        [output.name for output in existing],
+        frozenset(output.name for output in existing if not output.on_request),
     )
-    return Request(options, method, float(rtol), frozenset(wanted))
 
 
 def _check_method(scene, options, method, table):

@@ -416,7 +416,8 @@ def _problem(row, rho, low=None, line=None, ends=None):
 
 def _sizes(row):
     half, half_low = row.half
-    bound = np.column_stack([row.k**2 + 1, 2 * row.k, np.ones(row.k.size)])  # (|rho| + k)^2 + 1
+    bound = np.ones((row.k.size, 3))  # (|rho| + k)^2 + 1
+    bound[:, 0], bound[:, 1] = row.k**2 + 1, 2 * row.k
     return monodromy.RowSizes(half, bound, row.rate, half_low)
 
 

@@ -23,7 +23,7 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 
 import threading
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from math import log
 
@@ -270,7 +270,7 @@ class _Interval:
     radius: float
     even: bool
 
-    @property
+    @cached_property
     def most(self):
         """The number of DEGREES whose nodes pay."""
         return int(
@@ -293,10 +293,11 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
         return
     sought = _sought(asked)
     degree = np.full(len(problem.p), DEGREES.size)
-    degree[chosen] = _degrees(problem, axis, asked.rtol, sought)[chosen]
+    kind = _kind(problem, axis, sought)
+    degree[chosen] = _enough(kind, _least(problem, asked.rtol, sought))[chosen]
     if problem.c2 and not sought.factors:  # not beyond what pays, where less may do
-        enough = _degrees(problem, axis, ROWS_SHARE * asked.rtol, sought)
-        degree[chosen] = np.maximum(degree, np.minimum(enough, axis.most - 1))[chosen]
+        enough = np.minimum(_enough(kind, ROWS_SHARE * asked.rtol), axis.most - 1)
+        degree[chosen] = np.maximum(degree, enough)[chosen]
     first = degree.copy()
     # a row whose series has not converged goes on to the next degree
     while (at := int(degree.min(initial=axis.most))) < axis.most:
@@ -531,9 +532,9 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
-    kind = np.abs(np.diff(ends.span * size))  # half the change of D's phase
-    at = int(_enough(0.5 * kind if sought.factors else kind, rtol)[0])
-    degree = int(_degrees(ends, axis, rtol, sought).max())
+    phase = np.abs(np.diff(ends.span * size))  # half the change of D's phase
+    at = int(_enough(0.5 * phase if sought.factors else phase, rtol)[0])
+    degree = int(_enough(_kind(ends, axis, sought), _least(ends, rtol, sought)).max())
     spent = 0
     doubt = np.inf
     while at < DEGREES.size and degree < axis.most and spent + DEGREES[at] <= budget:
@@ -567,17 +568,19 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     return None, spent
 
 
-def _degrees(problem, axis, rtol, sought):
-    """The index in DEGREES of what each row's D, or its factors, need; beyond DEGREES where none is
-    enough.
-    """
+def _kind(problem, axis, sought):
+    """The argument x of J_n(x) that the coefficients of each row's D, or of its factors, resemble."""
     share = 0.5 if sought.factors else 1.0  # they are those of half a period
     if problem.c2:
-        least = FACTORS_SHARE * rtol if sought.factors else rtol
-        return _enough(share * (2 * problem.span * axis.radius * np.sqrt(problem.c2)), least)
+        return share * (2 * problem.span * axis.radius * np.sqrt(problem.c2))
     # cos(span sqrt(p)) on an axis of length 2 radius is half as rich as cos(span p) on its square
     # root
-    return _enough(share * (problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1])), rtol)
+    return share * (problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1]))
+
+
+def _least(problem, rtol, sought):
+    """How small coefficients have to be where a series may end."""
+    return FACTORS_SHARE * rtol if problem.c2 and sought.factors else rtol
 
 
 def _enough(kind, rtol):
