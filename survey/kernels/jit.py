@@ -27,6 +27,8 @@ from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic, overload
 
+from survey.kernels import quick_typing
+
 # Fused multiply-adds: of today's processors only old and small ones of x86 have none.
 HAS_FMA = not llvm.get_process_triple().startswith(
     ("x86", "i686")
@@ -126,6 +128,7 @@ class _Compiling(event.TimingListener):
             function = getattr((start.data or {}).get("dispatcher"), "py_func", None)
             self._ours = str(getattr(function, "__module__", "")).startswith("survey.")
             if self._ours:
+                quick_typing.begin()
                 _set_options(_NO_UNROLLING)
                 cpu_target.target_context.get_preferred_array_alignment = _of_cache_lines
                 cpu_target.target_context.declare_function = _declared
@@ -136,6 +139,7 @@ class _Compiling(event.TimingListener):
         if self._depth == 0:
             gc.set_threshold(*self._usual)
             if self._ours:
+                quick_typing.end()
                 _set_options(_DEFAULT)
                 del cpu_target.target_context.get_preferred_array_alignment
                 del cpu_target.target_context.declare_function
