@@ -19,7 +19,7 @@ from survey.file import disk, reading
 from survey.file.labels import count, layout
 from survey.file.labels import describe as labelled
 from survey.grid import Grid, fixed, lines
-from survey.request import arrays, earlier, physical, trust, user_scene
+from survey.request import arrays, physical, trust, user_scene
 from survey.request.checks import (
     check_options,
     check_parameters,
@@ -28,9 +28,8 @@ from survey.request.checks import (
     methods_of,
 )
 from survey.request.function_scene import FunctionScene
-from survey.request.workflow import check, read
 from survey.scene import Option, Output, Parameter, Request, condition, exists
-from survey.sweep import announce, engine, solve
+from survey.sweep import announce, solve
 from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.progress import Progress, watched
 from survey.wording import counted, html_table, shown, summary
@@ -72,6 +71,10 @@ def run(
     ------
     survey.BadInput, survey.Damaged, survey.Stopped (resumable): one line each.
     """
+    from survey.request import earlier  # what evaluate does without: half of the time of loading
+    from survey.request.workflow import check, read
+    from survey.sweep import engine
+
     if isinstance(workflow, (xr.Dataset, xr.DataArray)):
         raise BadInput("run: this is a dataset, not a workflow; give the path of a workflow file, or a mapping; "
                        "ds.survey.zoom() and survey.evaluate solve further points")  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from survey import methods
 from survey.measures.cylinder import basins, blocks, equation, motion, solution
-from survey.measures.cylinder.compile_ahead import of_functions
+from survey.measures.cylinder.compile_ahead import first_of_functions, of_functions
 from survey.measures.cylinder.fate import MOST_OF_PROGRAM
 from survey.measures.hill.multiprecision import Unsupported
 from survey.modules import load
@@ -53,7 +53,7 @@ class AbelScene(FunctionScene):
     FAMILY = "abel"
     AUDIT = ("dop853",)
     STATUS = STATUS
-    compile_ahead = staticmethod(of_functions)
+    compile_ahead, compile_first = staticmethod(of_functions), staticmethod(first_of_functions)
     DIMENSIONS = gyrostat.DIMENSIONS | {"equilibrium": np.arange(1, MOST_OF_PROGRAM + 1)}
 
     @property

@@ -44,6 +44,8 @@ def compiling_ahead(scene, request):
     ) as process:
         waiting.other_compiler = process.stdout.readline  # a line, or the end
         try:
+            if first := getattr(scene, "compile_first", None):
+                first(request.variables, request.options)
             yield
         finally:
             waiting.other_compiler = None

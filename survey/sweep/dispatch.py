@@ -16,11 +16,6 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import resource_tracker
 
-import dask
-import dask.multiprocessing
-import dask.threaded
-from dask.callbacks import Callback
-
 from survey.errors import Stopped, SurveyError
 
 DEATHS = 3
@@ -60,6 +55,8 @@ class Patience:
 
 def on_threads(task, numbers, finished=lambda done, result=None: None, threads=None):
     """Call the task for every number on threads of this process."""
+    from dask.threaded import get  # loading dask takes longer than most calls from Python
+
     done = itertools.count(1)
     finished(0)
     # the function itself: given its name, dask would import all of distributed
@@ -67,7 +64,7 @@ def on_threads(task, numbers, finished=lambda done, result=None: None, threads=N
         task,
         numbers,
         lambda number, result: finished(next(done), result),
-        dask.threaded.get,
+        get,
         threads or cpus(),
     )
 
@@ -79,6 +76,8 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
     The tasks that were running when a worker died are repeated one by one, which shows the one that
     killed it. Raises Stopped for a task that exceeds the time limit then, too.
     """
+    from dask.multiprocessing import get
+
     done, ended, patience = itertools.count(1), set(), patience or Patience()
     finished(0)
 
@@ -95,7 +94,7 @@ def on_processes(task, numbers, finished, died, workers, patience=None):
                     _Signed(task),
                     some,
                     watch.ended(end),
-                    dask.multiprocessing.get,
+                    get,
                     workers,
                     watch.began,
                     pool=pool,
@@ -259,6 +258,9 @@ def _compute(task, numbers, ended, get, workers, begun=lambda number: None, **mo
     """Run the tasks with dask's scheduler, which takes tasks of equal priority in reverse order of
     their names.
     """
+    import dask
+    from dask.callbacks import Callback
+
     keys = {f"task-{-position % 10**9:09d}": number for position, number in enumerate(numbers, 1)}
     call = dask.delayed(task, pure=False, traverse=False)
     callback = Callback(

@@ -699,7 +699,7 @@ def _damping(series_of, dt):
 
 
 @kernel
-def _cross(T, state, before, fixed, i, reach, total, end, block, size):
+def cross(T, state, before, fixed, i, reach, total, end, block, size):
     """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step;
     there psi has risen by `total`, and w = `end`.
     """
@@ -799,7 +799,7 @@ def _pass(p, T, state, before, fixed, delay, i, block, targets, j, doubt, starte
             count += 1
         for k in range(count, near.BLOCK):
             block[near.GOAL + k], block[near.SQUARE + k] = block[near.GOAL + count - 1], 0.0
-        _cross(T, state, before, fixed, i, reach, x1 - before[PSI, i], v1, block, count)
+        cross(T, state, before, fixed, i, reach, x1 - before[PSI, i], v1, block, count)
         for k in range(count):
             row = floats[j]
             row[rc.VALUE], row[rc.TIME] = block[near.VALUE + k], block[near.TIMES + k]

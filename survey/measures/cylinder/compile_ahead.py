@@ -8,7 +8,13 @@ of a user's f and g.
 
 import numpy as np
 
-from survey.kernels.cylinder import creeping, returns
+from survey.kernels.cylinder import (
+    creeping,
+    lockstep,
+    lockstep_abel,
+    lockstep_program,
+    returns,
+)
 from survey.kernels.cylinder import fate as kf
 from survey.kernels.cylinder import records as rc
 from survey.kernels.cylinder.borders import BORDER
@@ -28,6 +34,21 @@ def of_functions(variables, options):
     yield from _compile(np.zeros(OPERATIONS + WIDTH), options, own=True)
 
 
+def first_of_functions(variables, options):
+    """For a user's f and g: what the process that waits compiles first, as the other has more to do."""
+    question = options.get("question")
+    work, none = np.zeros((lockstep.ROWS, lockstep.LANES)), np.empty((0, 0))
+    rows, planes = np.full(lockstep.LANES, -1), np.empty((rc.STATE, 0, 0))
+    if question == "trajectory":
+        turnings = np.empty((0, 0), np.int64)
+        lockstep.record(work.reshape(-1), none, rows, rows, rows, planes, turnings)
+    if question == "abel":
+        block = np.zeros(8 * lockstep_abel.BLOCK)
+        lockstep_program.cross(*lockstep.split(work)[:4], 0, 0.0, 0.0, 0.0, block, 0)
+    if question == "fate" and "separatrix" not in options:
+        _of_cycles(np.zeros(OPERATIONS + WIDTH))
+
+
 def _compile(p, options, own):
     question = options.get("question")
     if "separatrix" in options:
@@ -39,10 +60,8 @@ def _compile(p, options, own):
     if question not in ("fate", "portrait"):
         return
     eqs = np.empty((0, EQUILIBRIUM_SIZE))
-    if own or question == "portrait":
-        # first what the main process needs soon, for cycles as well
-        creeping.crept(p, eqs, 0, 0.0, 0.0, 0.0, 0.0, True, 0.0, np.empty(creeping.PASSAGE))
-        returns.runs_in(p, eqs, 0, 0.0, 0.0, 0.0)
+    if question == "portrait":
+        _of_cycles(p)  # the main process needs it soon
     for name in ("borders", "fates") if question == "portrait" else ("fates", "borders"):
         if name == "borders":
             taylor.flow_borders(returns.ROTATION, p, eqs, 0, 0.0, 0.0, np.empty((0, BORDER)))
@@ -52,3 +71,10 @@ def _compile(p, options, own):
             starts = np.empty((0, rc.START)), 0.0, 0, np.empty((0, rc.FATE))
             taylor.flow_fates(p, 0.0, np.zeros(2), sizes, *tables, *starts)
         yield name
+
+
+def _of_cycles(p):
+    """What cycles need, and fates too."""
+    eqs = np.empty((0, EQUILIBRIUM_SIZE))
+    creeping.crept(p, eqs, 0, 0.0, 0.0, 0.0, 0.0, True, 0.0, np.empty(creeping.PASSAGE))
+    returns.runs_in(p, eqs, 0, 0.0, 0.0, 0.0)
