@@ -51,7 +51,8 @@ class Grid:
         """Blocks, slices per dimension, of at most `points_per_block` points: the first dimensions
         are cut first.
         """
-        return self._within([slice(0, size) for size in self.shape], points_per_block)
+        whole = tuple(slice(0, size) for size in self.shape)
+        return [whole] if self.points <= points_per_block else self._within(whole, points_per_block)
 
     def tiled(self, points_per_block, points_per_region, points_per_tile):
         """(lengths of a tile, [(region, its blocks)]): no tile or block belongs to two regions.

@@ -45,11 +45,10 @@ class Parameter:
         NaN and infinities do not.
         """
         values = np.asarray(values, dtype=float)
-        inside = np.isfinite(values)
-        if self.minimum > -inf:
-            inside &= values > self.minimum if self.open_minimum else values >= self.minimum
-        if self.maximum < inf:
-            inside &= values < self.maximum if self.open_maximum else values <= self.maximum
+        above = self.open_minimum or self.minimum == -inf
+        below = self.open_maximum or self.maximum == inf
+        inside = values > self.minimum if above else values >= self.minimum
+        inside &= values < self.maximum if below else values <= self.maximum
         if self.whole:
             inside = inside & (values == np.floor(values))
         if self.excluded and not (

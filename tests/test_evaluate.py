@@ -146,3 +146,19 @@ def test_a_lone_point_is_labelled_as_one_of_an_array_and_shares_nothing_with_the
         ds.status.attrs["flag_values"][:] = 7
         ds.status.attrs["long_name"] = ds.attrs["title"] = "changed"
         ds.status.encoding["dtype"] = "int16"
+
+
+@pytest.mark.parametrize("mu", [0.01, [0.01, 0.02]])
+def test_what_a_caller_does_to_a_dataset_is_not_in_the_next(mu):
+    def text(ds):
+        return ds.to_dict(data="list", encoding=True)
+
+    ds = survey.evaluate("libration", mu=mu)  # with coordinates of its own
+    before = str(text(ds))
+    for variable in ds.variables.values():
+        variable.attrs["spoiled"] = variable.encoding["spoiled"] = 1
+    ds.status.attrs["flag_values"][:] = 9
+    ds.attrs["spoiled"] = 1
+    ds.status.values[...] = 9
+    ds.attrs.pop("title")
+    assert str(text(survey.evaluate("libration", mu=mu))) == before

@@ -158,6 +158,30 @@ def test_kernels_are_compiled_ahead_for_the_arguments_of_the_call(tmp_path, call
     assert done.stdout.splitlines() == [f"{name} {READ}" for name in kernels]
 
 
+@pytest.mark.slow
+@pytest.mark.skipif(dispatch.cpus() == 1, reason="nothing is compiled beside on one processor")
+@pytest.mark.parametrize(
+    ("more", "kernels"),
+    [
+        ('question="trajectory", phi0=0.0, w0=1.0, t=1.0', ["balls.balls", "lockstep.record"]),
+        ('question="abel", phi0=0.0, w0=1.0, phi=1.0', ["balls.balls", "lockstep_program.cross"]),
+        (
+            'question="fate", phi0=0.0, w0=1.0',
+            ["balls.balls_of_one", "creeping.crept", "returns.runs_in"],
+        ),
+    ],
+)
+def test_what_the_waiting_process_compiles_first_serves_the_other(tmp_path, more, kernels):
+    done = subprocess.run(
+        [sys.executable, "-c", READING.format(call=OWN.format(more=more), kernels=[])],
+        capture_output=True, text=True,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    # for other arguments each would be there twice
+    assert [len([*tmp_path.rglob(f"{name}-*.nbc")]) for name in kernels] == [1] * len(kernels)
+
+
 def test_what_has_a_name_is_waited_for_once(monkeypatch):
     lines = iter(["first\n", "second\n", "third\n", "", "", ""])
     monkeypatch.setattr(waiting, "other_compiler", lambda: next(lines))

@@ -9,6 +9,7 @@ of a user's f and g.
 import numpy as np
 
 from survey.kernels.cylinder import (
+    balls,
     creeping,
     lockstep,
     lockstep_abel,
@@ -35,18 +36,24 @@ def of_functions(variables, options):
 
 
 def first_of_functions(variables, options):
-    """For a user's f and g: what the process that waits compiles first, as the other has more to do."""
-    question = options.get("question")
+    """For a user's f and g: what the process that waits compiles first, as the other has more to do,
+    and needs `balls` as well.
+    """
+    question, p = options.get("question"), np.zeros(OPERATIONS + WIDTH)
+    nothing, known = np.empty(0), np.zeros(0, np.bool_)
     work, none = np.zeros((lockstep.ROWS, lockstep.LANES)), np.empty((0, 0))
-    rows, planes = np.full(lockstep.LANES, -1), np.empty((rc.STATE, 0, 0))
+    if question in ("trajectory", "abel"):
+        balls.balls(p, nothing, known, nothing, nothing, nothing)
     if question == "trajectory":
+        rows, planes = np.full(lockstep.LANES, -1), np.empty((rc.STATE, 0, 0))
         turnings = np.empty((0, 0), np.int64)
         lockstep.record(work.reshape(-1), none, rows, rows, rows, planes, turnings)
     if question == "abel":
         block = np.zeros(8 * lockstep_abel.BLOCK)
         lockstep_program.cross(*lockstep.split(work)[:4], 0, 0.0, 0.0, 0.0, block, 0)
     if question == "fate" and "separatrix" not in options:
-        _of_cycles(np.zeros(OPERATIONS + WIDTH))
+        balls.balls_of_one(p, nothing, known, 0.0, 0.0, nothing)
+        _of_cycles(p)
 
 
 def _compile(p, options, own):
