@@ -71,7 +71,7 @@ def run(
     ------
     survey.BadInput, survey.Damaged, survey.Stopped (resumable): one line each.
     """
-    from survey.request import earlier  # what evaluate does without: half of the time of loading
+    from survey.request import earlier  # evaluate needs none of these, which take long to load
     from survey.request.workflow import check, read
     from survey.sweep import engine
 

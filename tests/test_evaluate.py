@@ -6,6 +6,7 @@ import pytest
 import xarray as xr
 
 import survey
+from survey.file import labels
 
 SYSTEM = {
     "question": "trajectory",
@@ -162,3 +163,38 @@ def test_what_a_caller_does_to_a_dataset_is_not_in_the_next(mu):
     ds.status.values[...] = 9
     ds.attrs.pop("title")
     assert str(text(survey.evaluate("libration", mu=mu))) == before
+
+
+def test_a_lazy_survey_takes_no_memory_however_often_it_is_asked_for():
+    times, starts = (
+        xr.DataArray(da.linspace(0.1, 0.9, 200_000, chunks=50_000), dims=dim) for dim in ("t", "w0")
+    )
+    system = {"b12": 0.7, "b31": -0.4, "d": 1.1, "s2": 0.5}
+    for _ in range(3):  # with an output that is an integer, NaN where it does not apply
+        ds = survey.evaluate(
+            "gyrostat", question="trajectory", phi0=0.0, w0=starts, t=times, **system
+        )
+        assert ds.turnings.shape == (200_000, 200_000)
+
+
+@pytest.mark.parametrize("scene", ["libration", "satellite"])
+def test_a_dataset_asked_for_again_is_like_the_first(scene):
+    """Of other values, one of a kind that was made before is a copy without values, filled."""
+
+    def ask(shift):
+        if scene == "libration":
+            return survey.evaluate("libration", mu=[0.01 + shift, 0.02, np.nan])
+        k = xr.DataArray([0.1 + shift, 0.5], dims="point", coords={"point": ["a", "b"]})
+        return survey.evaluate("satellite", k=k, rho=[1.0, 2.0 + shift, 3.0])
+
+    labels._kept.cache_clear()
+    first = ask(0.0)
+    ask(0.1), ask(0.2)
+    again = ask(0.0)
+    xr.testing.assert_identical(again, first)
+    for name, variable in first.variables.items():
+        assert type(again.variables[name]) is type(variable)
+        assert again.variables[name].encoding == variable.encoding
+    assert [*again.xindexes] == [*first.xindexes]
+    shared = [n for n in again.variables if np.shares_memory(again[n].values, ask(0.0)[n].values)]
+    assert not shared

@@ -24,6 +24,11 @@ def test_nothing_that_a_first_point_alone_needs_is_loaded_before():
     )
 
 
+def test_a_first_call_loads_what_it_needs_alone():
+    code = "import survey; survey.evaluate('satellite', k=0.5, rho=[1.0, 2.0])"
+    assert not {"dask.array", "pydantic", "matplotlib"} & set(loaded_by(code))
+
+
 def test_telling_what_a_file_contains_loads_no_compiler():
     path = Path(__file__).parent / "golden/mathieu.nc"
     code = (

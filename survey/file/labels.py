@@ -14,14 +14,15 @@ import numpy as np
 from survey import __version__, status
 from survey.errors import Damaged
 from survey.file import schema
-from survey.grid import Grid
-from survey.scene import Request, exists
+from survey.scene import exists
 from survey.wording import summary
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
 UNDECIDED = -1  # of every verdict
 FILL = "_FillValue"  # CF's attribute: the integer that stands where none applies
 CHUNK = 2**16  # values whose temporaries fit in the cache
+# datasets of one kind that take as long as loading dask.array, which xarray does where a dataset is copied
+MANY = 500
 
 
 def outputs_of(scene, request):
@@ -74,51 +75,69 @@ def percent(fraction, bar):
 
 def describe(grid, scene, name, request, arrays):
     """The dataset of a survey: `arrays` holds the variables of `layout` in the grid's shape."""
-    asked = request.variables, tuple(request.options.items()), request.method, request.rtol
     given = tuple((key, dims, values.shape) for key, (dims, values) in grid.parameters.items())
-    known, fills, flagged = _without_values(scene, name, tuple(grid.sizes.items()), given, *asked)
-    ds = known.copy(data={key: _masked(arrays[key], fill) for key, fill in fills.items()})
-    for key, codes in flagged.items():
-        ds.variables[key].attrs["flag_values"] = codes.copy()
-    for key, (_, values) in grid.parameters.items():
-        ds.variables[key].data = values
-    for key, (dims, _) in grid.parameters.items():
-        if dims == (key,):
+    asked = request.variables, tuple(request.options.items()), request.method, request.rtol
+    kept = _kept(scene, name, tuple(grid.sizes.items()), given, *asked)
+    kept.times += 1
+    if kept.times == 1 or (kept.times < MANY and "dask.array" not in sys.modules):
+        return _dataset(grid, scene, name, request, arrays)
+    if kept.blank is None:
+        kept.blank = _without_values(_dataset(grid, scene, name, request, arrays))
+    blank, fills, names = kept.blank
+    ds = blank.copy(data={key: _masked(arrays[key], fill) for key, fill in fills.items()})
+    for of in ds.variables.values():
+        if "flag_values" in of.attrs:
+            of.attrs["flag_values"] = of.attrs["flag_values"].copy()
+    for key in names:
+        own = key in grid.parameters
+        ds.variables[key].data = grid.parameters[key][1] if own else np.array(scene.DIMENSIONS[key])
+        if ds.variables[key].dims == (key,):
             ds = ds.set_xindex(key)
     return ds
 
 
-@lru_cache(maxsize=64)
-def _without_values(scene, name, sizes, given, wanted, options, method, rtol):
-    """(dataset, fills, codes) of a survey whose values are not known yet, its axes without indexes.
-
-    To copy it and to index its axes takes a third of the time of making one. `given` holds (name,
-    dimensions, shape) of each parameter, `fills` the integers of `_masked` by output, and `codes`
-    the `flag_values` of those that have some.
+class _Kept:
+    """How many `times` datasets of one kind were asked for, and what `_without_values` gives of
+    them: to copy that and to index its axes takes a third of the time of making a dataset.
     """
+
+    times, blank = 0, None
+
+
+@lru_cache(maxsize=64)
+def _kept(*_kind):
+    return _Kept()
+
+
+def _without_values(ds):
+    """(the dataset with zeros that take no memory, however large, and without indexes; the integers
+    of `_masked` by output; its coordinates).
+    """
+
+    def zeros(of):
+        return np.broadcast_to(np.zeros((), of.dtype), of.shape)
+
+    fills = {key: ds.variables[key].encoding.get(FILL) for key in ds.data_vars}
+    blank = ds.copy(data={key: zeros(ds.variables[key]) for key in fills})
+    blank = blank.drop_indexes([*ds.xindexes])
+    for key in ds.coords:
+        blank.variables[key].data = zeros(ds.variables[key])
+    return blank, fills, [*ds.coords]
+
+
+def _dataset(grid, scene, name, request, arrays):
     import xarray as xr
 
-    def blank(shape, kind=float):  # no memory, however large
-        return np.broadcast_to(np.zeros((), kind), shape)
-
-    request = Request(dict(options), method, rtol, wanted)
-    grid = Grid(dict(sizes), {key: (dims, blank(shape)) for key, dims, shape in given})
-    kinds = layout(scene, request)
+    # made here, as xarray takes longer to find out what they are
     data = {
-        key: variable(dims, blank(grid.shape + kinds[key][2], kinds[key][0]), attrs)
+        key: variable(dims, arrays[key], attrs)
         for key, (dims, attrs) in variables(grid, scene, request).items()
     }
-    fills = {key: of.encoding.get(FILL) for key, of in data.items()}
-    coords = {key: xr.Variable(*of) for key, of in coordinates(grid, scene, request).items()}
-    parameters = {key: coords.pop(key) for key in grid.parameters}
-    ds = xr.Dataset(data, xr.Coordinates(parameters, indexes={}), attributes(scene, name, request))
-    ds = ds.assign_coords(coords)
-    flagged = {
-        key: of.attrs["flag_values"]
-        for key, of in ds.variables.items()
-        if "flag_values" in of.attrs
+    coords = {
+        key: xr.Variable(*of, fastpath=True)
+        for key, of in coordinates(grid, scene, request).items()
     }
-    return ds, fills, flagged
+    return xr.Dataset(data, coords, attributes(scene, name, request))
 
 
 def variable(dims, values, attributes):

@@ -4,7 +4,7 @@ kernels are compiled: a quarter of the compiler's time.
 The code that it makes is the same. For each a[i] of arrays it tries half a dozen rules for other
 types first; where it looks for what is compiled already, it compares the compiler's flags, which
 all have one hash, option by option, though nearly all are defaults; and it times each of the tens
-of thousands of calls of LLVM.
+of thousands of calls of LLVM, of which its events `numba:llvm_lock` tell nothing meanwhile.
 """
 
 from functools import cache
@@ -13,7 +13,7 @@ from numba.core import event
 from numba.core.targetconfig import TargetConfig
 from numba.core.types.functions import BaseFunction
 
-_MODULES = ("_operator", "builtins", "math")  # of functions whose result depends on types alone
+_MODULES = ("_operator", "builtins", "math")  # of functions that are asked for most
 _LLVM = "numba:llvm_lock"
 _known = {}
 
@@ -39,7 +39,7 @@ def _equal(self, other):
 
 
 def _hash(self):
-    """One number for all sets of the same options, as numba has it."""
+    """A number that depends on the names of the options, not on their values, as in numba."""
     return _hash_of(type(self))
 
 
@@ -53,11 +53,12 @@ def _call_type(self, context, args, kws):
     function = self.key[0]
     if kws or getattr(function, "__module__", None) not in _MODULES:
         return _USUAL[BaseFunction, "get_call_type"](self, context, args, kws)
-    asked = self, context, tuple(args), len(self.templates)  # anyone may add rules
+    asked = self, context, tuple(args)  # a function to which a rule is added is another one
     signature = _known.get(asked)
     if signature is None:
         signature = _USUAL[BaseFunction, "get_call_type"](self, context, args, kws)
-        if self.get_impl_key(signature) is function:  # else numba notes what it compiles for this
+        # else numba has compiled something for this call, which it notes at each call
+        if self.get_impl_key(signature) is function:
             _known[asked] = signature
     return signature
 

@@ -18,11 +18,10 @@ class Rows:
             axis for axis in range(len(self.shape)) if any(self._size(a, axis) > 1 for a in shared)
         ]
         of_lanes = [axis for axis in range(len(self.shape)) if axis not in of_rows]
-        self.order = of_rows + of_lanes
+        self.order, self.row_shape = of_rows + of_lanes, tuple(self.shape[axis] for axis in of_rows)
         self.at_first = tuple(
             slice(None) if axis in of_rows else 0 for axis in range(len(self.shape))
         )
-        self.row_shape = tuple(self.shape[axis] for axis in of_rows)
         self.rows = prod(self.shape[axis] for axis in of_rows)
         self.lanes = prod(self.shape[axis] for axis in of_lanes)
         self.sorted_shape = [self.shape[axis] for axis in self.order]

@@ -9,6 +9,8 @@ import sys
 import threading
 import time
 
+from survey.sweep import dispatch
+
 PATIENCE = 0.5  # seconds of compiling that pass without a word
 # measured, 2 cores, by family; of scenes of which less is compiled, on one, and what cells need besides
 SECONDS = {
@@ -44,8 +46,6 @@ def always_compiled(scene):
 
 def seconds(name, scene, cells=False, request=None):
     """How long compiling a scene's kernels for a request usually takes here; with those of `cells`."""
-    from survey.sweep.dispatch import cpus  # loads dask
-
     asked = scene.FAMILY, request and request.options.get("question")
     if asked in OF_QUESTIONS:
         return OF_QUESTIONS[asked]
@@ -55,7 +55,7 @@ def seconds(name, scene, cells=False, request=None):
     kernels += max((further.get(o, 0) for o in wanted), default=0)
     divided = hasattr(scene, "compile_ahead") and name not in OF_SCENES
     # measured: on one processor, what another compiles meanwhile comes after it
-    return (kernels + more * cells) * (2 if divided and cpus() == 1 else 1)
+    return (kernels + more * cells) * (2 if divided and dispatch.cpus() == 1 else 1)
 
 
 def sentence(name, scene, request=None):

@@ -28,7 +28,7 @@ def command(ahead, request):
 @contextlib.contextmanager
 def compiling_ahead(scene, request):
     """Where kernels are not compiled yet, compile some in another process while this one compiles
-    the longest.
+    the longest: what a scene of the user's own has in `compile_first` before all others.
     """
     ahead = getattr(scene, "compile_ahead", None)
     if not (

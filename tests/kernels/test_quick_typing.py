@@ -1,32 +1,41 @@
+"""What numba is given from memory is what it would find again."""
+
 import itertools
 import math
 import operator
 
 import numba
+import numpy as np
 import pytest
 from numba import types
+from numba.core import event
+from numba.core.compiler import Flags
 from numba.core.registry import cpu_target
 from numba.core.targetconfig import TargetConfig
+from numba.core.types.functions import BaseFunction
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 
-from survey.kernels import quick_typing
-from survey.kernels.jit import kernel
+from survey.kernels import jit, quick_typing
 
-FLAGS = numba.core.compiler.Flags
+pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
 
 
 @pytest.fixture
-def remembering():
+def remembering(monkeypatch):
+    monkeypatch.setattr(quick_typing, "_known", {})
     quick_typing.begin()
     yield
     quick_typing.end()
 
 
+def function_type(function):
+    cpu_target.typing_context.refresh()
+    return cpu_target.typing_context.resolve_value_type(function)
+
+
 def typed(function, *arguments):
     """The signature that numba gives, by what it uses at this moment."""
-    context = cpu_target.typing_context
-    context.refresh()
-    return context.resolve_value_type(function).get_call_type(context, arguments, {})
+    return function_type(function).get_call_type(cpu_target.typing_context, arguments, {})
 
 
 ARRAY = types.Array(types.float64, 2, "C")
@@ -41,37 +50,41 @@ CALLS = [
     (math.sqrt, types.float64),
     (math.sqrt, types.int64),
     (bool, types.int64),
-    (max, types.float64, types.float64),
 ]
 
 
 @pytest.mark.parametrize("call", CALLS, ids=str)
-def test_the_types_are_those_of_numba(call, remembering):
-    first, again = typed(*call), typed(*call)
+def test_signatures_are_those_of_numba_and_remembered(call, remembering):
+    first = typed(*call)
+    assert list(quick_typing._known.values()) == [first] and typed(*call) is first
     quick_typing.end()
     usual = typed(*call)
-    assert first == again == usual and again.return_type == usual.return_type
+    assert first == usual and first.return_type == usual.return_type
 
 
-def test_a_rule_that_is_added_is_heard(remembering):
-    class Own(types.Type):
-        def __init__(self):
-            super().__init__("Own")
+def test_what_numba_compiles_for_a_call_is_not_remembered(remembering):
+    assert typed(max, types.float64, types.float64).return_type == types.float64
+    assert not quick_typing._known
 
-    with pytest.raises(numba.TypingError):
-        typed(operator.matmul, Own(), types.float64)
 
-    @infer_global(operator.matmul)
-    class Rule(AbstractTemplate):
+def test_a_function_with_more_rules_is_asked_anew(remembering):
+    typed(operator.lshift, types.int64, types.int64)
+    before = function_type(operator.lshift)
+    assert before in {function for function, *_ in quick_typing._known}
+
+    @infer_global(operator.lshift)
+    class Rule(AbstractTemplate):  # of no types
         def generic(self, args, kws):
-            return signature(types.int8, *args) if isinstance(args[0], Own) else None
+            return signature(types.int8, *args) if args == () else None
 
-    assert typed(operator.matmul, Own(), types.float64).return_type == types.int8
+    typed(operator.lshift, types.int64, types.int64)
+    after = function_type(operator.lshift)
+    assert before != after and after in {function for function, *_ in quick_typing._known}
 
 
 def test_flags_are_equal_where_numba_says_so(remembering):
     def made(**options):
-        flags = FLAGS()
+        flags = Flags()
         for name, value in options.items():
             setattr(flags, name, value)
         return flags
@@ -92,30 +105,36 @@ def test_flags_are_equal_where_numba_says_so(remembering):
     assert (made() == 1) is False
 
 
-def test_numba_does_as_usual_once_a_kernel_is_compiled():
-    usual = (
-        TargetConfig.__eq__,
-        types.functions.BaseFunction.get_call_type,
-        numba.core.event.start_event,
+def in_use():
+    return TargetConfig.__eq__, BaseFunction.get_call_type, event.start_event
+
+
+@pytest.mark.parametrize("module, ours", [("survey.kernels.some", True), ("other", False)])
+@pytest.mark.parametrize("wrong", [False, True])
+def test_numba_remembers_while_a_kernel_is_compiled_and_does_as_usual_afterwards(
+    module, ours, wrong
+):
+    usual, seen = in_use(), []
+
+    def asked(x):
+        pass
+
+    @numba.extending.overload(asked)
+    def _asked(x):
+        seen.append(in_use())
+        return None if wrong else lambda x: x
+
+    def called(x):
+        return asked(x[0])
+
+    called.__module__ = module
+    kernel = jit.fresh(called)
+    if wrong:
+        with pytest.raises(numba.TypingError):
+            kernel(np.zeros(1))
+    else:
+        assert kernel(np.ones(1)) == 1.0
+    assert seen and all(
+        (a is not b) == ours for now in seen for a, b in zip(now, usual, strict=True)
     )
-
-    @kernel
-    def _twice(x):
-        return 2.0 * x
-
-    _twice.py_func.__module__ = "survey.kernels.test"
-    assert _twice(1.5) == 3.0
-    assert usual == (
-        TargetConfig.__eq__,
-        types.functions.BaseFunction.get_call_type,
-        numba.core.event.start_event,
-    )
-
-    @kernel
-    def _wrong(x):
-        return x.nothing
-
-    _wrong.py_func.__module__ = "survey.kernels.test"
-    with pytest.raises(numba.TypingError):
-        _wrong(1.5)
-    assert TargetConfig.__eq__ is usual[0]
+    assert in_use() == usual

@@ -1,5 +1,5 @@
-"""What a process of its own compiles at the first use of a question (see
-`survey.sweep.compile_ahead`).
+"""What a process of its own compiles at the first use of a question, and what the process that
+waits for it compiles first (see `survey.sweep.compile_ahead`).
 
 The kernels are called on no rows, and some on a program of zeros. They are those that come before
 and after the cycles of fates and portraits, one of the two of Abel's equation, or the trajectories

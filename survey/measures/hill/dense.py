@@ -293,10 +293,10 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
         return
     sought = _sought(asked)
     degree = np.full(len(problem.p), DEGREES.size)
-    kind = _kind(problem, axis, sought)
-    degree[chosen] = _enough(kind, _least(problem, asked.rtol, sought))[chosen]
+    argument = _argument(problem, axis, sought)
+    degree[chosen] = _enough(argument, _smallest(problem, asked.rtol, sought))[chosen]
     if problem.c2 and not sought.factors:  # not beyond what pays, where less may do
-        enough = np.minimum(_enough(kind, ROWS_SHARE * asked.rtol), axis.most - 1)
+        enough = np.minimum(_enough(argument, ROWS_SHARE * asked.rtol), axis.most - 1)
         degree[chosen] = np.maximum(degree, enough)[chosen]
     first = degree.copy()
     # a row whose series has not converged goes on to the next degree
@@ -532,9 +532,10 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
-    phase = np.abs(np.diff(ends.span * size))  # half the change of D's phase
-    at = int(_enough(0.5 * phase if sought.factors else phase, rtol)[0])
-    degree = int(_enough(_kind(ends, axis, sought), _least(ends, rtol, sought)).max())
+    half = np.abs(np.diff(ends.span * size))  # the change of D's phase
+    at = int(_enough(0.5 * half if sought.factors else half, rtol)[0])
+    smallest = _smallest(ends, rtol, sought)
+    degree = int(_enough(_argument(ends, axis, sought), smallest).max())
     spent = 0
     doubt = np.inf
     while at < DEGREES.size and degree < axis.most and spent + DEGREES[at] <= budget:
@@ -568,7 +569,7 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     return None, spent
 
 
-def _kind(problem, axis, sought):
+def _argument(problem, axis, sought):
     """The argument x of J_n(x) that the coefficients of each row's D, or of its factors, resemble."""
     share = 0.5 if sought.factors else 1.0  # they are those of half a period
     if problem.c2:
@@ -578,19 +579,19 @@ def _kind(problem, axis, sought):
     return share * (problem.span * np.sqrt(2 * axis.radius * problem.bound[:, 1]))
 
 
-def _least(problem, rtol, sought):
-    """How small coefficients have to be where a series may end."""
+def _smallest(problem, rtol, sought):
+    """The size of coefficients below which a series may end."""
     return FACTORS_SHARE * rtol if problem.c2 and sought.factors else rtol
 
 
-def _enough(kind, rtol):
-    """The index in DEGREES where J_n(kind), about a coefficient, is below rtol; beyond DEGREES
+def _enough(argument, rtol):
+    """The index in DEGREES where J_n(argument), about a coefficient, is below rtol; beyond DEGREES
     where there is none.
 
     |J_n(x)| <= (x/2)^n / n! (DLMF 10.14.4).
     """
     with np.errstate(divide="ignore"):
-        size = DEGREES * np.log(kind)[:, None] + _OF_DEGREES
+        size = DEGREES * np.log(argument)[:, None] + _OF_DEGREES
     enough = size < log(0.01 * rtol)
     return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
 
