@@ -14,13 +14,13 @@ from survey.sweep import dispatch
 PATIENCE = 0.5  # seconds of compiling that pass without a word
 # measured, 2 cores, by family; of scenes of which less is compiled, on one, and what cells need besides
 SECONDS = {
-    "hill": 7,
-    "cylinder": 10,
-    "abel": 18,
-    "nutation": 9,
-    "danby": 7,
+    "hill": 6,
+    "cylinder": 9,
+    "abel": 13,
+    "nutation": 7,
+    "danby": 6,
     "normal_form": 7,
-    "floquet": 11,
+    "floquet": 10,
 }
 OF_SCENES = {"mathieu": (6, 7), "libration_elliptic": (6, 8)}
 OF_QUESTIONS = {("cylinder", "trajectory"): 6}  # of which nothing is compiled beside
@@ -59,7 +59,7 @@ def seconds(name, scene, cells=False, request=None):
 
 
 def sentence(name, scene, request=None):
-    """`compiling gyrostat, once on this machine, about 10 s`."""
+    """`compiling gyrostat, once on this machine, about 9 s`."""
     when = "in each process that solves it" if always_compiled(scene) else "on this machine"
     return f"compiling {name}, once {when}, about {seconds(name, scene, request=request)} s"
 

@@ -32,7 +32,7 @@ def test_compiling_is_named_once_it_takes_a_moment(monkeypatch):
         function_of_own = numba.njit(lambda x: x + 1.0)
         assert function_of_own(1.0) == 2.0
         time.sleep(0.2)
-    assert said == ["compiling gyrostat, once on this machine, about 10 s"]
+    assert said == ["compiling gyrostat, once on this machine, about 9 s"]
     said.clear()
     with announce.compiling("gyrostat", scene, said.append):
         function_of_own(2.0)  # compiled already

@@ -203,8 +203,8 @@ def complete(rows, angles):
     first, end = 2 * LANES + COARSEST, 2 * LANES + pieces
     radii[2 * LANES : first] = _middles(COARSEST, at[2 * LANES : first])
     radii[first:end] = _middles(4 * COARSEST, at[first:end])
-    for p in rows:
-        good = True
+    for r in range(len(rows)):
+        p, good = rows[r], True  # the rows of `for p in rows` are of a type of their own
         for k in range(OPERATIONS, len(p)):
             good &= math.isfinite(p[k])
         if good:

@@ -41,13 +41,13 @@ def first_of_functions(variables, options):
     """
     question, p = options.get("question"), np.zeros(OPERATIONS + WIDTH)
     nothing, known = np.empty(0), np.zeros(0, np.bool_)
-    work, none = np.zeros((lockstep.ROWS, lockstep.LANES)), np.empty((0, 0))
+    work = np.zeros((lockstep.ROWS, lockstep.LANES))
     if question in ("trajectory", "abel"):
         balls.balls(p, nothing, known, nothing, nothing, nothing)
     if question == "trajectory":
-        rows, planes = np.full(lockstep.LANES, -1), np.empty((rc.STATE, 0, 0))
-        turnings = np.empty((0, 0), np.int64)
-        lockstep.record(work.reshape(-1), none, rows, rows, rows, planes, turnings)
+        times, planes = np.empty((0, 0)), np.empty((rc.STATE, 0, 0))
+        rows, turnings = np.full(lockstep.LANES, -1), np.empty((0, 0), np.int64)
+        lockstep.record(work.reshape(-1), times, rows, rows, rows, planes, turnings)
     if question == "abel":
         block = np.zeros(8 * lockstep_abel.BLOCK)
         lockstep_program.cross(*lockstep.split(work)[:4], 0, 0.0, 0.0, 0.0, block, 0)
