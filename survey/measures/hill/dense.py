@@ -532,8 +532,8 @@ def _surface(row_axis, method, rtol, middle, radius, axis, budget, sought):
     """
     ends = row_axis.at(middle + radius * np.array([-1.0, 1.0]))
     size = np.sqrt((ends.bound * np.abs([1.0, axis.radius, axis.radius**2])).sum(axis=1))
-    half = np.abs(np.diff(ends.span * size))  # the change of D's phase
-    at = int(_enough(0.5 * half if sought.factors else half, rtol)[0])
+    argument = np.abs(np.diff(ends.span * size))  # half the change of D's phase
+    at = int(_enough(0.5 * argument if sought.factors else argument, rtol)[0])
     smallest = _smallest(ends, rtol, sought)
     degree = int(_enough(_argument(ends, axis, sought), smallest).max())
     spent = 0
