@@ -24,8 +24,9 @@ def test_nothing_that_a_first_point_alone_needs_is_loaded_before():
     )
 
 
-def test_a_first_call_loads_what_it_needs_alone():
-    code = "import survey; survey.evaluate('satellite', k=0.5, rho=[1.0, 2.0])"
+def test_calls_load_what_they_need_alone():
+    call = "survey.evaluate('satellite', k=0.5, rho=[1.0, 2.0])"
+    code = f"import survey; {'; '.join([call] * 3)}"  # from the second on a dataset is copied
     assert not {"dask.array", "pydantic", "matplotlib"} & set(loaded_by(code))
 
 

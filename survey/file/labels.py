@@ -21,8 +21,6 @@ CONVENTIONS = "CF-1.11, ACDD-1.3"
 UNDECIDED = -1  # of every verdict
 FILL = "_FillValue"  # CF's attribute: the integer that stands where none applies
 CHUNK = 2**16  # values whose temporaries fit in the cache
-# datasets of one kind that take as long as loading dask.array, which xarray does where a dataset is copied
-MANY = 500
 
 
 def outputs_of(scene, request):
@@ -78,30 +76,35 @@ def describe(grid, scene, name, request, arrays):
     given = tuple((key, dims, values.shape) for key, (dims, values) in grid.parameters.items())
     asked = request.variables, tuple(request.options.items()), request.method, request.rtol
     kept = _kept(scene, name, tuple(grid.sizes.items()), given, *asked)
-    kept.times += 1
-    if kept.times == 1 or (kept.times < MANY and "dask.array" not in sys.modules):
+    if not kept.asked:  # most are asked for once
+        kept.asked = True
         return _dataset(grid, scene, name, request, arrays)
     if kept.blank is None:
         kept.blank = _without_values(_dataset(grid, scene, name, request, arrays))
     blank, fills, names = kept.blank
-    ds = blank.copy(data={key: _masked(arrays[key], fill) for key, fill in fills.items()})
+    ds = blank.copy(
+        data={
+            key: _bare(blank.variables[key].dims, _masked(arrays[key], fill))
+            for key, fill in fills.items()
+        }
+    )
     for of in ds.variables.values():
         if "flag_values" in of.attrs:
             of.attrs["flag_values"] = of.attrs["flag_values"].copy()
     for key in names:
-        own = key in grid.parameters
-        ds.variables[key].data = grid.parameters[key][1] if own else np.array(scene.DIMENSIONS[key])
-        if ds.variables[key].dims == (key,):
+        dims, values = grid.parameters.get(key) or ((key,), np.array(scene.DIMENSIONS[key]))
+        ds.variables[key].data = _bare(dims, values)
+        if dims == (key,):
             ds = ds.set_xindex(key)
     return ds
 
 
 class _Kept:
-    """How many `times` datasets of one kind were asked for, and what `_without_values` gives of
-    them: to copy that and to index its axes takes a third of the time of making a dataset.
+    """Whether datasets of one kind were `asked` for, and what `_without_values` gives of them: to
+    copy that and to index its axes takes a third of the time of making a dataset.
     """
 
-    times, blank = 0, None
+    asked, blank = False, None
 
 
 @lru_cache(maxsize=64)
@@ -115,7 +118,7 @@ def _without_values(ds):
     """
 
     def zeros(of):
-        return np.broadcast_to(np.zeros((), of.dtype), of.shape)
+        return _bare(of.dims, np.broadcast_to(np.zeros((), of.dtype), of.shape))
 
     fills = {key: ds.variables[key].encoding.get(FILL) for key in ds.data_vars}
     blank = ds.copy(data={key: zeros(ds.variables[key]) for key in fills})
@@ -123,6 +126,15 @@ def _without_values(ds):
     for key in ds.coords:
         blank.variables[key].data = zeros(ds.variables[key])
     return blank, fills, [*ds.coords]
+
+
+def _bare(dims, values):
+    """The values as xarray takes them at once: of plain arrays it asks whether dask made them, and
+    would load dask.array for that.
+    """
+    import xarray as xr
+
+    return xr.Variable(dims, values, fastpath=True)
 
 
 def _dataset(grid, scene, name, request, arrays):
