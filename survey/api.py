@@ -28,7 +28,7 @@ from survey.request.checks import (
     methods_of,
 )
 from survey.request.function_scene import FunctionScene
-from survey.scene import Option, Output, Parameter, Request, condition, exists
+from survey.scene import Option, Output, Parameter, Request, condition, existing_outputs
 from survey.sweep import announce, solve
 from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.progress import Progress, watched
@@ -268,7 +268,7 @@ def _lazy(
         solved = solve.solve_point(module, request, dict(zip(names, wide, strict=True)), shape)
         return tuple(solved[name] for name in table)
 
-    outputs = {o.name: o for o in module.OUTPUTS if exists(o, request.options)}
+    outputs = {o.name: o for o in existing_outputs(module, request.options)}
     extra = [outputs.get(name.removesuffix("_error")) for name in table]
     results = xr.apply_ufunc(
         solve_arrays,

@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import inf
 from typing import Any
 
@@ -187,3 +188,13 @@ def condition(scene: Any, when: Mapping[str, tuple[str, ...]], own: str = "") ->
 def exists(item: Parameter | Output | Option, options: Mapping[str, str]) -> bool:
     """Does this parameter or output exist under these option values?"""
     return all(options.get(name, "") in allowed for name, allowed in item.when.items())
+
+
+def existing_outputs(scene: Any, options: Mapping[str, str]) -> tuple[Output, ...]:
+    """The Outputs of a scene that exist under these option values."""
+    return _existing_outputs(scene, tuple(options.items()))
+
+
+@lru_cache(maxsize=64)
+def _existing_outputs(scene: Any, options: tuple[tuple[str, str], ...]) -> tuple[Output, ...]:
+    return tuple(output for output in scene.OUTPUTS if exists(output, dict(options)))

@@ -21,7 +21,7 @@ from survey.file.labels import as_stored, outputs_of
 from survey.measures.hill.edges import FACTORS
 from survey.request import user_scene
 from survey.request.checks import methods_of
-from survey.scene import Request, exists
+from survey.scene import Request, existing_outputs
 from survey.sweep import boundaries
 
 
@@ -56,7 +56,7 @@ def audit(ds, points, seed=0):
     outputs = outputs_of(module, Request(options, variables=frozenset(flat.data_vars)))
     outputs, report["complaints"] = _stored_as_declared(flat, outputs, module)
     answered = np.zeros(flat.status.size, bool)
-    decided = any(o.name == "verdict" and exists(o, options) for o in module.OUTPUTS)
+    decided = any(o.name == "verdict" for o in existing_outputs(module, options))
     rtol = max(ds.attrs["rtol"] / 100, 1e-13)
     wanted = [o.name for o in outputs]
     for method in used:

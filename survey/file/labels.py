@@ -14,7 +14,7 @@ import numpy as np
 from survey import __version__, status
 from survey.errors import Damaged
 from survey.file import schema
-from survey.scene import exists
+from survey.scene import existing_outputs
 from survey.wording import summary
 
 CONVENTIONS = "CF-1.11, ACDD-1.3"
@@ -30,7 +30,7 @@ def outputs_of(scene, request):
 
 @lru_cache(maxsize=64)
 def _outputs_of(scene, names, options):
-    return [o for o in scene.OUTPUTS if o.name in names and exists(o, dict(options))]
+    return [o for o in existing_outputs(scene, dict(options)) if o.name in names]
 
 
 def layout(scene, request):

@@ -50,7 +50,7 @@ from survey.precision import peers as programs
 from survey.precision.cases import own_file
 from survey.request import ranges
 from survey.request.checks import check_options, check_parameters, methods_of
-from survey.scene import Request, exists
+from survey.scene import Request, existing_outputs
 from survey.waiting import compile_seconds
 
 SETTINGS = tuple(10.0**-n for n in range(4, 14))
@@ -323,7 +323,7 @@ def _solver(module, method, error):
     def solve(point, options, rtol, everything=False):
         options = check_options(module, options, point)
         used = check_parameters(module, module.TITLE, options, point)
-        asked = [o.name for o in module.OUTPUTS if exists(o, options) and not o.on_request]
+        asked = [o.name for o in existing_outputs(module, options) if not o.on_request]
         wanted = frozenset(name for name in asked if everything or name in (error, "verdict"))
         ndim = max(np.ndim(values) for values in point.values()) or 1
         arrays = {key: np.asarray(point.get(key, p.default), float) for key, p in used.items()}

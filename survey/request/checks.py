@@ -3,7 +3,6 @@
 `table` is what stands before a key in a message, such as "options."; it is empty where Python asks.
 """
 
-from functools import lru_cache
 from numbers import Real
 
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 import survey.methods
 from survey import measures, modules
 from survey.errors import BadInput
-from survey.scene import Request, condition, exists
+from survey.scene import Request, condition, existing_outputs, exists
 from survey.wording import short, shown
 
 
@@ -121,24 +120,19 @@ def check_request(scene, options, method, rtol, variables, tables=("", "")):
         raise BadInput(
             f"{tables[0]}rtol = {shown(rtol)}: it must lie between 0 and 1, such as 1e-10"
         )
-    outputs, usual = _outputs(scene, tuple(options.items()))
+    existing = existing_outputs(scene, options)
+    outputs = [output.name for output in existing]
     for variable in variables or ():
         if not isinstance(variable, str) or variable not in outputs:
             raise BadInput(
                 f"{tables[1]}variables: {modules.unknown('variable', variable, outputs)}"
             )
-    wanted = usual if variables is None else frozenset(variables)
-    return Request(options, method, float(rtol), wanted)
-
-
-@lru_cache(maxsize=64)
-def _outputs(scene, options):
-    """(names of the outputs that exist under these options, those that are computed unasked)."""
-    existing = [output for output in scene.OUTPUTS if exists(output, dict(options))]
-    return (
-        [output.name for output in existing],
-        frozenset(output.name for output in existing if not output.on_request),
+    wanted = (
+        [output.name for output in existing if not output.on_request]
+        if variables is None
+        else variables
     )
+    return Request(options, method, float(rtol), frozenset(wanted))
 
 
 def _check_method(scene, options, method, table):

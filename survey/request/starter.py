@@ -4,7 +4,7 @@ from survey import measures
 from survey.request.checks import check_options, check_parameters
 from survey.request.schema import File
 from survey.request.user_scene import find
-from survey.scene import exists
+from survey.scene import existing_outputs, exists
 
 NUMBERS = (41, 61)  # of values along the two axes
 FAR = 4.0  # where an axis ends whose parameter has no such bound
@@ -56,7 +56,7 @@ def workflow(scene):
     lines += ["", "[solver]", 'method = "auto"  # or one that `survey scenes` lists for this scene',
               "rtol = 1e-10  # the requested accuracy: |error| <= rtol (1 + |value|)", "", "[output]",
               f'path = "{name.removesuffix(".py").replace("/", "_")}.nc"']  # fmt: skip
-    drawn = [o.name for o in module.OUTPUTS if exists(o, options) and not o.dims]
+    drawn = [o.name for o in existing_outputs(module, options) if not o.dims]
     figure = given.get("figures", "verdict" if "verdict" in drawn else drawn[0])
     lines += [f'figures = ["{figure}"]  # pictures beside the file; of {", ".join(dict.fromkeys(drawn))}',
               "# variables = [...]  # which outputs are stored; by default all but those on request"]  # fmt: skip

@@ -45,19 +45,6 @@ def complete_integrals(k, kc):
     return first, first * (1.0 - total)
 
 
-def first_integral(kc):
-    """K alone of arrays of complements, the same bits."""
-    a, b = np.ones_like(kc), kc
-    for _ in range(MEANS):
-        wide = abs(a - b) > GAP * a
-        number = np.count_nonzero(wide)
-        if not number:
-            break
-        mean, other = 0.5 * (a + b), np.sqrt(a * b)
-        a, b = (mean, other) if number == wide.size else np.where(wide, (mean, other), (a, b))
-    return np.pi / (a + b)
-
-
 def half_periods(k, kc):
     """2 K(k), or K(1/k) / k for rotations, rounded, and the rest, as phases are rho times as long
     (DLMF 19.8.5).

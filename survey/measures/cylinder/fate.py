@@ -421,9 +421,8 @@ def _rotations(method, p, eqs, section, end, K, L, above):
     # below it too
     near = np.sign(start)
     if border > 0.0:
-        slower = max(
-            min(border, image), 1e-300
-        )  # of a velocity w is w^2 known to the rounding of scale^2
+        # of a velocity w is w^2 known to the rounding of scale^2
+        slower = max(min(border, image), 1e-300)
         error = image_error + SAME * border + 1e-14 * scale * scale / slower * (image > 0.0)
         near = np.sign(image - border) if abs(image - border) > error else math.nan
     sure = border > 0.0 or start > LEAST * scale

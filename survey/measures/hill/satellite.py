@@ -9,7 +9,7 @@ from math import pi, sqrt
 import numpy as np
 
 from survey.kernels.hill import satellite as motion
-from survey.kernels.hill.satellite import complete_integrals, first_integral, half_periods
+from survey.kernels.hill.satellite import complete_integrals, half_periods
 from survey.kernels.math.double import split_error
 from survey.kernels.math.roundoff import EPS
 
@@ -133,8 +133,8 @@ class Motion:
     @cached_property
     def rate(self):
         """1 / distance of the poles of w from the real axis: K' or K'/k."""
-        scale = np.maximum(self.k, 1)
-        return scale / first_integral(np.minimum(self.k, 1 / scale))
+        conjugate, _ = complete_integrals(self.kc, np.minimum(self.k, 1 / np.maximum(self.k, 1)))
+        return np.maximum(self.k, 1) / conjugate
 
     def lyapunov(self, rho, period):
         """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability,
