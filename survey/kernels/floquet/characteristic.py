@@ -100,7 +100,7 @@ def fill_rows(series, doubts, x, places, near, starts, outputs, needed, c, bars,
     """
     K, m, R, L = len(doubts), starts.shape[1], len(x), outputs.shape[1]
     rows, table = np.empty((R, K * m)), np.empty((m, LANES))
-    restrict(series, x, np.empty((2, K * m)), rows)
+    restrict(series, x, rows)
     of_row = (L + LANES - 1) // LANES
     for first in range(0, L, LANES):
         count = min(LANES, L - first)

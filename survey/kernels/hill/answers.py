@@ -29,9 +29,11 @@ UNTRIED = -1
 # Of half the angle of a point, where more digits are known: sin^2 and cos^2.
 SINE, SINE_BAR, COSINE, COSINE_BAR = range(4)
 SQUARES = 4
-# Rows of a tile of points, after these: of an exponent or a rotation number, and the number of zeros.
+# Rows of a tile of points, after these: of an exponent or a rotation number, and the number of zeros;
+# then the points' results.
 VALUE, DOUBT, ZEROS, WORK = range(SQUARES, SQUARES + 4)
-ROWS = SQUARES + 4
+OWN = SQUARES + 4
+ROWS = OWN + lanes.RESULTS
 TILE = 128
 
 
@@ -126,7 +128,7 @@ def measure(
     missed,
     status,
 ):
-    """What follows from `results` (n, RESULTS) of n of N points, from the `first` on, by
+    """What follows from `results` (RESULTS, n) of n of N points, from the `first` on, by
     arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
@@ -135,48 +137,60 @@ def measure(
     `squares` (n, SQUARES, or empty) holds what it finds, where more digits of it are known.
     """
     tile = np.empty((ROWS, TILE))
-    for start in range(0, len(results), TILE):
-        count = min(TILE, len(results) - start)
+    for start in range(0, results.shape[1], TILE):
+        count = min(TILE, results.shape[1] - start)
         begin, end = first + start, first + start + count
-        own, decided, left_out, misses = (
-            results[start : start + count],
-            verdict[begin:end],
-            status[begin:end],
-            missed[begin:end],
-        )
-        _half_angles(own, squares, start, full_period, tile)
+        decided, left_out, misses = verdict[begin:end], status[begin:end], missed[begin:end]
+        _half_angles(results, squares, start, count, full_period, tile)
         for i in range(count):
             sine, sine_bar, cosine, cosine_bar = _of_half(tile, i)
-            says = decide(sine, sine_bar, cosine, cosine_bar)
-            if len(rule) > 0:
-                of = rule[begin + i]
-                says = STABLE if of == NO_UNSTABLE_SIDE and says == UNDECIDED else says
-                says = MARGINAL if of == ON_EDGE else says
             # D from 2 - 4 sin^2 or 4 cos^2 - 2, whichever has the smaller bar.
             by_sine = sine_bar <= cosine_bar
             d = 2.0 - 4.0 * sine if by_sine else 4.0 * cosine - 2.0
             bar = 4.0 * (sine_bar if by_sine else cosine_bar) + 2.0 * EPS * (2.0 + abs(d))
-            if says == MARGINAL and abs(d) > bar:  # on an edge |D| = 2
-                d, bar = 2.0 if d > 0.0 else -2.0, 0.0
             tile[VALUE, i], tile[DOUBT, i] = d, bar
-            within = abs(d) < np.inf and bar < LARGEST
-            for c in range(4):
-                within &= own[i, lanes.Y1_BAR + c] < LARGEST
-            if left_out[i] == 0 and not within:
-                left_out[i] = overflow
-            decided[i] = says if left_out[i] == 0 else UNDECIDED
-            misses[i] = decides and left_out[i] == 0 and says == UNDECIDED
+        for i in range(count):
+            decided[i] = np.int8(decide(*_of_half(tile, i)))
+        if len(rule) > 0:
+            _obey(rule[begin:end], decided, tile)
+        for i in range(count):
+            within = (abs(tile[VALUE, i]) < np.inf) & (tile[DOUBT, i] < LARGEST)
+            within &= (tile[OWN + lanes.Y1_BAR, i] < LARGEST) & (
+                tile[OWN + lanes.DY1_BAR, i] < LARGEST
+            )
+            within &= (tile[OWN + lanes.Y2_BAR, i] < LARGEST) & (
+                tile[OWN + lanes.DY2_BAR, i] < LARGEST
+            )
+            tile[WORK, i] = 0.0 if within else 1.0
+        for i in range(count):
+            beyond = (left_out[i] == 0) & (tile[WORK, i] > 0.0)
+            left_out[i] = overflow if beyond else left_out[i]
+        for i in range(count):
+            decided[i] = decided[i] if left_out[i] == 0 else np.int8(UNDECIDED)
+        for i in range(count):
+            misses[i] = decides & (left_out[i] == 0) & (decided[i] == UNDECIDED)
         if wanted[0]:
-            _keep(tile, rtol, floats[DISCRIMINANT, begin:end], floats[DISCRIMINANT + 1, begin:end],
-                  misses, left_out)  # fmt: skip
+            _keep(tile[VALUE], tile[DOUBT], rtol, floats[DISCRIMINANT, begin:end],
+                  floats[DISCRIMINANT + 1, begin:end], misses, left_out)  # fmt: skip
         for c in range(4):
             at = FACTOR_ROWS[c]
             if wanted[at // 2]:
-                for i in range(count):
-                    tile[VALUE, i], tile[DOUBT, i] = own[i, lanes.Y1 + c], own[i, lanes.Y1_BAR + c]
-                _keep(
-                    tile, rtol, floats[at, begin:end], floats[at + 1, begin:end], misses, left_out
-                )
+                _keep(tile[OWN + lanes.Y1 + c], tile[OWN + lanes.Y1_BAR + c], rtol,
+                      floats[at, begin:end], floats[at + 1, begin:end], misses, left_out)  # fmt: skip
+
+
+@kernel
+def _obey(rule, decided, tile):
+    """What an exact rule says of neighbouring points, in place of the verdict `decided`, and of D, where
+    it is sharper.
+    """
+    for i in range(len(rule)):
+        if rule[i] == NO_UNSTABLE_SIDE and decided[i] == UNDECIDED:
+            decided[i] = STABLE
+        if rule[i] == ON_EDGE:
+            decided[i] = MARGINAL
+            if abs(tile[VALUE, i]) > tile[DOUBT, i]:  # on an edge |D| = 2
+                tile[VALUE, i], tile[DOUBT, i] = 2.0 if tile[VALUE, i] > 0.0 else -2.0, 0.0
 
 
 @kernel
@@ -187,15 +201,11 @@ def transcendental(
     who misses.
     """
     tile = np.empty((ROWS, TILE))
-    for start in range(0, len(results), TILE):
-        count = min(TILE, len(results) - start)
+    for start in range(0, results.shape[1], TILE):
+        count = min(TILE, results.shape[1] - start)
         begin, end = first + start, first + start + count
-        own, decided, left_out = (
-            results[start : start + count],
-            verdict[begin:end],
-            status[begin:end],
-        )
-        _half_angles(own, squares, start, full_period, tile)
+        decided, left_out = verdict[begin:end], status[begin:end]
+        _half_angles(results, squares, start, count, full_period, tile)
         if wanted[EXPONENT // 2]:
             for i in range(count):
                 sine, sine_bar, cosine, cosine_bar = _of_half(tile, i)
@@ -206,7 +216,7 @@ def transcendental(
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
         if wanted[ROTATION // 2]:
-            _lost(own, full_period, decided, tile)
+            _lost(full_period, decided, tile)
             _turns(
                 tile, rtol, floats[ROTATION, begin:end], floats[ROTATION + 1, begin:end],
                 decided, missed[begin:end], left_out,
@@ -238,19 +248,29 @@ def _of_half(tile, i):
     return tile[SINE, i], tile[SINE_BAR, i], tile[COSINE, i], tile[COSINE_BAR, i]
 
 
-@kernel
-def _half_angles(results, squares, first, full_period, tile):
-    """`_squares` of neighbouring points into the first rows of `tile`; those in `squares` begin at
-    row `first`.
+@splice
+def _half_angles(results, squares, first, count, full_period, tile):
+    """The results of `count` points from the `first` on into the last rows of `tile`, and their
+    `_squares` into its first rows.
     """
+    for c in range(lanes.RESULTS):
+        of = results[c, first : first + count]
+        for i in range(count):
+            tile[OWN + c, i] = of[i]
     if full_period or len(squares) > 0:
-        for i in range(len(results)):
-            found = _squares(results[i], squares, first + i, full_period)
-            for row in range(SQUARES):
-                tile[row, i] = found[row]
-        return
-    for i in range(len(results)):
-        found = _of_factors(results[i])
+        _other_half_angles(squares, first, count, full_period, tile)
+    else:
+        for i in range(count):
+            sine, sine_bar, cosine, cosine_bar = _of_factors(tile[OWN:, i])
+            tile[SINE, i], tile[SINE_BAR, i] = sine, sine_bar
+            tile[COSINE, i], tile[COSINE_BAR, i] = cosine, cosine_bar
+
+
+@kernel
+def _other_half_angles(squares, first, count, full_period, tile):
+    """As `_half_angles` at T, or where `squares` are known, those of these points from row `first` on."""
+    for i in range(count):
+        found = _squares(tile[OWN:, i], squares, first + i, full_period)
         for row in range(SQUARES):
             tile[row, i] = found[row]
 
@@ -363,19 +383,19 @@ def _growths(tile, rtol, values, bars, verdict, missed, left_out):
         still, x, bar = verdict[i] >= STABLE, 2.0 * tile[VALUE, i], tile[DOUBT, i]
         bar += 8.0 * EPS * x
         tile[VALUE, i], tile[DOUBT, i] = 0.0 if still else x, 0.0 if still else bar
-    _keep(tile, rtol, values, bars, missed, left_out)
+    _keep(tile[VALUE], tile[DOUBT], rtol, values, bars, missed, left_out)
 
 
 @kernel
-def _keep(tile, rtol, values, bars, missed, left_out):
-    """Keep the numbers in row VALUE of `tile` and their bars in row DOUBT, NaN of who is `left_out`;
-    and who misses.
+def _keep(found, doubts, rtol, values, bars, missed, left_out):
+    """Keep the numbers `found` of neighbouring points and their `doubts` as `values` and `bars`, NaN of
+    who is `left_out`; and who misses.
     """
     for i in range(len(values)):
-        x, bar, known = tile[VALUE, i], tile[DOUBT, i], left_out[i] == 0
+        x, bar, known = found[i], doubts[i], left_out[i] == 0
         values[i], bars[i] = x if known else np.nan, bar if known else np.nan
     for i in range(len(values)):
-        wide = not tile[DOUBT, i] <= rtol * (1.0 + abs(tile[VALUE, i]))
+        wide = not doubts[i] <= rtol * (1.0 + abs(found[i]))
         missed[i] |= wide & (left_out[i] == 0)
 
 
@@ -393,12 +413,12 @@ def _move(growth, bar):
 
 
 @splice
-def _lost(results, full_period, verdict, tile):
+def _lost(full_period, verdict, tile):
     """The zeros of y1, y2 of neighbouring points into row ZEROS of `tile`, what the rotation number
     is off where they may be miscounted into row DOUBT.
     """
-    for i in range(len(results)):
-        own = results[i]
+    for i in range(len(verdict)):
+        own = tile[OWN:, i]
         zeros = own[lanes.Y1_ZEROS] + own[lanes.Y2_ZEROS]
         lost_1, lost_2 = (
             abs(own[lanes.Y1]) <= own[lanes.Y1_BAR],
@@ -423,9 +443,15 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
     """theta_total / (2 pi) of neighbouring points: `ZEROS` of y1, y2 in (0, T/2) give the band; n / 2
     exactly in gaps. Their bars, and who misses. Not of who is `left_out`.
     """
+    far = False
     for i in range(len(values)):
         tile[VALUE, i] = arctan_root(tile[SINE, i], tile[COSINE, i]) * (2.0 / pi)
-        tile[WORK, i] = _spread(*_of_half(tile, i))
+        tile[WORK, i] = _steepest(*_of_half(tile, i))
+        far |= not _is_near(tile[WORK, i], *_of_half(tile, i))
+    if far:
+        for i in range(len(values)):
+            most = _farthest(*_of_half(tile, i))
+            tile[WORK, i] = tile[WORK, i] if tile[WORK, i] < most else most
     for i in range(len(values)):
         sine, cosine, zeros, further = (
             tile[SINE, i],
@@ -442,19 +468,37 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
         bar = 0.0 if on_edge | (verdict[i] == UNSTABLE) else bar
         tile[VALUE, i] = 0.5 * np.rint(2.0 * x) if on_edge else x
         tile[DOUBT, i] = bar + tile[DOUBT, i]
-    _keep(tile, rtol, values, bars, missed, left_out)
+    _keep(tile[VALUE], tile[DOUBT], rtol, values, bars, missed, left_out)
 
 
 @inline
-def _spread(sine, sine_bar, cosine, cosine_bar):
-    """How far atan sqrt(sine / cosine) moves within the bars: by its steepest slopes there, at most
-    by all of it, or by all that it lacks to pi/2.
+def _steepest(sine, sine_bar, cosine, cosine_bar):
+    """How far atan sqrt(sine / cosine) moves within the bars at most, by its steepest slopes there:
+    sqrt(cosine / sine) / 2 (sine + cosine) times the bar of sine is one, and so forth, with
+    sqrt((cosine + bar) (cosine - bar)) <= cosine.
+    """
+    low_sine, low_cosine = max(sine - sine_bar, 0.0), max(cosine - cosine_bar, 0.0)
+    moved = 0.5 * (sine_bar * abs(cosine) + cosine_bar * abs(sine))
+    return moved / (sqrt(low_sine * low_cosine) * (low_sine + low_cosine)) * (1.0 + 16.0 * EPS)
+
+
+@inline
+def _is_near(steep, sine, sine_bar, cosine, cosine_bar):
+    """Is the point in a gap, or `steep` less than `_farthest`?"""
+    low_sine, low_cosine = max(sine - sine_bar, 0.0), max(cosine - cosine_bar, 0.0)
+    square = steep * steep
+    less = (square * low_cosine <= sine) & (square * low_sine <= cosine) & (steep <= 1.0)
+    return less | (sine < -sine_bar) | (cosine < -cosine_bar)
+
+
+@inline
+def _farthest(sine, sine_bar, cosine, cosine_bar):
+    """How far atan sqrt(sine / cosine) moves within the bars at most: by all of it, or by all that it
+    lacks to pi/2.
 
     Next to an edge one of the two is small, and the bar of the other counts for as little.
     """
     low_sine, low_cosine = max(sine - sine_bar, 0.0), max(cosine - cosine_bar, 0.0)
     ratio = sqrt(max(sine + sine_bar, 0.0) / low_cosine)
     inverse = sqrt(max(cosine + cosine_bar, 0.0) / low_sine)
-    steep = 0.5 * (sine_bar * inverse + cosine_bar * ratio) / (low_sine + low_cosine)
-    most = min(0.5 * pi, ratio if ratio < inverse else inverse)
-    return (steep if steep < most else most) * (1.0 + 16.0 * EPS)
+    return min(0.5 * pi, ratio if ratio < inverse else inverse) * (1.0 + 16.0 * EPS)

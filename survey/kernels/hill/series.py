@@ -11,10 +11,10 @@ import numpy as np
 from survey.kernels import lanes
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
+from survey.kernels.math.chebyshev import TERMS, WIDTH, add_several, next_term
 from survey.kernels.math.roundoff import EPS
 
 TILE = 64
-TERMS = 8  # as many as `_sum` spells out
 ROOT_2 = math.sqrt(2.0)
 ROWS = 8
 # Of a series of factors, in the order of `lanes`: y1, y1', y2, y2'.
@@ -23,10 +23,12 @@ FACTOR_COUNT = 4
 NEAR, Y1_LEAST, Y1_MOST, Y2_LEAST, Y2_MOST = range(5)
 TURNS = 5
 # Rows of a tile of points, after the factors: see `_count`.
-TURNED, MIRRORED, BEYOND, Y1_SIZE, M_LOW, M_HIGH, D_LOW, D_HIGH = range(
-    FACTOR_COUNT, FACTOR_COUNT + 8
-)
-TILE_ROWS = FACTOR_COUNT + 8
+TURNED, MIRRORED, BEYOND, Y1_SIZE, M, D = range(FACTOR_COUNT, FACTOR_COUNT + 6)
+TILE_ROWS = FACTOR_COUNT + 6
+# Of a row, between neighbouring nodes: the rotation number at the first, how far it is to the second's, and the
+# numbers of zeros as `_either` gives them.
+FIRST, RISE, Y1_EITHER, Y2_EITHER = range(4)
+BETWEEN = 4
 # Around a point of a panel: the two nodes across the rows, and the two along them.
 ACROSS, ALONG = range(2)
 LOW_ACROSS, HIGH_ACROSS, LOW_ALONG, HIGH_ALONG = range(4)
@@ -39,30 +41,28 @@ def _polynomials(x, tile):
         tile[0, i], tile[1, i] = 1.0, x[i]
     for k in range(2, len(tile)):
         for i in range(len(x)):
-            tile[k, i] = 2.0 * x[i] * tile[k - 1, i] - tile[k - 2, i]
+            tile[k, i] = next_term(2.0 * x[i], tile[k - 1, i], tile[k - 2, i])
+    _complete(tile, len(x))
+
+
+@splice
+def _complete(tile, count):
+    """Zeros in the lanes from `count` on up to a multiple of WIDTH."""
+    end = (count + WIDTH - 1) // WIDTH * WIDTH
+    for k in range(len(tile) if end > count else 0):
+        for i in range(count, end):
+            tile[k, i] = 0.0
 
 
 @splice
 def _sum(c, tile, sums, count):
-    """sum_k c_k T_k in `count` lanes, TERMS terms a turn."""
-    for i in range(count):
+    """sum_k c_k T_k in `count` lanes, and in those up to a multiple of WIDTH; TERMS terms a turn."""
+    for i in range(len(sums)):
         sums[i] = 0.0
     for k in range(len(c) - TERMS, -1, -TERMS):
-        c0, c1, c2, c3, c4, c5, c6, c7 = (
-            c[k],
-            c[k + 1],
-            c[k + 2],
-            c[k + 3],
-            c[k + 4],
-            c[k + 5],
-            c[k + 6],
-            c[k + 7],
-        )
-        t = tile[k : k + TERMS]
-        for i in range(count):
-            low = (c0 * t[0, i] + c1 * t[1, i]) + (c2 * t[2, i] + c3 * t[3, i])
-            high = (c4 * t[4, i] + c5 * t[5, i]) + (c6 * t[6, i] + c7 * t[7, i])
-            sums[i] += low + high
+        own = (c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7])
+        for i in range(0, count, WIDTH):
+            add_several(own, tile, k, sums, i)
 
 
 @kernel
@@ -78,6 +78,7 @@ def _lagrange(n, x, tile, top, weights):
         node, share = math.cos(angle), math.sin(angle) / n if k < n else 0.0
         for i in range(len(x)):
             weights[k, i] = min((share * top[i] + 2.0 * EPS) / abs(x[i] - node), ROOT_2)
+    _complete(weights, len(x))
 
 
 @kernel
@@ -149,61 +150,71 @@ def _table(x, even, odd, tile):
     for k in range(2, len(tile)):
         for i in range(len(x)):
             y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
-            tile[k, i] = 2.0 * y * tile[k - 1, i] - tile[k - 2, i]
+            tile[k, i] = next_term(2.0 * y, tile[k - 1, i], tile[k - 2, i])
+    _complete(tile, len(x))
+
+
+@splice
+def _fill(values, out):
+    """The first of the `values`."""
+    for i in range(len(out)):
+        out[i] = values[i]
 
 
 @kernel
-def factors(coefficients, bars, x, even, turns, left, right, share, full_period, results):
-    """The results (R x, RESULTS) of R rows at x: y1, y1', y2, y2' from their series `coefficients`
+def factors(coefficients, bars, x, even, turns, place, share, full_period, results):
+    """The results (RESULTS, R x) of R rows at x: y1, y1', y2, y2' from their series `coefficients`
     (4, R, terms) within `bars` (4, R); if `even`, from those of (y1 + y2') / 2, y1', y2 and, odd,
     (y1 - y2') / 2.
 
-    The numbers of zeros follow from `turns` (TURNS, R, nodes) at the nodes `left` and `right` of x, `share` of the
-    way between; NaN where they do not tell.
+    The numbers of zeros follow from `turns` (TURNS, R, nodes) at the nodes around x, of which `place` is the sum
+    of the numbers, `share` of the way between; NaN where they do not tell.
     """
     _, rows, terms = coefficients.shape
-    table, odd, tile = (
-        np.empty((terms, TILE)),
-        np.empty((terms, TILE)),
-        np.empty((TILE_ROWS, TILE)),
-    )
+    table, odd = np.empty((terms, TILE)), np.empty((terms, TILE))
+    tile, around = np.empty((TILE_ROWS, TILE)), np.empty((rows, BETWEEN, 2 * turns.shape[2] - 1))
+    for j in range(rows):
+        _between_nodes(turns[:, j], around[j])
     for start in range(0, len(x), TILE):
         count = min(TILE, len(x) - start)
         _table(x[start : start + count], even, False, table)
         if even:
             _table(x[start : start + count], even, True, odd)
+        places, shares = place[start : start + count], share[start : start + count]
         for i in range(count):
             tile[MIRRORED, i] = 1.0 if even and x[start + i] < 0.0 else 0.0
-            tile[BEYOND, i] = 1.0 if left[start + i] == right[start + i] else 0.0
+            tile[BEYOND, i] = 1.0 if places[i] % 2 == 0 else 0.0
         for j in range(rows):
             for f in range(FACTOR_COUNT):
                 _sum(coefficients[f, j], odd if even and f == lanes.DY2 else table, tile[f], count)
-            y1_bar, dy2_bar = bars[lanes.Y1, j], bars[lanes.DY2, j]
+            y1_bar = bars[lanes.Y1, j]
             if even:
-                y1_bar = dy2_bar = y1_bar + dy2_bar
+                y1_bar += bars[lanes.DY2, j]
                 for i in range(count):
                     tile[lanes.Y1, i], tile[lanes.DY2, i] = (
                         tile[lanes.Y1, i] + tile[lanes.DY2, i],
                         tile[lanes.Y1, i] - tile[lanes.DY2, i],
                     )
+            first, rise, y1_either, y2_either = (
+                around[j, FIRST],
+                around[j, RISE],
+                around[j, Y1_EITHER],
+                around[j, Y2_EITHER],
+            )
             for i in range(count):
-                one, other = left[start + i], right[start + i]
-                near = turns[NEAR, j, one] + share[start + i] * (
-                    turns[NEAR, j, other] - turns[NEAR, j, one]
-                )
-                tile[TURNED, i], tile[Y1_SIZE, i] = near, y1_bar
-                tile[M_LOW, i] = min(turns[Y1_LEAST, j, one], turns[Y1_LEAST, j, other])
-                tile[M_HIGH, i] = max(turns[Y1_MOST, j, one], turns[Y1_MOST, j, other])
-                tile[D_LOW, i] = min(turns[Y2_LEAST, j, one], turns[Y2_LEAST, j, other])
-                tile[D_HIGH, i] = max(turns[Y2_MOST, j, one], turns[Y2_MOST, j, other])
+                at = np.uint64(places[i])  # with a sign, it might count from the end
+                tile[TURNED, i] = first[at] + shares[i] * rise[at]
+                tile[M, i], tile[D, i] = y1_either[at], y2_either[at]
+                tile[Y1_SIZE, i] = y1_bar
             _count(tile, full_period, count)
-            own = results[j * len(x) + start : j * len(x) + start + count]
-            for i in range(count):
-                for f in range(FACTOR_COUNT):
-                    own[i, lanes.Y1 + f] = tile[f, i]
-                own[i, lanes.Y1_BAR], own[i, lanes.DY1_BAR] = y1_bar, bars[lanes.DY1, j]
-                own[i, lanes.Y2_BAR], own[i, lanes.DY2_BAR] = bars[lanes.Y2, j], dy2_bar
-                own[i, lanes.Y1_ZEROS], own[i, lanes.Y2_ZEROS] = tile[M_LOW, i], tile[D_LOW, i]
+            begin = j * len(x) + start
+            end = begin + count
+            for f in range(FACTOR_COUNT):
+                mixed = even and (f == lanes.Y1 or f == lanes.DY2)
+                _fill(tile[f], results[lanes.Y1 + f, begin:end])
+                results[lanes.Y1_BAR + f, begin:end] = y1_bar if mixed else bars[f, j]
+            _fill(tile[M], results[lanes.Y1_ZEROS, begin:end])
+            _fill(tile[D], results[lanes.Y2_ZEROS, begin:end])
 
 
 @kernel
@@ -257,27 +268,22 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
             tile[BEYOND, i] = 1.0 if c == d else 0.0
             y1_least, y1_most = turns[Y1_LEAST], turns[Y1_MOST]
             y2_least, y2_most = turns[Y2_LEAST], turns[Y2_MOST]
-            tile[M_LOW, i] = min(
-                min(y1_least[a, c], y1_least[b, c]), min(y1_least[a, d], y1_least[b, d])
-            )
-            tile[M_HIGH, i] = max(
-                max(y1_most[a, c], y1_most[b, c]), max(y1_most[a, d], y1_most[b, d])
-            )
-            tile[D_LOW, i] = min(
-                min(y2_least[a, c], y2_least[b, c]), min(y2_least[a, d], y2_least[b, d])
-            )
-            tile[D_HIGH, i] = max(
-                max(y2_most[a, c], y2_most[b, c]), max(y2_most[a, d], y2_most[b, d])
-            )
+            low = min(min(y1_least[a, c], y1_least[b, c]), min(y1_least[a, d], y1_least[b, d]))
+            high = max(max(y1_most[a, c], y1_most[b, c]), max(y1_most[a, d], y1_most[b, d]))
+            tile[M, i] = _either(low, high)
+            low = min(min(y2_least[a, c], y2_least[b, c]), min(y2_least[a, d], y2_least[b, d]))
+            high = max(max(y2_most[a, c], y2_most[b, c]), max(y2_most[a, d], y2_most[b, d]))
+            tile[D, i] = _either(low, high)
         _count(tile, full_period, count)
-        own = results[start : start + count]
-        for i in range(count):
-            for f in range(FACTOR_COUNT):
-                own[i, lanes.Y1 + f] = tile[f, i]
-            own[i, lanes.Y1_BAR], own[i, lanes.DY1_BAR] = tile[Y1_SIZE, i], bars[lanes.DY1]
-            own[i, lanes.Y2_BAR] = bars[lanes.Y2]
-            own[i, lanes.DY2_BAR] = tile[Y1_SIZE, i] if even else bars[lanes.DY2]
-            own[i, lanes.Y1_ZEROS], own[i, lanes.Y2_ZEROS] = tile[M_LOW, i], tile[D_LOW, i]
+        end = start + count
+        for f in range(FACTOR_COUNT):
+            _fill(tile[f], results[lanes.Y1 + f, start:end])
+            results[lanes.Y1_BAR + f, start:end] = bars[f]
+        _fill(tile[Y1_SIZE], results[lanes.Y1_BAR, start:end])
+        if even:
+            _fill(tile[Y1_SIZE], results[lanes.DY2_BAR, start:end])
+        _fill(tile[M], results[lanes.Y1_ZEROS, start:end])
+        _fill(tile[D], results[lanes.Y2_ZEROS, start:end])
 
 
 @kernel
@@ -314,10 +320,25 @@ def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, ve
 
 
 @splice
+def _between_nodes(turns, out):
+    """FIRST to Y2_EITHER of a row (BETWEEN, 2 n - 1), from its `turns` at n nodes: of nodes i and k in
+    column i + k, neighbours or the same.
+    """
+    for at in range(out.shape[1]):
+        one, other = at // 2, (at + 1) // 2
+        out[FIRST, at], out[RISE, at] = turns[NEAR, one], turns[NEAR, other] - turns[NEAR, one]
+        for row, least, most in ((Y1_EITHER, Y1_LEAST, Y1_MOST), (Y2_EITHER, Y2_LEAST, Y2_MOST)):
+            out[row, at] = _either(
+                min(turns[least, one], turns[least, other]),
+                max(turns[most, one], turns[most, other]),
+            )
+
+
+@splice
 def _count(tile, full_period, count):
-    """Numbers of zeros of neighbouring points into rows M_LOW and D_LOW, NaN where they are not known:
-    at nodes around a point there are M_LOW to M_HIGH of y1, D_LOW to D_HIGH of y2, or it lies
-    BEYOND the last. `TURNED` is the rotation number between those of nodes.
+    """Numbers of zeros of neighbouring points into rows M and D, NaN where they are not known, from
+    those which nodes around a point allow for y1 and y2, there (see `_either`), unless it lies BEYOND
+    the last. `TURNED` is the rotation number between those of nodes.
 
     A point -p, `MIRRORED`, has the rotation number of p, whose y1 is the y2' of -p.
     """
@@ -325,8 +346,8 @@ def _count(tile, full_period, count):
         mirrored, near = tile[MIRRORED, i] > 0.0, tile[TURNED, i]
         y1, y2, dy2 = tile[lanes.Y1, i], tile[lanes.Y2, i], tile[lanes.DY2, i]
         y1 = dy2 if mirrored else y1  # loaded before: vector code has no branches
-        m = 0.0 if full_period else _zeros(tile[M_LOW, i], tile[M_HIGH, i], y1 < 0.0)
-        d = _zeros(tile[D_LOW, i], tile[D_HIGH, i], y2 < 0.0)
+        m = 0.0 if full_period else _zeros(tile[M, i], y1 < 0.0)
+        d = _zeros(tile[D, i], y2 < 0.0)
         # one of the two may have changed
         loose = (tile[BEYOND, i] > 0.0) & (not full_period)
         lost_m, lost_d = loose & (m != m), loose & (m == m) & (d != d)
@@ -338,7 +359,7 @@ def _count(tile, full_period, count):
         known = (abs(m + d + 0.5 - 2.0 * near) <= 1.0) & (
             (not mirrored) | (abs(y1) > tile[Y1_SIZE, i])
         )
-        tile[M_LOW, i], tile[D_LOW, i] = m if known else np.nan, d if known else np.nan
+        tile[M, i], tile[D, i] = m if known else np.nan, d if known else np.nan
 
 
 @splice
@@ -349,8 +370,17 @@ def _nearest(x, odd):
 
 
 @splice
-def _zeros(low, high, odd):
-    """The number from `low` to `high`, which differ by 1 at most, that is odd or even; else NaN."""
+def _either(low, high):
+    """What stands for the numbers from `low` to `high`: `low` if they are the same, `low` + 1/2 if they
+    are neighbours, else NaN.
+    """
+    return low + 0.5 * (high - low) if high - low <= 1.0 else np.nan
+
+
+@splice
+def _zeros(either, odd):
+    """That of the numbers (see `_either`) which is odd, or even; NaN if there is none."""
+    low = np.floor(either)
     is_odd = low - 2.0 * np.floor(0.5 * low) == 1.0
     value = low if is_odd == odd else low + 1.0
-    return value if (value <= high) & (high - low <= 1.0) else np.nan
+    return value if (value == low) | (either > low) else np.nan

@@ -5,8 +5,8 @@ The n nodes are those of the first kind, where nothing else is said. Bits of wha
 how each caller rounds cos(k theta_i), theta_i the angle of node i: so `to_coefficients` takes these
 cosines.
 
-Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1 (Clenshaw's recurrence),
-4.6 (discrete orthogonality); L. N. Trefethen, Approximation Theory and Approximation Practice
+Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 1.2.1 (the recurrence of
+T_k), 4.6 (discrete orthogonality); L. N. Trefethen, Approximation Theory and Approximation Practice
 (2013), theorem 15.2.
 """
 
@@ -14,8 +14,12 @@ from functools import cache
 
 import numpy as np
 
-from survey.kernels.jit import kernel
+from survey.kernels.jit import kernel, splice
 from survey.kernels.math.roundoff import EPS
+from survey.kernels.unroll import consecutive, fma, put, unroll
+
+# How many rows of a matrix are added at once, and in how many columns.
+TERMS = WIDTH = 8
 
 
 def angles(n):
@@ -147,11 +151,48 @@ def combined(values, matrix):
 @kernel
 def _combine(values, matrix, out):
     for r in range(len(values)):
-        row = out[r]
-        for i in range(len(matrix)):
-            weight, terms = values[r, i], matrix[i]
-            for k in range(len(row)):
-                row[k] += weight * terms[k]
+        add(values[r], matrix, out[r])
+
+
+@splice
+def add(c, rows, sums):
+    """Add sum_k c[k] rows[k] to `sums`, row after row of TERMS at once, the last ones first; each of
+    `sums` as if it were alone.
+    """
+    whole = len(sums) - len(sums) % WIDTH
+    top = len(c) % TERMS
+    for k in range(len(c) - TERMS, top - 1, -TERMS):
+        own = (c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7])
+        for i in range(0, whole, WIDTH):
+            add_several(own, rows, k, sums, i)
+        for i in range(whole, len(sums)):
+            sums[i] = _more(own, rows, k, sums[i], i)
+    for k in range(top - 1, -1, -1):
+        for i in range(len(sums)):
+            sums[i] = _one_more(c[k], rows[k, i], sums[i])
+
+
+@unroll
+def add_several(c, rows, first, sums, i):
+    """Add TERMS numbers c times as many rows, from the `first` on, to WIDTH `sums` from i on; the
+    last one first.
+    """
+    total = consecutive(sums, (i,), WIDTH)
+    for k in reversed(range(TERMS)):
+        total = fma(c[k], consecutive(rows, (first + k, i), WIDTH), total)
+    put(sums, (i,), total)
+
+
+@unroll
+def _more(c, rows, first, total, i):
+    for k in reversed(range(TERMS)):
+        total = fma(c[k], rows[first + k, i], total)
+    return total
+
+
+@unroll
+def _one_more(c, x, total):
+    return fma(c, x, total)
 
 
 def expand(values, matrix, ulps):
@@ -184,8 +225,8 @@ def _doubt(sizes, ulps):
     """`tail` and rounding of such series (R, n), whose argument on [-1, 1] is known to within
     `ulps` ulp.
 
-    Rounding is that of the transform, of Clenshaw's recurrence, and of the argument, where T_k' <=
-    k^2.
+    Rounding is that of the transform, of T_k (see `next_term`) and the sum, and of the argument, where
+    T_k' <= k^2.
     """
     k = np.arange(sizes.shape[1])
     rounding = (sizes * (4.0 + k + (0.5 + ulps) * k * k)).sum(axis=1)
@@ -193,18 +234,18 @@ def _doubt(sizes, ulps):
 
 
 @kernel
-def restrict(series, x, work, out):
-    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients, by Clenshaw's recurrence;
-    `work` is (2, m).
-    """
-    n, m = series.shape
+def restrict(series, x, out):
+    """out[r] = sum_k series[k] T_k(x[r]): the rows' own coefficients."""
+    t = np.empty(len(series))
     for r in range(len(x)):
-        last, before = work[0], work[1]
-        for i in range(m):
-            last[i], before[i] = 0.0, 0.0
-        for k in range(n - 1, 0, -1):
-            for i in range(m):
-                before[i] = series[k, i] + 2.0 * x[r] * last[i] - before[i]
-            last, before = before, last
-        for i in range(m):
-            out[r, i] = series[0, i] + x[r] * last[i] - before[i]
+        for k in range(len(t)):
+            t[k] = next_term(2.0 * x[r], t[k - 1], t[k - 2]) if k > 1 else x[r] if k == 1 else 1.0
+        for i in range(out.shape[1]):
+            out[r, i] = 0.0
+        add(t, series, out[r])
+
+
+@unroll
+def next_term(twice, last, before):
+    """T_k from the two before, within k^2 EPS / 4 with those."""
+    return fma(twice, last, -before)

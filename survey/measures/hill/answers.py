@@ -51,9 +51,10 @@ class Answers(answers.Answers):
         """
         asked, own = self.asked, (self.floats, self.verdict, self.missed, self.status)
         rule = NONE if rule is None else rule
+        columns = np.ascontiguousarray(results.T)
         kernels.measure(
             first,
-            results,
+            columns,
             squares,
             rule,
             asked.wanted,
@@ -66,5 +67,5 @@ class Answers(answers.Answers):
         if asked.wanted[kernels.EXPONENT // 2 :].any():
             waiting.wait("answers")
             kernels.transcendental(
-                first, results, squares, asked.wanted, asked.rtol, asked.full_period, *own
+                first, columns, squares, asked.wanted, asked.rtol, asked.full_period, *own
             )

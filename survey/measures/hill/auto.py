@@ -99,7 +99,7 @@ def _exactly(problem, answers, points, asked, most):
         own = Answers(these.size, asked)
         rule = None if problem.rule is None else problem.rule.reshape(-1)[points[these]]
         squares = np.ascontiguousarray(results[:, RESULTS:]) if problem.full_period else NO_SQUARES
-        own.assess(np.ascontiguousarray(results[:, :RESULTS]), rule, squares)
+        own.assess(results[:, :RESULTS], rule, squares)
         answers.replace(points[these], own)
 
 

@@ -249,7 +249,7 @@ def _shortened(series, bars):
 
 def _at_points(box, axis, series, number, bars, turns, across, along, position):
     """The results (N, RESULTS) at x `across` and `along` the rows of a panel."""
-    results = np.empty((position.size, RESULTS))
+    results = np.empty((RESULTS, position.size))
     nodes = turns.shape[2] * (2 if axis.even else 1)
     *one, share = _between(across, turns.shape[1], turns.shape[1])
     *other, further = _between(abs(along) if axis.even else along, nodes, turns.shape[2])
@@ -258,7 +258,7 @@ def _at_points(box, axis, series, number, bars, turns, across, along, position):
     shares = np.stack([share, further])
     odd = _odd(box.row_axis, axis, position)
     points(series, number, bars, x, axis.even, odd, turns, around, shares, box.full_period, results)
-    return results
+    return results.T
 
 
 @dataclass(frozen=True)
@@ -372,10 +372,11 @@ def _answer_by_factors(problem, asked, answers, rows, series, bars, turns, axis,
 def _factors(series, bars, x, even, turns, between, full_period):
     """The results (R x, RESULTS) of the points x of rows, which lie `between` nodes of the `turns`."""
     left, right, share = between
-    results = np.empty((turns.shape[1] * x.size, RESULTS))
+    place = left + right
+    results = np.empty((RESULTS, turns.shape[1] * x.size))
     series, bars, turns = (np.ascontiguousarray(values) for values in (series, bars, turns))
-    factors(series, bars, x, even, turns, left, right, share, full_period, results)
-    return results
+    factors(series, bars, x, even, turns, place, share, full_period, results)
+    return results.T
 
 
 def _between(x, number, kept):
@@ -439,7 +440,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
     """Answer those `chosen` rows that a series across rows serves; returns the others."""
     # compile this, by a call on nothing, while that process compiles what the nodes need
     if waiting.other_compiler:
-        chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((2, 0)), np.empty((0, 0)))
+        chebyshev.restrict(np.empty((0, 0)), np.empty(0), np.empty((0, 0)))
     with _ONE_AT_A_TIME:
         served = panels(problem.row_axis, method, asked.rtol, axis, _sought(asked))
     position = problem.positions[chosen]
@@ -451,7 +452,7 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
         if rows.size:
             x = (position[inside] - 0.5 * (low + high)) / (0.5 * (high - low))
             for of, out in zip(series, own, strict=True):
-                chebyshev.restrict(of, x, np.empty((2, series.shape[2])), out)
+                chebyshev.restrict(of, x, out)
             bar = np.repeat(bars[:, None], rows.size, axis=1)
             odd = _odd(problem.row_axis, axis, position[inside])
             # points may miss it: bounds of the rows themselves, which cost more

@@ -1,10 +1,12 @@
 """Chebyshev series: exact coefficients, the Lebesgue constant, tails of a series that is known."""
 
+import mpmath
 import numpy as np
 import pytest
 from numpy.polynomial import chebyshev as known
 
 from survey.kernels.math import chebyshev
+from survey.kernels.math.roundoff import EPS, ROUNDOFF
 
 
 @pytest.mark.parametrize("n", [4, 9, 16, 33])
@@ -39,13 +41,30 @@ def test_the_tail_holds_what_a_series_leaves_out():
             assert chebyshev.tail(sizes[:n]) >= sizes[n:].sum()
 
 
-@pytest.mark.parametrize("rows", [1, 7])
-def test_sums_of_rows_are_in_the_order_of_their_terms(rows):
-    """The bits of a row depend on no other row, nor on how many there are."""
-    rng = np.random.default_rng(5)
-    values, matrix = rng.normal(size=(rows, 13)), rng.normal(size=(13, 10)).T.copy().T
-    wanted = np.zeros((rows, 10))
-    for i in range(13):
-        wanted += values[:, i, None] * matrix[i]
-    np.testing.assert_array_equal(chebyshev.combined(values, matrix), wanted)
-    np.testing.assert_array_equal(chebyshev.combined(values[:1], matrix), wanted[:1])
+@pytest.mark.parametrize("terms", [5, 8, 29])
+@pytest.mark.parametrize("columns", [3, 8, 21])
+def test_the_bits_of_a_sum_depend_on_no_other(terms, columns):
+    rng = np.random.default_rng(terms)
+    values, matrix = rng.normal(size=(7, terms)), rng.normal(size=(columns, terms)).T
+    found = chebyshev.combined(values, matrix)
+    off, sizes = found - values @ matrix, abs(values) @ abs(matrix)
+    assert (abs(off) <= 2 * terms * ROUNDOFF * sizes).all()
+    np.testing.assert_array_equal(chebyshev.combined(values[3:4], matrix), found[3:4])
+    np.testing.assert_array_equal(chebyshev.combined(values, matrix[:, 1:3]), found[:, 1:3])
+
+
+@pytest.mark.parametrize("terms", [1, 2, 16, 44])
+def test_a_surface_is_restricted_to_rows(terms):
+    rng = np.random.default_rng(terms)
+    series, x = rng.normal(size=(terms, 13)), np.r_[-1.0, 1.0, 0.0, rng.uniform(-1, 1, 5)]
+    rows = np.empty((x.size, 13))
+    chebyshev.restrict(series, x, rows)
+    with mpmath.workdps(30):
+        for row, at in zip(rows, x, strict=True):
+            polynomials = [mpmath.chebyt(k, mpmath.mpf(float(at))) for k in range(terms)]
+            for found, column in zip(row, series.T, strict=True):
+                wanted = mpmath.fsum(
+                    mpmath.mpf(float(c)) * t for c, t in zip(column, polynomials, strict=True)
+                )
+                k = np.arange(terms)
+                assert abs(wanted - found) <= EPS * (abs(column) * (4 + k + 0.25 * k * k)).sum()
