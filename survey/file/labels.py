@@ -55,14 +55,12 @@ def _layout(scene, names, options):
 
 def round_up(errors):
     """float64 error bars (not negative) as float32, rounded up."""
-    errors = np.asarray(errors, dtype=float)
-    if errors.size > 1 and not any(errors.strides):  # one number for all points, as a rule NaN
-        return np.broadcast_to(round_up(errors.flat[:1])[0], errors.shape)
-    with np.errstate(over="ignore"):
-        small = errors.astype(np.float32)
-    bits = small.view(np.int32)
-    bits += small < errors  # the next float32 up: consecutive floats are consecutive integers
-    return small
+    from survey.kernels.math import rounding  # numba: reading files needs none
+
+    errors = np.ascontiguousarray(errors, dtype=float)
+    out = np.empty(errors.shape, np.float32)
+    rounding.round_up(errors.reshape(-1), out.reshape(-1))
+    return out
 
 
 def percent(fraction, bar):

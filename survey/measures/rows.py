@@ -68,10 +68,8 @@ class Rows:
         return np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
 
     def back(self, array):
-        """(rows, lanes), or (rows, 1), in the block's shape."""
-        full = (
-            np.broadcast_to(array, (self.rows, self.lanes))
-            if array.shape != (self.rows, self.lanes)
-            else array
-        )
-        return np.ascontiguousarray(full.reshape(self.sorted_shape).transpose(self.back_order))
+        """(rows, lanes) in the block's shape; or (rows, 1), as a view to read alone."""
+        full = array.shape == (self.rows, self.lanes)
+        wide = array if full else np.broadcast_to(array, (self.rows, self.lanes))
+        moved = wide.reshape(self.sorted_shape).transpose(self.back_order)
+        return np.ascontiguousarray(moved) if full else moved

@@ -273,9 +273,11 @@ def _derived(out, row, rho, block, request, period):
     and `rho`.
     """
     wanted, ok = _wanted(request), out["status"] == status.OK
+    rho = rho if rho.strides[0] else rho[:1]  # all rows have the same
     if "period" in wanted:
-        out["period"] = np.where(ok, period[:, None], np.nan)
-        out["period_error"] = _PERIOD_ULPS * EPS * out["period"]
+        for name, values in (("period", period), ("period_error", _PERIOD_ULPS * EPS * period)):
+            column = values[:, None]
+            out[name] = column if ok.all() else np.where(ok, column, np.nan)
     if "exponent_per_orbit" in wanted:
         _per_orbit(out, abs(rho) * (period[:, None] / (2 * pi)))
     if "lyapunov" in wanted:
@@ -348,12 +350,11 @@ def _per_orbit(out, orbits):
     """Add the exponent per orbital revolution, `orbits` of which make a period; it does not apply
     where none do.
     """
-    orbits = np.where(orbits > 0, orbits, np.nan)
-    out["exponent_per_orbit"] = out["exponent"] / orbits
-    out["exponent_per_orbit_error"] = (
-        out["exponent_error"] / orbits + (_PERIOD_ULPS + 4) * EPS * out["exponent_per_orbit"]
-    )
-    monodromy.overflow(out, out["exponent_per_orbit_error"] > LARGEST)
+    orbits[~(orbits > 0)] = np.nan
+    growth, bar = out["exponent"] / orbits, out["exponent_error"] / orbits
+    bar += np.multiply((_PERIOD_ULPS + 4) * EPS, growth, out=orbits)
+    out["exponent_per_orbit"], out["exponent_per_orbit_error"] = growth, bar
+    monodromy.overflow(out, bar > LARGEST)
 
 
 def _line_of_rho(request):

@@ -7,7 +7,8 @@ import numpy as np
 
 from survey import status
 from survey.errors import BadInput
-from survey.file.labels import layout, round_up
+from survey.file.labels import layout
+from survey.kernels.math.rounding import round_up
 from survey.sweep import dispatch
 from survey.sweep.compile_ahead import compiling_ahead
 from survey.sweep.cost import bytes_per_point, points_per_block, seconds_per_point
@@ -16,14 +17,15 @@ from survey.wording import listed
 QUICK_SECONDS, QUICK_BYTES = 0.05, 2**23  # what takes no more is done before threads have begun
 
 
-def solve_block(scene, request, grid, block):
-    """The variables of `layout` in one block of the grid."""
+def solve_block(scene, request, grid, block, out=None):
+    """The variables of `layout` in one block of the grid; in the arrays `out`, if these are given."""
     _keep_freed_memory()
     return solve_point(
         scene,
         replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges),
         grid.point(block),
         _shape(grid, block),
+        out,
     )
 
 
@@ -44,9 +46,9 @@ def _shape(grid, block):
     )
 
 
-def solve_point(scene, request, point, shape):
+def solve_point(scene, request, point, shape, out=None):
     """The variables of `layout` at `point` ({name: array that broadcasts to shape}), as they are
-    stored.
+    stored; in the arrays `out`, if these are given.
 
     Values outside a parameter's domain reach the scene as NaN.
     """
@@ -57,26 +59,50 @@ def solve_point(scene, request, point, shape):
         valid[key] = values if inside.all() else np.where(inside, values, np.nan)
     with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
         solved = scene.solve({key: np.atleast_1d(values) for key, values in valid.items()}, request)
-    return stored(scene, request, solved, shape)
+    return stored(scene, request, solved, shape, out)
 
 
-def stored(scene, request, solved, shape):
-    """A scene's results in the file's types and the block's shape; status `overflow` where a bar
-    does not fit.
+def stored(scene, request, solved, shape, out=None):
+    """A scene's results in the file's types and the block's shape, in the arrays `out`, if these are
+    given; status `overflow` where a bar does not fit.
     """
-    arrays = {}
+    arrays, infinite = {}, False
     table = layout(scene, request)
     left_out = [name for name in table if name not in solved]
     if left_out:
         raise BadInput(f"{scene.TITLE}: solve returns no {listed(left_out)}, which OUTPUTS declare")
     for name, (dtype, _, extra) in table.items():
-        values = round_up(solved[name]) if name.endswith("_error") else np.asarray(solved[name])
-        arrays[name] = values.astype(dtype, copy=False).reshape(shape + extra)
-    unbounded = [
-        bad
-        for bad in (np.isinf(arrays[name]) for name in table if name.endswith("_error"))
-        if bad.any()
-    ]
+        values = np.asarray(solved[name]).reshape(shape + extra)
+        if name.endswith("_error"):
+            arrays[name] = np.empty(values.shape, dtype) if out is None else out[name]
+            infinite |= _round_up(values, arrays[name])
+        else:
+            arrays[name] = values.astype(dtype, copy=False)
+    if infinite:
+        _overflow(arrays, table, shape)
+    for name, array in out.items() if out else ():
+        if arrays[name] is not array:
+            array[...] = arrays[name]
+    return arrays if out is None else out
+
+
+def _round_up(values, out):
+    """Fill `out` with error bars, rounded up; returns whether one is infinite. Those that are the same
+    along an axis are rounded once.
+    """
+    few = tuple(slice(None) if step else slice(1) for step in values.strides)
+    bars = np.asarray(values[few], dtype=float, order="C")
+    whole = out.flags.c_contiguous and bars.shape == out.shape
+    kept = out if whole else np.empty(bars.shape, np.float32)
+    infinite = round_up(bars.reshape(-1), kept.reshape(-1))
+    if not whole:
+        out[...] = kept
+    return infinite
+
+
+def _overflow(arrays, table, shape):
+    """Take back the answers of points that have an infinite error bar; changes `arrays`."""
+    unbounded = [np.isinf(arrays[name]) for name in table if name.endswith("_error")]
     for bad in unbounded:
         lost = bad.reshape(*shape, -1).any(axis=-1)
         for name, (dtype, fill, extra) in table.items():
@@ -85,7 +111,6 @@ def stored(scene, request, solved, shape):
                 where = lost & ~np.isin(arrays[name], list(status.UNANSWERED))
                 fill = status.OVERFLOW
             arrays[name] = np.where(where, dtype.type(fill), arrays[name])
-    return arrays
 
 
 def compute(grid, scene, request, threads=None, progress=None):
@@ -98,8 +123,8 @@ def compute(grid, scene, request, threads=None, progress=None):
     }
 
     def task(block):
-        for name, values in solve_block(scene, request, grid, block).items():
-            result[name][block] = values
+        out = {name: values[block] for name, values in result.items()}
+        solve_block(scene, request, grid, block, out)
 
     blocks = grid.blocks(points_per_block(scene, request, grid))
     seconds = grid.points * seconds_per_point(scene, request, grid)

@@ -14,6 +14,7 @@ from survey.kernels.math.double import split_error
 from survey.kernels.math.roundoff import EPS
 
 CLOSE = 1e-17  # of means: what is left of their difference
+LYAPUNOV_ULPS = 100  # of the sizes of what makes T times the integral of z
 
 
 def moduli(point):
@@ -140,26 +141,32 @@ class Motion:
         """Does Lyapunov's criterion (corrected: T int z <= 4, and z >= 0) certify stability,
         rounding aside?
         """
-        total, bar = self.lyapunov_integral(rho, period)
-        certain = total <= 4 - bar
+        still, sizes, drift = self._of_lyapunov(period)
+        total = ((1 + LYAPUNOV_ULPS * EPS) * period**2)[:, None] * (rho * rho)
+        if drift.any():
+            total += drift[:, None] * rho + (LYAPUNOV_ULPS * EPS * drift)[:, None] * abs(rho)
+        certain = total <= (4 - still - LYAPUNOV_ULPS * EPS * sizes)[:, None]
         return certain & self._nonnegative(rho) if self.oblate else certain
 
     def lyapunov_integral(self, rho, period):
         """T times the integral of z over T, and a bound of its rounding."""
+        still, sizes, drift = self._of_lyapunov(period)
+        grows = (period**2)[:, None] * (rho * rho)
+        total, size = still[:, None] + grows, sizes[:, None] + grows
+        if drift.any():
+            total, size = total + drift[:, None] * rho, size + drift[:, None] * abs(rho)
+        return total, LYAPUNOV_ULPS * EPS * size
+
+    def _of_lyapunov(self, period):
+        """Of each row, the part of T times the integral of z that is free of rho, its rounding, and what
+        rho is multiplied by, 2 pi T in rotations, where am advances by pi.
+        """
         first, second = self.integrals
         k, c = self.k, -(self.k**2) if self.oblate else (1 - self.k) * (1 + self.k)
         squares = np.where(self.rotates, 2 * k * second, 4 * (second - self.kc**2 * first))
-        # a row's part, its rounding, and what rho^2 is multiplied by
-        still, sizes = (
-            period * (2 * squares + c * period),
-            period * (2 * squares + (k**2 + 1) * period),
-        )
-        grows = (period**2)[:, None] * (rho * rho)
-        total, size = still[:, None] + grows, sizes[:, None] + grows
-        if self.rotates.any():  # integral of w over T, times rho: am advances by pi
-            drift = np.where(self.rotates, 2 * pi * period, 0.0)[:, None] * rho
-            total, size = total + drift, size + abs(drift)
-        return total, 100 * EPS * size
+        still = period * (2 * squares + c * period)
+        sizes = period * (2 * squares + (k**2 + 1) * period)
+        return still, sizes, np.where(self.rotates, 2 * pi * period, 0.0)
 
     def range_of_z(self, rho):
         """The least and the greatest z along the motion, and a bound of their rounding."""
