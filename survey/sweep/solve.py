@@ -73,11 +73,12 @@ def stored(scene, request, solved, shape, out=None):
         raise BadInput(f"{scene.TITLE}: solve returns no {listed(left_out)}, which OUTPUTS declare")
     for name, (dtype, _, extra) in table.items():
         values = np.asarray(solved[name]).reshape(shape + extra)
-        if name.endswith("_error"):
+        if name.endswith("_error") and values.dtype != dtype:
             arrays[name] = np.empty(values.shape, dtype) if out is None else out[name]
             infinite |= _round_up(values, arrays[name])
         else:
             arrays[name] = values.astype(dtype, copy=False)
+            infinite |= name.endswith("_error") and np.isinf(values).any()
     if infinite:
         _overflow(arrays, table, shape)
     for name, array in out.items() if out else ():

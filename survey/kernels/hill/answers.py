@@ -12,6 +12,7 @@ import numpy as np
 from survey.kernels import lanes
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math.inverses import arcsinh_roots, arctan_root
+from survey.kernels.math.rounding import fill_up
 from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import unroll
 
@@ -21,9 +22,9 @@ LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
 # What an exact rule says of a point.
 NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE = 0, 1, 2
-# Columns of `measure`, each followed by that of its error bound.
+# Rows of `values`, and of `bars`, which are rounded up, of `measure`.
 FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
-DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(0, 14, 2)
+DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(7)
 FACTOR_ROWS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
 UNTRIED = -1
 # Of half the angle of a point, where more digits are known: sin^2 and cos^2.
@@ -123,13 +124,14 @@ def measure(
     rtol,
     full_period,
     overflow,
-    floats,
+    values,
+    bars,
     verdict,
     missed,
     status,
 ):
     """What follows from `results` (RESULTS, n) of n of N points, from the `first` on, by
-    arithmetic: `floats` (14, N), `verdict`, who has `missed` `rtol`.
+    arithmetic: `values` (7, N) and `bars` (7, N, float32), `verdict`, who has `missed` `rtol`.
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
     `overflow`. `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count
@@ -170,13 +172,13 @@ def measure(
         for i in range(count):
             misses[i] = decides & (left_out[i] == 0) & (decided[i] == UNDECIDED)
         if wanted[0]:
-            _keep(tile[VALUE], tile[DOUBT], rtol, floats[DISCRIMINANT, begin:end],
-                  floats[DISCRIMINANT + 1, begin:end], misses, left_out)  # fmt: skip
+            _keep(tile[VALUE], tile[DOUBT], rtol, values[DISCRIMINANT, begin:end],
+                  bars[DISCRIMINANT, begin:end], misses, left_out)  # fmt: skip
         for c in range(4):
             at = FACTOR_ROWS[c]
-            if wanted[at // 2]:
+            if wanted[at]:
                 _keep(tile[OWN + lanes.Y1 + c], tile[OWN + lanes.Y1_BAR + c], rtol,
-                      floats[at, begin:end], floats[at + 1, begin:end], misses, left_out)  # fmt: skip
+                      values[at, begin:end], bars[at, begin:end], misses, left_out)  # fmt: skip
 
 
 @kernel
@@ -195,7 +197,7 @@ def _obey(rule, decided, tile):
 
 @kernel
 def transcendental(
-    first, results, squares, wanted, rtol, full_period, floats, verdict, missed, status
+    first, results, squares, wanted, rtol, full_period, values, bars, verdict, missed, status
 ):
     """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and
     who misses.
@@ -206,25 +208,25 @@ def transcendental(
         begin, end = first + start, first + start + count
         decided, left_out = verdict[begin:end], status[begin:end]
         _half_angles(results, squares, start, count, full_period, tile)
-        if wanted[EXPONENT // 2]:
+        if wanted[EXPONENT]:
             for i in range(count):
                 sine, sine_bar, cosine, cosine_bar = _of_half(tile, i)
                 tile[VALUE, i] = -min(sine, cosine)
                 tile[DOUBT, i] = sine_bar if sine < cosine else cosine_bar
             _growths(
-                tile, rtol, floats[EXPONENT, begin:end], floats[EXPONENT + 1, begin:end],
+                tile, rtol, values[EXPONENT, begin:end], bars[EXPONENT, begin:end],
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
-        if wanted[ROTATION // 2]:
+        if wanted[ROTATION]:
             _lost(full_period, decided, tile)
             _turns(
-                tile, rtol, floats[ROTATION, begin:end], floats[ROTATION + 1, begin:end],
+                tile, rtol, values[ROTATION, begin:end], bars[ROTATION, begin:end],
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
 
 
 @kernel
-def exponents(first, count, rtol, floats, verdict, missed):
+def exponents(first, count, rtol, values, bars, verdict, missed):
     """The exponents of `count` points from each of `first` on, whose D and bar are known, and who
     misses `rtol`.
     """
@@ -234,10 +236,10 @@ def exponents(first, count, rtol, floats, verdict, missed):
             end = min(start + TILE, of + count)
             for i in range(start, end):
                 # |D| - 2 = 4 sinh^2(exponent / 2)
-                tile[VALUE, i - start] = 0.25 * (abs(floats[DISCRIMINANT, i]) - 2.0)
-                tile[DOUBT, i - start] = 0.25 * floats[DISCRIMINANT + 1, i]
+                tile[VALUE, i - start] = 0.25 * (abs(values[DISCRIMINANT, i]) - 2.0)
+                tile[DOUBT, i - start] = 0.25 * bars[DISCRIMINANT, i]
             _growths(
-                tile, rtol, floats[EXPONENT, start:end], floats[EXPONENT + 1, start:end],
+                tile, rtol, values[EXPONENT, start:end], bars[EXPONENT, start:end],
                 verdict[start:end], missed[start:end], none[: end - start],
             )  # fmt: skip
 
@@ -392,8 +394,10 @@ def _keep(found, doubts, rtol, values, bars, missed, left_out):
     who is `left_out`; and who misses.
     """
     for i in range(len(values)):
-        x, bar, known = found[i], doubts[i], left_out[i] == 0
-        values[i], bars[i] = x if known else np.nan, bar if known else np.nan
+        values[i] = found[i] if left_out[i] == 0 else np.nan
+    fill_up(doubts, bars)
+    for i in range(len(values)):
+        bars[i] = bars[i] if left_out[i] == 0 else np.float32(np.nan)
     for i in range(len(values)):
         wide = not doubts[i] <= rtol * (1.0 + abs(found[i]))
         missed[i] |= wide & (left_out[i] == 0)

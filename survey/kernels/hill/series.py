@@ -12,6 +12,7 @@ from survey.kernels import lanes
 from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
 from survey.kernels.math.chebyshev import TERMS, WIDTH, add_several, next_term
+from survey.kernels.math.rounding import fill_up
 from survey.kernels.math.roundoff import EPS
 
 TILE = 64
@@ -82,13 +83,13 @@ def _lagrange(n, x, tile, top, weights):
 
 
 @kernel
-def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdict, missed):
+def discriminants(rows, coefficients, doubts, at_nodes, n, x, rtol, values, bars, verdict, missed):
     """D of the `rows` from its series at x (L): D, its bar and the verdict; `missed` where not
     enough.
 
-    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within bars[j], to which is added, if n > 0,
+    Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within doubts[j], to which is added, if n > 0,
     what is `at_nodes` (R, K), of which n count, times the magnitudes of Lagrange's polynomials; K
-    and terms are multiples of TERMS. Columns as in `kernels.hill.answers.measure`.
+    and terms are multiples of TERMS. Rows as in `kernels.hill.answers.measure`.
     """
     terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
     kept = tiles if len(rows) > ROWS else 1  # of the tables: of no more than what is read again
@@ -109,23 +110,25 @@ def discriminants(rows, coefficients, bars, at_nodes, n, x, rtol, floats, verdic
             if n > 0:
                 _sum(at_nodes[j], weights[slot], bounds, count)
                 for i in range(count):
-                    bounds[i] += bars[j]
+                    bounds[i] += doubts[j]
             else:
                 for i in range(count):
-                    bounds[i] = bars[j]
+                    bounds[i] = doubts[j]
             first = rows[j] * len(x) + t * TILE
             decided, misses = verdict[first : first + count], missed[first : first + count]
-            _decide(sums, bounds, n > 0 or not bars[j] <= rtol, floats[:, first : first + count], rtol,
+            _decide(sums, bounds, n > 0 or not doubts[j] <= rtol, values[0, first : first + count],
+                    bars[0, first : first + count], rtol,
                     decided, misses)  # fmt: skip
 
 
 @splice
-def _decide(d, bar, wide, floats, rtol, verdict, missed):
+def _decide(d, bar, wide, values, bars, rtol, verdict, missed):
     """D, its bar and the verdict of neighbouring points, and who missed; `wide`: the bars may miss
     rtol. Views: an offset index is not vector code.
     """
     for i in range(len(verdict)):
-        floats[0, i], floats[1, i] = d[i], bar[i]
+        values[i] = d[i]
+    fill_up(bar, bars)
     for i in range(len(verdict)):
         stable, unstable = abs(d[i]) < 2.0 - bar[i], abs(d[i]) > 2.0 + bar[i]
         verdict[i] = (
@@ -287,7 +290,9 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
 
 
 @kernel
-def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, verdict, missed):
+def discriminants_at(
+    first, coefficients, number, bar, x, even, rtol, values, bars, verdict, missed
+):
     """As `discriminants` at points on their own, from the `first` on: series and x as in `points`,
     of one function, D, within `bar`.
     """
@@ -312,7 +317,8 @@ def discriminants_at(first, coefficients, number, bar, x, even, rtol, floats, ve
             sums,
             bounds,
             not bar <= rtol,
-            floats[:, begin:end],
+            values[0, begin:end],
+            bars[0, begin:end],
             rtol,
             verdict[begin:end],
             missed[begin:end],

@@ -31,8 +31,8 @@ class Asked:
 
 
 class Answers(answers.Answers):
-    """`floats` (14, N): each of `kernels.hill.answers.FLOATS` and its error bound, if wanted; and
-    the `verdict`.
+    """`floats` (7, N): each of `kernels.hill.answers.FLOATS`, if wanted, and `bars` (7, N, float32),
+    their error bounds, rounded up; and the `verdict`.
 
     `results` (N, RESULTS) is what they follow from, where all points were solved one by one.
     """
@@ -40,16 +40,26 @@ class Answers(answers.Answers):
     results = None
 
     def __init__(self, size, asked):
-        super().__init__(
-            size, 2 * len(kernels.FLOATS), ("verdict",), np.flatnonzero(np.repeat(asked.wanted, 2))
-        )
+        super().__init__(size, len(kernels.FLOATS), ("verdict",), np.flatnonzero(asked.wanted))
+        self.bars = np.empty(self.floats.shape, np.float32)
         self.asked = asked
+
+    @property
+    def found(self):
+        """What kernels fill: values, bars, verdicts, and who has missed."""
+        return self.floats, self.bars, self.verdict, self.missed
+
+    def replace(self, points, other, those=slice(None)):
+        """See there."""
+        super().replace(points, other, those)
+        for row in self.kept:
+            self.bars[row, points] = other.bars[row, those]
 
     def assess(self, results, rule, squares=NO_SQUARES, first=0):
         """Answer the points from the `first` on, if their status is ok, from their results (n,
         RESULTS) and `squares` (see `measure`).
         """
-        asked, own = self.asked, (self.floats, self.verdict, self.missed, self.status)
+        asked, own = self.asked, (*self.found, self.status)
         rule = NONE if rule is None else rule
         columns = np.ascontiguousarray(results.T)
         kernels.measure(
@@ -64,7 +74,7 @@ class Answers(answers.Answers):
             status.OVERFLOW,
             *own,
         )
-        if asked.wanted[kernels.EXPONENT // 2 :].any():
+        if asked.wanted[kernels.EXPONENT :].any():
             waiting.wait("answers")
             kernels.transcendental(
                 first, columns, squares, asked.wanted, asked.rtol, asked.full_period, *own

@@ -53,9 +53,9 @@ def solve(problem, asked, answers):
     left = ours & (answers.verdict == UNDECIDED) if asked.decides else np.zeros_like(ours)
     if problem.exact is not None:
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
-        if asked.rtol < ILL and asked.wanted[DISCRIMINANT // 2]:
+        if asked.rtol < ILL and asked.wanted[DISCRIMINANT]:
             d = abs(answers.floats[DISCRIMINANT])
-            bar = answers.floats[DISCRIMINANT + 1]
+            bar = answers.bars[DISCRIMINANT]
             _exactly(
                 problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS
             )

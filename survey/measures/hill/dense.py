@@ -96,7 +96,7 @@ class ExpandedFunctions:
     def wanted(self):
         """What is asked of the nodes."""
         return np.array(
-            [2 * i in self.rows or (self.turns and 2 * i == kernels.ROTATION) for i in range(7)]
+            [i in self.rows or (self.turns and i == kernels.ROTATION) for i in range(7)]
         )
 
 
@@ -129,9 +129,7 @@ def compile_ahead(sample, no_rows, variables):
         Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1), None)
         if grows:
-            kernels.exponents(
-                np.zeros(1, int), 1, 1.0, answers.floats, answers.verdict, answers.missed
-            )
+            kernels.exponents(np.zeros(1, int), 1, 1.0, *answers.found)
         answers.assess(np.ones((1, RESULTS)), None)
     else:
         Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
@@ -220,10 +218,10 @@ def _discriminants_at(answers, first, series, number, bar, x, even):
     """D of the answers from the `first` on, at points x (2, N) across and along, from its series,
     and the exponent.
     """
-    asked, outputs = answers.asked, (answers.floats, answers.verdict, answers.missed)
-    discriminants_at(first, series, number, bar, x, even, asked.rtol, *outputs)
-    if asked.wanted[kernels.EXPONENT // 2]:
-        kernels.exponents(np.array([first]), x.shape[1], asked.rtol, *outputs)
+    asked = answers.asked
+    discriminants_at(first, series, number, bar, x, even, asked.rtol, *answers.found)
+    if asked.wanted[kernels.EXPONENT]:
+        kernels.exponents(np.array([first]), x.shape[1], asked.rtol, *answers.found)
 
 
 def _parts(row_axis, sought):
@@ -332,10 +330,8 @@ def _answer(problem, asked, answers, rows, series, bars, turns, nodal, axis, ope
     _discriminants(answers, rows[~wide], series[0, ~wide], bars[0, ~wide], x, None)
     if wide.any():  # points may miss it: bounds of their own, which cost more
         _discriminants(answers, rows[wide], series[0, wide], None, x, nodal.of(wide))
-    if asked.wanted[kernels.EXPONENT // 2]:
-        kernels.exponents(
-            rows * x.size, x.size, asked.rtol, answers.floats, answers.verdict, answers.missed
-        )
+    if asked.wanted[kernels.EXPONENT]:
+        kernels.exponents(rows * x.size, x.size, asked.rtol, *answers.found)
     open_points[rows] = answers.missed.reshape(problem.p.shape)[rows]
 
 
@@ -397,8 +393,9 @@ def _discriminants(answers, rows, series, bars, x, nodal):
         bars = nodal.doubts
         at_nodes = _padded(nodal.bars)
         nodes = nodal.bars.shape[1]
-    own = answers.asked.rtol, answers.floats, answers.verdict, answers.missed
-    discriminants(rows, _padded(series), bars, at_nodes, nodes, x, *own)
+    discriminants(
+        rows, _padded(series), bars, at_nodes, nodes, x, answers.asked.rtol, *answers.found
+    )
 
 
 def _padded(series):
@@ -621,8 +618,9 @@ def _series(problem, method, accuracy, rows, n, axis, sought):
     )
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
-    found = own.floats.reshape(len(own.floats), *nodes.p.shape)
-    values, at_nodes = found[list(sought.rows)], found[[row + 1 for row in sought.rows]]
+    shape = len(kernels.FLOATS), *nodes.p.shape
+    found, bars = own.floats.reshape(shape), own.bars.reshape(shape)
+    values, at_nodes = found[list(sought.rows)], bars[list(sought.rows)].astype(float)
     bars = at_nodes.max(axis=2)
     turns = None
     if sought.factors:

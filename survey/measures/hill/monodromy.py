@@ -240,9 +240,8 @@ def _asked(rtol, wanted, full_period):
 def _outputs(answers, asked, shape):
     out = {"verdict": answers.verdict.reshape(shape), "status": answers.status.reshape(shape)}
     for i in np.flatnonzero(asked.wanted):
-        out[FLOATS[i]], out[f"{FLOATS[i]}_error"] = answers.floats[2 * i : 2 * i + 2].reshape(
-            2, *shape
-        )
+        out[FLOATS[i]] = answers.floats[i].reshape(shape)
+        out[f"{FLOATS[i]}_error"] = answers.bars[i].reshape(shape)
     return out
 
 
