@@ -127,7 +127,12 @@ class Output:
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked at every point of a survey: option values, method, accuracy and the requested outputs."""
+    """What is asked at every point of a survey: option values, method, accuracy and the requested
+    outputs.
+
+    `out` holds the arrays in which these are stored, in the block's shape; a scene may fill them itself
+    and return them, or parts of them, or take no notice.
+    """
 
     options: Mapping[str, str]
     method: str = "auto"
@@ -136,6 +141,7 @@ class Request:
     lines: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
     fixed: frozenset[str] = frozenset()
     ranges: Mapping[str, tuple[int, float, float]] = field(default_factory=dict)
+    out: Mapping[str, npt.NDArray[Any]] = field(default_factory=dict, compare=False, repr=False)
 
     def line(self, name: str) -> tuple[int, float, float] | None:
         """(number, least, greatest) of the full axis of the parameter `name`, which no other
@@ -145,6 +151,16 @@ class Request:
         depend on blocks.
         """
         return self.lines.get(name)
+
+
+def answers_of(scene: Any, point: Mapping[str, Any], request: Request) -> dict[str, Any]:
+    """The outputs of a block (see `survey.scenes`), for arithmetic: error bounds as float64."""
+    with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
+        out = scene.solve(point, request)
+    return {
+        name: values.astype(float) if values.dtype == np.float32 else values
+        for name, values in out.items()
+    }
 
 
 @dataclass(frozen=True)

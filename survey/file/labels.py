@@ -258,13 +258,10 @@ class Tally:
         self.missed += int(np.count_nonzero(missed))
         self.points += size
         for name, codes in self.codes.items():
-            left = size
-            for key, code in codes.items():
-                number = int(np.count_nonzero(arrays[name] == code)) if left else 0
+            for key, number in zip(codes, _numbers(arrays[name], codes.values()), strict=True):
                 self.counts[name][key] += number
-                left -= number
-        other = arrays["status"] != status.OK
-        if "verdict" in self.codes and other.any():
+        other = arrays["status"] != status.OK if np.any(arrays["status"]) else None
+        if "verdict" in self.codes and other is not None:
             why = arrays["status"][(arrays["verdict"] == UNDECIDED) & other]
             for key in self.unanswered if why.size else ():
                 self.unanswered[key] += int(np.count_nonzero(why == self.codes["status"][key]))
@@ -289,6 +286,19 @@ class Tally:
     def old_attributes(self):
         """The counts as older files hold them, where points without an answer count as undecided."""
         return _counts(self.counts)
+
+
+def _numbers(array, codes):
+    """How often each of the codes is in an array."""
+    flat, numbers = np.ravel(array), [0] * len(codes)
+    for first in range(0, flat.size, CHUNK):
+        some = flat[first : first + CHUNK]
+        left = some.size
+        for i, code in enumerate(codes):
+            number = int(np.count_nonzero(some == code)) if left else 0
+            numbers[i] += number
+            left -= number
+    return numbers
 
 
 def _counts(table):

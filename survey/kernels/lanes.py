@@ -20,7 +20,7 @@ falls below what the step itself loses where z is so small that its products und
 import numpy as np
 
 from survey.kernels.jit import splice
-from survey.kernels.unroll import changes_sign, unroll
+from survey.kernels.unroll import changes_sign, fma, unroll
 
 # The columns of a point's results: both solutions and their derivatives at the end, their error
 # bounds, and the numbers of zeros of y1 and of y2 on the way.
@@ -147,18 +147,18 @@ def relative(matrix, h):
 def column(matrix, y, v, s, t, w):
     """(y, v) and its error ellipse (s, t; t, w) after the step with propagator and bounds `matrix`."""
     a, b, c, d, diagonal, upper, lower = matrix
-    error_y = SCALE * (diagonal * abs(y) + upper * abs(v))
-    error_v = SCALE * (lower * abs(y) + diagonal * abs(v))
-    left, right = a * s + b * t, a * t + b * w
-    low, high = c * s + d * t, c * t + d * w
+    error_y = SCALE * fma(diagonal, abs(y), upper * abs(v))
+    error_v = SCALE * fma(lower, abs(y), diagonal * abs(v))
+    left, right = fma(a, s, b * t), fma(a, t, b * w)
+    low, high = fma(c, s, d * t), fma(c, t, d * w)
     # rounding: where one solution outgrows the other by 1e16 in square, a thin ellipse would lose
     # its positive sign
-    round_y = ROUNDING * (a * (a * s) + b * (b * w))
-    round_v = ROUNDING * (c * (c * s) + d * (d * w))
-    s = left * a + right * b + (error_y * error_y + LEAST + round_y)
-    t = left * c + right * d
-    w = low * c + high * d + (error_v * error_v + LEAST + round_v)
-    return a * y + b * v, c * y + d * v, s, t, w
+    round_y = ROUNDING * fma(a, a * s, b * (b * w))
+    round_v = ROUNDING * fma(c, c * s, d * (d * w))
+    s = fma(left, a, fma(right, b, fma(error_y, error_y, LEAST + round_y)))
+    t = fma(left, c, right * d)
+    w = fma(low, c, fma(high, d, fma(error_v, error_v, LEAST + round_v)))
+    return fma(a, y, b * v), fma(c, y, d * v), s, t, w
 
 
 @splice

@@ -9,34 +9,42 @@ and its bits are the same in any block.
 """
 
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from survey import status
 
 UNDECIDED = -1
+NOTHING = MappingProxyType({})
 
 
 class Answers:
     """Answers at N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and which points
     have `missed` the requested accuracy.
 
-    `kept` are the rows of `floats` that hold anything (all of them by default).
+    Codes and status that are in `out`, by name, are kept there.
     """
 
-    def __init__(self, size, rows, codes, kept=None):
-        self.kept, self.codes = range(rows) if kept is None else kept, codes
-        self.floats = np.empty((rows, size))
-        for name in codes:
-            setattr(self, name, np.full(size, UNDECIDED, np.int8))
-        self.status, self.missed = np.zeros(size, np.int8), np.zeros(size, np.bool_)
+    def __init__(self, size, codes, out=NOTHING):
+        self.codes = codes
+        for name, first in (*dict.fromkeys(codes, UNDECIDED).items(), ("status", status.OK)):
+            array = out[name] if name in out else np.empty(size, np.int8)
+            array[:] = first
+            setattr(self, name, array)
+        self.missed = np.zeros(size, np.bool_)
+
+    @property
+    def rows(self):
+        """The arrays (N each) of numbers that hold anything."""
+        return self.floats
 
     def replace(self, points, other, those=slice(None)):
         """The answers of `points` become those of `other`: of all its points, or of `those`, in
         that order.
         """
-        for row in self.kept:
-            self.floats[row, points] = other.floats[row, those]
+        for own, others in zip(self.rows, other.rows, strict=True):
+            own[points] = others[those]
         for name in (*self.codes, "status", "missed"):
             getattr(self, name)[points] = getattr(other, name)[those]
 

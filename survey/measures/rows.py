@@ -67,6 +67,14 @@ class Rows:
         """All values, a read-only view with the axes in order."""
         return np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
 
+    def straight(self, out):
+        """The arrays `out`, in the block's shape, as those of its points (rows x lanes); none of them
+        where points are in another order there.
+        """
+        if self.order != sorted(self.order) or not all(a.flags.c_contiguous for a in out.values()):
+            return {}
+        return {name: array.reshape(-1) for name, array in out.items()}
+
     def back(self, array):
         """(rows, lanes) in the block's shape; or (rows, 1), as a view to read alone."""
         full = array.shape == (self.rows, self.lanes)

@@ -21,7 +21,7 @@ from survey.kernels.floquet import steps
 from survey.kernels.jit import kernel, splice
 from survey.kernels.lanes import chain, scatter
 from survey.kernels.math.roundoff import ROUNDOFF
-from survey.kernels.unroll import unroll
+from survey.kernels.unroll import fma, unroll
 
 ORDER = 16
 SERVES = ("danby", "floquet", "hill", "orbit")
@@ -78,8 +78,10 @@ def hill_density(rtol):
 @unroll
 def _product(matrix, k, x, i):
     """Row k of the matrix times lane i of x."""
-    first = matrix[k, 0] * x[0, i] + matrix[k, 1] * x[1, i]
-    return first + matrix[k, 2] * x[2, i] + matrix[k, 3] * x[3, i] + matrix[k, 4] * x[4, i]
+    total = matrix[k, 0] * x[0, i]
+    for j in range(1, _HALF):
+        total = fma(matrix[k, j], x[j, i], total)
+    return total
 
 
 @splice
@@ -131,8 +133,11 @@ def _convolved(z, x, n, zeros=()):
     """The n-th coefficient of the product of the series z, of degree 9, and x, the `zeros` of which
     are passed over.
     """
-    terms = [z[n - j] * x[j] for j in range(max(0, n - _DEGREE), n + 1) if j not in zeros]
-    return sum(terms[1:], terms[0])
+    first, *others = (j for j in range(max(0, n - _DEGREE), n + 1) if j not in zeros)
+    total = z[n - first] * x[first]
+    for j in others:
+        total = fma(z[n - j], x[j], total)
+    return total
 
 
 def _sums(terms):
@@ -147,7 +152,8 @@ def _sums(terms):
 def hill_step(f, c2, p, h):
     """P and its local error bounds."""
     c2 = -0.25 * h * h * c2
-    z = [f[0] + p * (f[WIDTH] + p * c2)] + [f[k] + p * f[WIDTH + k] for k in range(1, _DEGREE + 1)]
+    z = [fma(p, fma(p, c2, f[WIDTH]), f[0])]
+    z += [fma(p, f[WIDTH + k], f[k]) for k in range(1, _DEGREE + 1)]
     a, b = [1.0, 0.0, z[0] * (1 / 2)], [0.0, 1.0, 0.0]
     for n in range(1, ORDER):
         b.append(_convolved(z, b, n, (0, 2)) * (1 / ((n + 2) * (n + 1))))
@@ -167,10 +173,10 @@ def hill_step(f, c2, p, h):
     b_end, b_start = b_odd + b_even, b_even - b_odd
     da_end, da_start = da_even + da_odd, da_even - da_odd
     db_end, db_start = db_even + db_odd, db_even - db_odd
-    p11 = a_end * db_start - b_end * da_start
-    p12 = b_end * a_start - a_end * b_start
-    p21 = da_end * db_start - db_end * da_start
-    p22 = db_end * a_start - da_end * b_start
+    p11 = fma(a_end, db_start, -b_end * da_start)
+    p12 = fma(b_end, a_start, -a_end * b_start)
+    p21 = fma(da_end, db_start, -db_end * da_start)
+    p22 = fma(db_end, a_start, -da_end * b_start)
     # Truncation: the next two coefficients, at the rate at which the last four fall; that rate,
     # with its accidents, is not trusted below 1/50, nor by more than a factor of 3.
     a_last, b_last = abs(a[15]) + abs(a[16]), abs(b[16]) + abs(b[17])

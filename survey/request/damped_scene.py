@@ -84,7 +84,7 @@ class DampedScene(FunctionScene):
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
         wanted = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
-        out = self._inner.solve(point, replace(request, variables=wanted))
+        out = self._inner.solve(point, replace(request, variables=wanted, out={}))
         c, turn, bar = self._loss(point, out)
         exponent = out["exponent"] - turn
         off = out["exponent_error"] + bar + EPS * abs(out["exponent"])

@@ -11,6 +11,7 @@ from survey import status
 from survey.errors import BadInput
 from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
+from survey.measures.answers import NOTHING
 from survey.measures.hill import (
     dependence,
     monodromy,
@@ -140,8 +141,9 @@ class HillScene(FunctionScene):
         position = np.ascontiguousarray(points[:, axes.across])
         p = np.ascontiguousarray(points[:, axes.lane])
         out = self._called(
-            monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables
-        )
+            monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables,
+            {name: array.reshape(-1) for name, array in request.out.items()},
+        )  # fmt: skip
         period = np.full(len(points), self._ranges(points[:1])[0][0])
         return self._labelled(out, rough, period, request.variables)
 
@@ -196,7 +198,8 @@ class HillScene(FunctionScene):
                 user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
                 self._more_digits,
             )  # fmt: skip
-            found = self._answers(problem, rough, self._ranges(points[rows])[0], request)
+            into = block.straight(request.out) if len(families) == 1 else {}
+            found = self._answers(problem, rough, self._ranges(points[rows])[0], request, into)
             bad = np.flatnonzero(bad)
             if bad.size:  # z may be smooth, or finite, at some of its points
                 alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
@@ -222,9 +225,9 @@ class HillScene(FunctionScene):
         _, family = np.unique(others, axis=0, return_inverse=True)
         return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
 
-    def _answers(self, problem, rough, period, request):
+    def _answers(self, problem, rough, period, request, out=NOTHING):
         out = self._called(
-            monodromy.solve, problem, request.method, request.rtol, request.variables
+            monodromy.solve, problem, request.method, request.rtol, request.variables, out
         )
         return self._labelled(out, rough, period, request.variables)
 

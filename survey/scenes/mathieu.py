@@ -63,7 +63,8 @@ def solve(point, request):
             request.line("a"),
             request.line("q"),
         )
-        out = monodromy.solve(problem, request.method, request.rtol, request.variables)
+        into = block.straight(request.out)
+        out = monodromy.solve(problem, request.method, request.rtol, request.variables, into)
     else:
         block = Rows((point["q"], point["a"]))
         q, a = block.per_row(point["q"]), block.per_row(point["a"])
@@ -75,9 +76,11 @@ def solve(point, request):
             lambda points: _problem(q[points], a[points, None]),
             request.rtol,
             request.variables,
+            block.straight(request.out),
         )
-    out["period"] = np.where(out["status"] == status.OK, pi, np.nan)
-    out["period_error"] = 1.3e-16 + 0.0 * out["period"]  # pi is rounded
+    known = out["status"] == status.OK
+    for name, value in (("period", pi), ("period_error", 1.3e-16)):  # pi is rounded
+        out[name] = np.full((1, 1), value) if known.all() else np.where(known, value, np.nan)
     return {name: block.back(values) for name, values in out.items()}
 
 

@@ -232,7 +232,8 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     problem = _problem(
         row, block.view(rho), None if low is None else block.per_point(low), line, ends
     )
-    out = monodromy.solve(problem, request.method, request.rtol, _wanted(request))
+    into = block.straight(request.out) if low is None else {}
+    out = monodromy.solve(problem, request.method, request.rtol, _wanted(request), into)
     period = None if _wanted(request).isdisjoint(_OF_PERIOD) else row.period
     return _derived(out, row, problem.p, block, request, period)
 
@@ -273,7 +274,7 @@ def _derived(out, row, rho, block, request, period):
     and `rho`.
     """
     wanted, ok = _wanted(request), out["status"] == status.OK
-    rho = rho if rho.strides[0] else rho[:1]  # all rows have the same
+    rho = _of_one_row(rho)
     if "period" in wanted:
         for name, values in (("period", period), ("period_error", _PERIOD_ULPS * EPS * period)):
             column = values[:, None]
@@ -319,7 +320,10 @@ def _solve_scattered(box, shared, rho, oblate, request):
             Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None]
         )
 
-    out = monodromy.solve_scattered(box, position, rho, problem_of, request.rtol, _wanted(request))
+    into = block.straight(request.out)
+    out = monodromy.solve_scattered(
+        box, position, rho, problem_of, request.rtol, _wanted(request), into
+    )
     period = None
     if not _wanted(request).isdisjoint(_OF_PERIOD):
         integral = row.integrals[0]
@@ -415,6 +419,11 @@ def _problem(row, rho, low=None, line=None, ends=None):
     )
 
 
+def _of_one_row(rho):
+    """rho (R, L), or (1, L) where all rows have the same."""
+    return rho if rho.strides[0] else rho[:1]
+
+
 def _sizes(row):
     half, half_low = row.half
     bound = np.ones((row.k.size, 3))  # (|rho| + k)^2 + 1
@@ -429,10 +438,10 @@ def _rules(row, rho, low=None):
     (2 rho)^2 = n^2 - 4, two squares of integers (a binary fraction whose square is an integer is one) that differ by
     4: only rho = 0.
     """
-    at_rest, balanced = np.flatnonzero(row.k == 0), rho == 0
+    at_rest, balanced = np.flatnonzero(row.k == 0), _of_one_row(rho) == 0
     if not at_rest.size and not balanced.any():
         return None, None
-    rule = np.where(balanced, np.int8(ON_EDGE), np.int8(NO_RULE))
+    rule = np.where(np.broadcast_to(balanced, rho.shape), np.int8(ON_EDGE), np.int8(NO_RULE))
     if not at_rest.size:
         return rule, None
     still = rho[at_rest]

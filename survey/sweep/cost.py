@@ -40,9 +40,9 @@ def lone_cost(scene, request, grid):
     return scene.cost(request.options, dict.fromkeys(grid.parameters, 1))
 
 
-def points_per_block(scene, request, grid):
-    """The number of points for which a block takes about BLOCK_SECONDS of kernel time."""
-    return int(min(max(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1), BLOCK_POINTS))
+def points_per_block(scene, request, grid, most=BLOCK_POINTS):
+    """The number of points for which a block takes about BLOCK_SECONDS of kernel time, at `most`."""
+    return int(min(max(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1), most))
 
 
 def regions_of(workflow):

@@ -11,10 +11,11 @@ from survey.file.labels import layout
 from survey.kernels.math.rounding import round_up
 from survey.sweep import dispatch
 from survey.sweep.compile_ahead import compiling_ahead
-from survey.sweep.cost import bytes_per_point, points_per_block, seconds_per_point
+from survey.sweep.cost import BLOCK_POINTS, bytes_per_point, points_per_block, seconds_per_point
 from survey.wording import listed
 
 QUICK_SECONDS, QUICK_BYTES = 0.05, 2**23  # what takes no more is done before threads have begun
+MOST_POINTS, BLOCKS_PER_THREAD = 2**20, 4  # of a block in memory; files are written in smaller ones
 
 
 def solve_block(scene, request, grid, block, out=None):
@@ -22,7 +23,7 @@ def solve_block(scene, request, grid, block, out=None):
     _keep_freed_memory()
     return solve_point(
         scene,
-        replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges),
+        replace(request, lines=grid.lines, fixed=grid.fixed, ranges=grid.ranges, out=out or {}),
         grid.point(block),
         _shape(grid, block),
         out,
@@ -78,7 +79,6 @@ def stored(scene, request, solved, shape, out=None):
             infinite |= _round_up(values, arrays[name])
         else:
             arrays[name] = values.astype(dtype, copy=False)
-            infinite |= name.endswith("_error") and np.isinf(values).any()
     if infinite:
         _overflow(arrays, table, shape)
     for name, array in out.items() if out else ():
@@ -127,12 +127,15 @@ def compute(grid, scene, request, threads=None, progress=None):
         out = {name: values[block] for name, values in result.items()}
         solve_block(scene, request, grid, block, out)
 
-    blocks = grid.blocks(points_per_block(scene, request, grid))
     seconds = grid.points * seconds_per_point(scene, request, grid)
     quick = (
         seconds <= QUICK_SECONDS and grid.points * bytes_per_point(scene, request) <= QUICK_BYTES
     )
     workers = 1 if quick else threads or dispatch.cpus()
+    # the fewer blocks the better, but threads should end at the same time
+    share = grid.points if workers == 1 else grid.points // (BLOCKS_PER_THREAD * workers)
+    most = max(BLOCK_POINTS, min(share, MOST_POINTS))
+    blocks = grid.blocks(points_per_block(scene, request, grid, most))
 
     def report(done, _=None):
         if progress:

@@ -131,7 +131,8 @@ def measure(
     status,
 ):
     """What follows from `results` (RESULTS, n) of n of N points, from the `first` on, by
-    arithmetic: `values` (7, N) and `bars` (7, N, float32), `verdict`, who has `missed` `rtol`.
+    arithmetic: `values` and `bars` (float32), 7 arrays (N) each, if wanted, `verdict`, who has
+    `missed` `rtol`.
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
     `overflow`. `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count
@@ -172,13 +173,13 @@ def measure(
         for i in range(count):
             misses[i] = decides & (left_out[i] == 0) & (decided[i] == UNDECIDED)
         if wanted[0]:
-            _keep(tile[VALUE], tile[DOUBT], rtol, values[DISCRIMINANT, begin:end],
-                  bars[DISCRIMINANT, begin:end], misses, left_out)  # fmt: skip
+            _keep(tile[VALUE], tile[DOUBT], rtol, values[DISCRIMINANT][begin:end],
+                  bars[DISCRIMINANT][begin:end], misses, left_out)  # fmt: skip
         for c in range(4):
             at = FACTOR_ROWS[c]
             if wanted[at]:
                 _keep(tile[OWN + lanes.Y1 + c], tile[OWN + lanes.Y1_BAR + c], rtol,
-                      values[at, begin:end], bars[at, begin:end], misses, left_out)  # fmt: skip
+                      values[at][begin:end], bars[at][begin:end], misses, left_out)  # fmt: skip
 
 
 @kernel
@@ -214,13 +215,13 @@ def transcendental(
                 tile[VALUE, i] = -min(sine, cosine)
                 tile[DOUBT, i] = sine_bar if sine < cosine else cosine_bar
             _growths(
-                tile, rtol, values[EXPONENT, begin:end], bars[EXPONENT, begin:end],
+                tile, rtol, values[EXPONENT][begin:end], bars[EXPONENT][begin:end],
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
         if wanted[ROTATION]:
             _lost(full_period, decided, tile)
             _turns(
-                tile, rtol, values[ROTATION, begin:end], bars[ROTATION, begin:end],
+                tile, rtol, values[ROTATION][begin:end], bars[ROTATION][begin:end],
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
 
@@ -236,10 +237,10 @@ def exponents(first, count, rtol, values, bars, verdict, missed):
             end = min(start + TILE, of + count)
             for i in range(start, end):
                 # |D| - 2 = 4 sinh^2(exponent / 2)
-                tile[VALUE, i - start] = 0.25 * (abs(values[DISCRIMINANT, i]) - 2.0)
-                tile[DOUBT, i - start] = 0.25 * bars[DISCRIMINANT, i]
+                tile[VALUE, i - start] = 0.25 * (abs(values[DISCRIMINANT][i]) - 2.0)
+                tile[DOUBT, i - start] = 0.25 * bars[DISCRIMINANT][i]
             _growths(
-                tile, rtol, values[EXPONENT, start:end], bars[EXPONENT, start:end],
+                tile, rtol, values[EXPONENT][start:end], bars[EXPONENT][start:end],
                 verdict[start:end], missed[start:end], none[: end - start],
             )  # fmt: skip
 

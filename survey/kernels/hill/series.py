@@ -107,38 +107,56 @@ def discriminants(rows, coefficients, doubts, at_nodes, n, x, rtol, values, bars
                 _lagrange(n, own, table[slot], sums, weights[slot])
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
             _sum(coefficients[j], table[slot], sums, count)
+            first = rows[j] * len(x) + t * TILE
+            end = first + count
             if n > 0:
                 _sum(at_nodes[j], weights[slot], bounds, count)
                 for i in range(count):
                     bounds[i] += doubts[j]
+                _decide_each(sums, bounds, values[first:end], bars[first:end], rtol,
+                             verdict[first:end], missed[first:end])  # fmt: skip
             else:
-                for i in range(count):
-                    bounds[i] = doubts[j]
-            first = rows[j] * len(x) + t * TILE
-            decided, misses = verdict[first : first + count], missed[first : first + count]
-            _decide(sums, bounds, n > 0 or not doubts[j] <= rtol, values[0, first : first + count],
-                    bars[0, first : first + count], rtol,
-                    decided, misses)  # fmt: skip
+                _decide(sums, doubts[j], values[first:end], bars[first:end], rtol,
+                        verdict[first:end], missed[first:end])  # fmt: skip
 
 
 @splice
-def _decide(d, bar, wide, values, bars, rtol, verdict, missed):
-    """D, its bar and the verdict of neighbouring points, and who missed; `wide`: the bars may miss
-    rtol. Views: an offset index is not vector code.
+def _decide(d, bar, values, bars, rtol, verdict, missed):
+    """D, their common bar and the verdict of neighbouring points, and who missed. Views: an offset
+    index is not vector code.
     """
+    bars[0] = np.float32(bar)
+    up = np.nextafter(bars[0], np.float32(np.inf)) if bars[0] < bar else bars[0]
+    low, high = 2.0 - bar, 2.0 + bar
     for i in range(len(verdict)):
-        values[i] = d[i]
+        size = abs(d[i])
+        values[i], bars[i] = d[i], up
+        verdict[i] = (
+            np.int8(STABLE)
+            if size < low
+            else np.int8(UNSTABLE)
+            if size > high
+            else np.int8(UNDECIDED)
+        )
+    for i in range(len(verdict)):
+        missed[i] = verdict[i] == UNDECIDED
+    if not bar <= rtol:
+        for i in range(len(verdict)):
+            missed[i] |= not bar <= rtol * (1.0 + abs(d[i]))
+
+
+@splice
+def _decide_each(d, bar, values, bars, rtol, verdict, missed):
+    """As `_decide`, with a bar of each point."""
     fill_up(bar, bars)
     for i in range(len(verdict)):
+        values[i] = d[i]
         stable, unstable = abs(d[i]) < 2.0 - bar[i], abs(d[i]) > 2.0 + bar[i]
         verdict[i] = (
             np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
         )
     for i in range(len(verdict)):
-        missed[i] = verdict[i] == UNDECIDED
-    if wide:
-        for i in range(len(verdict)):
-            missed[i] |= not bar[i] <= rtol * (1.0 + abs(d[i]))
+        missed[i] = (verdict[i] == UNDECIDED) | (not bar[i] <= rtol * (1.0 + abs(d[i])))
 
 
 @splice
@@ -298,7 +316,7 @@ def discriminants_at(
     """
     terms, across = coefficients.shape
     table, rows = np.empty((terms, TILE)), np.empty((across, TILE))
-    sums, part, bounds = np.empty(TILE), np.empty(TILE), np.full(TILE, bar)
+    sums, part = np.empty(TILE), np.empty(TILE)
     for start in range(0, x.shape[1], TILE):
         count = min(TILE, x.shape[1] - start)
         end = start + count
@@ -315,10 +333,9 @@ def discriminants_at(
         begin, end = first + start, first + end
         _decide(
             sums,
-            bounds,
-            not bar <= rtol,
-            values[0, begin:end],
-            bars[0, begin:end],
+            bar,
+            values[begin:end],
+            bars[begin:end],
             rtol,
             verdict[begin:end],
             missed[begin:end],

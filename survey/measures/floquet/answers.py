@@ -11,7 +11,8 @@ class Answers(answers.Answers):
     """
 
     def __init__(self, size, n):
-        super().__init__(size, 4 * n + 2, ("verdict", "crossing"))
+        super().__init__(size, ("verdict", "crossing"))
+        self.floats = np.empty((4 * n + 2, size))
         self.n, self.signs = n, np.zeros((n, size), np.int8)
 
     def replace(self, points, other, those=slice(None)):

@@ -31,29 +31,40 @@ class Asked:
 
 
 class Answers(answers.Answers):
-    """`floats` (7, N): each of `kernels.hill.answers.FLOATS`, if wanted, and `bars` (7, N, float32),
-    their error bounds, rounded up; and the `verdict`.
+    """`floats`, an array (N) for each of `kernels.hill.answers.FLOATS`, if wanted, and `bars` (float32),
+    their error bounds, rounded up; and the `verdict`. Those that are in `out`, by name, are filled.
 
     `results` (N, RESULTS) is what they follow from, where all points were solved one by one.
     """
 
     results = None
 
-    def __init__(self, size, asked):
-        super().__init__(size, len(kernels.FLOATS), ("verdict",), np.flatnonzero(asked.wanted))
-        self.bars = np.empty(self.floats.shape, np.float32)
+    def __init__(self, size, asked, out=answers.NOTHING):
+        super().__init__(size, ("verdict",), out)
         self.asked = asked
+        sizes = [size if wanted else 0 for wanted in asked.wanted]
+        self.floats, self.bars = (
+            tuple(
+                out[name + end] if name + end in out else np.empty(n, kind)
+                for name, n in zip(kernels.FLOATS, sizes, strict=True)
+            )
+            for end, kind in (("", np.float64), ("_error", np.float32))
+        )
+
+    @property
+    def rows(self):
+        """See there."""
+        kept = np.flatnonzero(self.asked.wanted)
+        return [of[row] for of in (self.floats, self.bars) for row in kept]
 
     @property
     def found(self):
         """What kernels fill: values, bars, verdicts, and who has missed."""
         return self.floats, self.bars, self.verdict, self.missed
 
-    def replace(self, points, other, those=slice(None)):
-        """See there."""
-        super().replace(points, other, those)
-        for row in self.kept:
-            self.bars[row, points] = other.bars[row, those]
+    def of(self, row):
+        """What of this a kernel fills that answers one question alone."""
+        return self.floats[row], self.bars[row], self.verdict, self.missed
 
     def assess(self, results, rule, squares=NO_SQUARES, first=0):
         """Answer the points from the `first` on, if their status is ok, from their results (n,

@@ -219,7 +219,8 @@ def _discriminants_at(answers, first, series, number, bar, x, even):
     and the exponent.
     """
     asked = answers.asked
-    discriminants_at(first, series, number, bar, x, even, asked.rtol, *answers.found)
+    own = answers.of(kernels.DISCRIMINANT)
+    discriminants_at(first, series, number, bar, x, even, asked.rtol, *own)
     if asked.wanted[kernels.EXPONENT]:
         kernels.exponents(np.array([first]), x.shape[1], asked.rtol, *answers.found)
 
@@ -393,9 +394,8 @@ def _discriminants(answers, rows, series, bars, x, nodal):
         bars = nodal.doubts
         at_nodes = _padded(nodal.bars)
         nodes = nodal.bars.shape[1]
-    discriminants(
-        rows, _padded(series), bars, at_nodes, nodes, x, answers.asked.rtol, *answers.found
-    )
+    own = answers.of(kernels.DISCRIMINANT)
+    discriminants(rows, _padded(series), bars, at_nodes, nodes, x, answers.asked.rtol, *own)
 
 
 def _padded(series):
@@ -618,15 +618,19 @@ def _series(problem, method, accuracy, rows, n, axis, sought):
     )
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
-    shape = len(kernels.FLOATS), *nodes.p.shape
-    found, bars = own.floats.reshape(shape), own.bars.reshape(shape)
-    values, at_nodes = found[list(sought.rows)], bars[list(sought.rows)].astype(float)
+    values, at_nodes = (
+        np.array([of[row] for row in sought.rows], float).reshape(-1, *nodes.p.shape)
+        for of in (own.floats, own.bars)
+    )
     bars = at_nodes.max(axis=2)
     turns = None
     if sought.factors:
         zeros = own.results[:, Y1_ZEROS:].T.reshape(2, *nodes.p.shape)
         turns = np.stack(
-            [found[kernels.ROTATION] if sought.turns else zeros[0], *np.repeat(zeros, 2, axis=0)]
+            [
+                own.floats[kernels.ROTATION].reshape(nodes.p.shape) if sought.turns else zeros[0],
+                *np.repeat(zeros, 2, axis=0),
+            ]
         )
     ulps = (abs(axis.middle) + axis.radius) / axis.radius
     matrix = chebyshev.by_columns(x.size)

@@ -22,6 +22,7 @@ from survey import measures, status
 from survey.kernels.hill.answers import FLOATS, MARGINAL, STABLE, UNDECIDED, UNSTABLE, spread
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math.double import split_error
+from survey.measures.answers import NOTHING
 from survey.measures.hill import auto, pointwise
 from survey.measures.hill.answers import Answers, Asked
 from survey.scene import Output
@@ -215,14 +216,15 @@ def of_rows(rows, sample, walk, exact=None):
     return {"sample": samples, "walk": walked, "exact": solved if exact else None}
 
 
-def solve(problem, method, rtol, wanted=()):
-    """The wanted outputs (R, L; all by default) with `_error` each, `verdict`, `status`.
+def solve(problem, method, rtol, wanted=(), out=NOTHING):
+    """The wanted outputs (R, L; all by default) with `_error` each (float32), `verdict`, `status`;
+    in the arrays `out` (R L), by name, as far as these are given.
 
     `method` is the name of a method, or "auto" (see `auto`); points climb its ladder until
     `rtol` is met or more work is of no use.
     """
     asked = _asked(rtol, wanted, problem.full_period)
-    answers = Answers(problem.p.size, asked)
+    answers = Answers(problem.p.size, asked, out)
     if method == "auto":
         auto.solve(problem, asked, answers)
     else:
@@ -252,13 +254,13 @@ def cost(rows, points):
     return SECONDS[bool(points >= DENSE) + bool(rows >= DENSE and points >= DENSE)]
 
 
-def solve_scattered(box, position, p, problem_of, rtol, wanted=()):
+def solve_scattered(box, position, p, problem_of, rtol, wanted=(), out=NOTHING):
     """As `solve` by "auto", (N, 1), of points on their own at `position` and `p` (N each; NaN where
     no series serves): from series on their `box`; `problem_of(points)` is the Problem of those that
     are left.
     """
     asked = _asked(rtol, wanted, box.full_period)
-    answers = Answers(p.size, asked)
+    answers = Answers(p.size, asked, out)
     left = np.flatnonzero(auto.scattered(box, asked, answers, position, p))
     if left.size:
         own = Answers(left.size, asked)

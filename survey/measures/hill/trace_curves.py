@@ -28,6 +28,7 @@ from survey.measures.floquet.curves import ALONG, CLASSES, NUMBER, TITLE, refusa
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.hill.edges import COUNTS, has_factors
 from survey.measures.segments import UNKNOWN
+from survey.scene import answers_of
 
 ENTRIES = ("y1", "y2", "dy1", "dy2")  # by rows
 
@@ -56,9 +57,8 @@ class _System:
     def solved(self, point, request, *wanted):
         """These outputs of the scene."""
         # `auto` would go on to more digits beside the curves, which are of no use here
-        return self.scene.solve(
-            point, replace(request, method="taylor16", variables=frozenset(wanted))
-        )
+        own = replace(request, method="taylor16", variables=frozenset(wanted), out={})
+        return answers_of(self.scene, point, own)
 
 
 class _Undamped(_System):

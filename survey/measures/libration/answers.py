@@ -1,5 +1,7 @@
 """The answers of points of Danby's map as they come in."""
 
+import numpy as np
+
 from survey import status
 from survey.kernels.libration import traces
 from survey.kernels.libration.traces import PAIRS, PAIRS_BAR, SUM, SUM_BAR, UNDECIDED
@@ -10,7 +12,8 @@ class Answers(answers.Answers):
     """`floats` (4, N): a, b, each followed by its error bound; `verdict` and `collision`."""
 
     def __init__(self, size):
-        super().__init__(size, 4, ("verdict", "collision"))
+        super().__init__(size, ("verdict", "collision"))
+        self.floats = np.empty((4, size))
 
     @property
     def all(self):

@@ -14,17 +14,14 @@ def by_the_kernel(x, n):
     """
     at_nodes = np.zeros((n, -(-n // TERMS) * TERMS))
     at_nodes[:, :n] = np.eye(n)
-    floats, verdict, missed = (
-        np.empty((2, n * x.size)),
-        np.empty(n * x.size, np.int8),
-        np.empty(n * x.size, np.bool_),
-    )
+    size = n * x.size
+    values, bars = np.empty(size), np.empty(size, np.float32)
+    verdict, missed = np.empty(size, np.int8), np.empty(size, np.bool_)
     zeros = np.zeros_like(at_nodes)
-    discriminants(
-        np.arange(n), zeros, zeros[:, 0].copy(), at_nodes, n, x, 1e-9, floats, verdict, missed
-    )
-    assert (missed == ~(floats[1] <= 1e-9)).all() and (floats[0] == 0).all()
-    return floats[1].reshape(n, x.size)
+    given = np.arange(n), zeros, zeros[:, 0].copy(), at_nodes, n, x, 1e-9
+    discriminants(*given, values, bars, verdict, missed)
+    assert (missed == ~(bars <= 1e-9)).all() and (values == 0).all()
+    return bars.reshape(n, x.size)
 
 
 @pytest.mark.parametrize("magnitudes", [chebyshev.lagrange, by_the_kernel])
