@@ -153,16 +153,6 @@ class Request:
         return self.lines.get(name)
 
 
-def answers_of(scene: Any, point: Mapping[str, Any], request: Request) -> dict[str, Any]:
-    """The outputs of a block (see `survey.scenes`), for arithmetic: error bounds as float64."""
-    with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
-        out = scene.solve(point, request)
-    return {
-        name: values.astype(float) if values.dtype == np.float32 else values
-        for name, values in out.items()
-    }
-
-
 @dataclass(frozen=True)
 class Trajectory:
     """One point solved in time: `data` as xarray.Dataset takes it, {name: (dimensions, values,

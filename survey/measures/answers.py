@@ -34,19 +34,17 @@ class Answers:
             setattr(self, name, array)
         self.missed = np.zeros(size, np.bool_)
 
-    @property
-    def rows(self):
-        """The arrays (N each) of numbers that hold anything."""
-        return self.floats
-
     def replace(self, points, other, those=slice(None)):
         """The answers of `points` become those of `other`: of all its points, or of `those`, in
         that order.
         """
-        for own, others in zip(self.rows, other.rows, strict=True):
-            own[points] = others[those]
+        self._replace_floats(points, other, those)
         for name in (*self.codes, "status", "missed"):
             getattr(self, name)[points] = getattr(other, name)[those]
+
+    def _replace_floats(self, points, other, those):
+        for own, others in zip(self.floats, other.floats, strict=True):
+            own[points] = others[those]
 
 
 @dataclass(frozen=True)

@@ -198,9 +198,9 @@ class HillScene(FunctionScene):
                 user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
                 self._more_digits,
             )  # fmt: skip
-            into = block.straight(request.out) if len(families) == 1 else {}
-            found = self._answers(problem, rough, self._ranges(points[rows])[0], request, into)
             bad = np.flatnonzero(bad)
+            into = {} if bad.size or len(families) > 1 else block.straight(request.out)
+            found = self._answers(problem, rough, self._ranges(points[rows])[0], request, into)
             if bad.size:  # z may be smooth, or finite, at some of its points
                 alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
                 alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)

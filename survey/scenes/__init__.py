@@ -13,11 +13,12 @@ as NaN: such points get the status `invalid_parameters`. `request` is a survey.s
 `request.line(name)` describes the full axis of a parameter, of which the block may be a part.
 
 `solve` returns, in the block's shape (plus an output's extra dimensions), every output in
-`request.variables` (all of them if that is empty), `X_error` (float64; or float32, rounded up and
-finite), an absolute error bound, for each float output `X`, and `status` (int8: the codes of
-`survey.status`, from 16 on the scene's own in the order of STATUS). Where an output does not apply
-a float is NaN, an integer its `fill`. Where a scene gives a status of its own, the verdict is -1,
-and maps and counts name the status.
+`request.variables` (all of them if that is empty), `X_error` (float64), an absolute error bound,
+for each float output `X`, and `status` (int8: the codes of `survey.status`, from 16 on the scene's
+own in the order of STATUS). Where an output does not apply a float is NaN, an integer its `fill`.
+Where a scene gives a status of its own, the verdict is -1, and maps and counts name the status. A
+scene may fill arrays of `request.out`, in which outputs are stored, and return these, error bounds
+(float32) rounded up and finite.
 `solve` is pure and thread-safe, and gives a point the same bits in any block.
 
 In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything

@@ -232,10 +232,17 @@ def _solve(shared, rho, oblate, request, low=None, line=None, ends=None):
     problem = _problem(
         row, block.view(rho), None if low is None else block.per_point(low), line, ends
     )
-    into = block.straight(request.out) if low is None else {}
+    into = _own_outputs(block, request) if low is None else {}
     out = monodromy.solve(problem, request.method, request.rtol, _wanted(request), into)
     period = None if _wanted(request).isdisjoint(_OF_PERIOD) else row.period
     return _derived(out, row, problem.p, block, request, period)
+
+
+def _own_outputs(block, request):
+    """The arrays of `request.out`, but for error bounds from which other outputs follow."""
+    derived = _wanted(request) & ({"exponent_per_orbit"} | nonlinear.NAMES)
+    used = {"exponent_error", "discriminant_error"} if derived else set()
+    return {name: a for name, a in block.straight(request.out).items() if name not in used}
 
 
 def _passages(point, request):
@@ -320,7 +327,7 @@ def _solve_scattered(box, shared, rho, oblate, request):
             Motion(*(values[points] for values in columns), bool(oblate)), rho[points, None]
         )
 
-    into = block.straight(request.out)
+    into = _own_outputs(block, request)
     out = monodromy.solve_scattered(
         box, position, rho, problem_of, request.rtol, _wanted(request), into
     )

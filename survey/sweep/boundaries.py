@@ -26,7 +26,7 @@ from survey.grid import Grid, logarithmic
 from survey.measures.segments import UNKNOWN
 from survey.measures.square import Square
 from survey.measures.tasks import in_turn
-from survey.scene import Request, answers_of
+from survey.scene import Request
 from survey.sweep.line import OnLine, on_line, together
 
 # of the time of a map, measured: of one axis, of which most are short or have few boundaries; and
@@ -327,8 +327,10 @@ def _row_solver(workflow, axis, rows):
 
 
 def _solve(workflow, point, wanted):
-    request = Request(workflow.request.options, "auto", RTOL, frozenset(wanted))
-    return answers_of(workflow.scene, point, request)
+    with np.errstate(all="ignore"):
+        return workflow.scene.solve(
+            point, Request(workflow.request.options, "auto", RTOL, frozenset(wanted))
+        )
 
 
 def _rows(workflow, axis, other, edges):

@@ -16,7 +16,7 @@ from survey import measures
 from survey.errors import BadInput
 from survey.file.labels import flag_attributes, percent, round_up
 from survey.measures.tasks import in_turn
-from survey.scene import Request, answers_of
+from survey.scene import Request
 
 LABELS = ("unstable", "stable")
 CELL_SECONDS = 3e-6  # of a measure that names none
@@ -166,7 +166,8 @@ def _solver(workflow, x, y):
 
     def solve(*values):
         point = {p.name: np.where(p.holds(v), v, np.nan) for p, v in zip(axes, values, strict=True)}
-        return answers_of(workflow.scene, fixed | point, request)
+        with np.errstate(all="ignore"):
+            return workflow.scene.solve(fixed | point, request)
 
     return solve
 

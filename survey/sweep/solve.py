@@ -124,7 +124,7 @@ def compute(grid, scene, request, threads=None, progress=None):
     }
 
     def task(block):
-        out = {name: values[block] for name, values in result.items()}
+        out = {name: values[(*block, ...)] for name, values in result.items()}
         solve_block(scene, request, grid, block, out)
 
     seconds = grid.points * seconds_per_point(scene, request, grid)

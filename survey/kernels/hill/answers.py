@@ -22,7 +22,7 @@ LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
 UNDECIDED, UNSTABLE, STABLE, MARGINAL = -1, 0, 1, 2
 # What an exact rule says of a point.
 NO_RULE, NO_UNSTABLE_SIDE, ON_EDGE = 0, 1, 2
-# Rows of `values`, and of `bars`, which are rounded up, of `measure`.
+# Rows of `values`, and of their bars, of `measure`.
 FLOATS = ("discriminant", "y1", "y2", "dy1", "dy2", "exponent", "rotation_number")
 DISCRIMINANT, Y1, Y2, DY1, DY2, EXPONENT, ROTATION = range(7)
 FACTOR_ROWS = np.array([Y1, DY1, Y2, DY2])  # in the order of the results
@@ -126,13 +126,14 @@ def measure(
     overflow,
     values,
     bars,
+    rounded,
     verdict,
     missed,
     status,
 ):
     """What follows from `results` (RESULTS, n) of n of N points, from the `first` on, by
-    arithmetic: `values` and `bars` (float32), 7 arrays (N) each, if wanted, `verdict`, who has
-    `missed` `rtol`.
+    arithmetic: `values`, 7 arrays (N), if wanted, their `bars`, or these `rounded` up to float32 where
+    those arrays are not empty, `verdict`, who has `missed` `rtol`.
 
     Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
     `overflow`. `rule` (N, or empty) holds what exact rules say, `wanted` (7) which columns count
@@ -174,12 +175,12 @@ def measure(
             misses[i] = decides & (left_out[i] == 0) & (decided[i] == UNDECIDED)
         if wanted[0]:
             _keep(tile[VALUE], tile[DOUBT], rtol, values[DISCRIMINANT][begin:end],
-                  bars[DISCRIMINANT][begin:end], misses, left_out)  # fmt: skip
+                  bars[DISCRIMINANT][begin:end], rounded[DISCRIMINANT][begin:end], misses, left_out)  # fmt: skip
         for c in range(4):
             at = FACTOR_ROWS[c]
             if wanted[at]:
                 _keep(tile[OWN + lanes.Y1 + c], tile[OWN + lanes.Y1_BAR + c], rtol,
-                      values[at][begin:end], bars[at][begin:end], misses, left_out)  # fmt: skip
+                      values[at][begin:end], bars[at][begin:end], rounded[at][begin:end], misses, left_out)  # fmt: skip
 
 
 @kernel
@@ -198,7 +199,18 @@ def _obey(rule, decided, tile):
 
 @kernel
 def transcendental(
-    first, results, squares, wanted, rtol, full_period, values, bars, verdict, missed, status
+    first,
+    results,
+    squares,
+    wanted,
+    rtol,
+    full_period,
+    values,
+    bars,
+    rounded,
+    verdict,
+    missed,
+    status,
 ):
     """The columns of `measure` that are no arithmetic: exponent and rotation number, if wanted, and
     who misses.
@@ -215,19 +227,19 @@ def transcendental(
                 tile[VALUE, i] = -min(sine, cosine)
                 tile[DOUBT, i] = sine_bar if sine < cosine else cosine_bar
             _growths(
-                tile, rtol, values[EXPONENT][begin:end], bars[EXPONENT][begin:end],
+                tile, rtol, values[EXPONENT][begin:end], bars[EXPONENT][begin:end], rounded[EXPONENT][begin:end],
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
         if wanted[ROTATION]:
             _lost(full_period, decided, tile)
             _turns(
-                tile, rtol, values[ROTATION][begin:end], bars[ROTATION][begin:end],
+                tile, rtol, values[ROTATION][begin:end], bars[ROTATION][begin:end], rounded[ROTATION][begin:end],
                 decided, missed[begin:end], left_out,
             )  # fmt: skip
 
 
 @kernel
-def exponents(first, count, rtol, values, bars, verdict, missed):
+def exponents(first, count, rtol, values, bars, rounded, verdict, missed):
     """The exponents of `count` points from each of `first` on, whose D and bar are known, and who
     misses `rtol`.
     """
@@ -240,7 +252,7 @@ def exponents(first, count, rtol, values, bars, verdict, missed):
                 tile[VALUE, i - start] = 0.25 * (abs(values[DISCRIMINANT][i]) - 2.0)
                 tile[DOUBT, i - start] = 0.25 * bars[DISCRIMINANT][i]
             _growths(
-                tile, rtol, values[EXPONENT][start:end], bars[EXPONENT][start:end],
+                tile, rtol, values[EXPONENT][start:end], bars[EXPONENT][start:end], rounded[EXPONENT][start:end],
                 verdict[start:end], missed[start:end], none[: end - start],
             )  # fmt: skip
 
@@ -371,7 +383,7 @@ def decide(sine, sine_bar, cosine, cosine_bar):
 
 
 @kernel
-def _growths(tile, rtol, values, bars, verdict, missed, left_out):
+def _growths(tile, rtol, values, bars, rounded, verdict, missed, left_out):
     """The exponents 2 asinh sqrt(growth) of neighbouring points, -sin^2 or -cos^2 of half the angle in
     row VALUE of `tile`, its bar in row DOUBT; their bars, and who misses. Not of who is `left_out`.
     """
@@ -386,19 +398,21 @@ def _growths(tile, rtol, values, bars, verdict, missed, left_out):
         still, x, bar = verdict[i] >= STABLE, 2.0 * tile[VALUE, i], tile[DOUBT, i]
         bar += 8.0 * EPS * x
         tile[VALUE, i], tile[DOUBT, i] = 0.0 if still else x, 0.0 if still else bar
-    _keep(tile[VALUE], tile[DOUBT], rtol, values, bars, missed, left_out)
+    _keep(tile[VALUE], tile[DOUBT], rtol, values, bars, rounded, missed, left_out)
 
 
 @kernel
-def _keep(found, doubts, rtol, values, bars, missed, left_out):
-    """Keep the numbers `found` of neighbouring points and their `doubts` as `values` and `bars`, NaN of
+def _keep(found, doubts, rtol, values, bars, rounded, missed, left_out):
+    """Keep the numbers `found` of neighbouring points and their `doubts` as in `measure`, NaN of
     who is `left_out`; and who misses.
     """
     for i in range(len(values)):
         values[i] = found[i] if left_out[i] == 0 else np.nan
-    fill_up(doubts, bars)
-    for i in range(len(values)):
-        bars[i] = bars[i] if left_out[i] == 0 else np.float32(np.nan)
+    fill_up(doubts, rounded)
+    for i in range(len(rounded)):
+        rounded[i] = rounded[i] if left_out[i] == 0 else np.float32(np.nan)
+    for i in range(len(bars)):
+        bars[i] = doubts[i] if left_out[i] == 0 else np.nan
     for i in range(len(values)):
         wide = not doubts[i] <= rtol * (1.0 + abs(found[i]))
         missed[i] |= wide & (left_out[i] == 0)
@@ -444,7 +458,7 @@ def _lost(full_period, verdict, tile):
 
 
 @splice
-def _turns(tile, rtol, values, bars, verdict, missed, left_out):
+def _turns(tile, rtol, values, bars, rounded, verdict, missed, left_out):
     """theta_total / (2 pi) of neighbouring points: `ZEROS` of y1, y2 in (0, T/2) give the band; n / 2
     exactly in gaps. Their bars, and who misses. Not of who is `left_out`.
     """
@@ -473,7 +487,7 @@ def _turns(tile, rtol, values, bars, verdict, missed, left_out):
         bar = 0.0 if on_edge | (verdict[i] == UNSTABLE) else bar
         tile[VALUE, i] = 0.5 * np.rint(2.0 * x) if on_edge else x
         tile[DOUBT, i] = bar + tile[DOUBT, i]
-    _keep(tile[VALUE], tile[DOUBT], rtol, values, bars, missed, left_out)
+    _keep(tile[VALUE], tile[DOUBT], rtol, values, bars, rounded, missed, left_out)
 
 
 @inline

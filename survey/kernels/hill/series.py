@@ -83,7 +83,9 @@ def _lagrange(n, x, tile, top, weights):
 
 
 @kernel
-def discriminants(rows, coefficients, doubts, at_nodes, n, x, rtol, values, bars, verdict, missed):
+def discriminants(
+    rows, coefficients, doubts, at_nodes, n, x, rtol, values, bars, rounded, verdict, missed
+):
     """D of the `rows` from its series at x (L): D, its bar and the verdict; `missed` where not
     enough.
 
@@ -113,24 +115,28 @@ def discriminants(rows, coefficients, doubts, at_nodes, n, x, rtol, values, bars
                 _sum(at_nodes[j], weights[slot], bounds, count)
                 for i in range(count):
                     bounds[i] += doubts[j]
-                _decide_each(sums, bounds, values[first:end], bars[first:end], rtol,
+                _decide_each(sums, bounds, values[first:end], bars[first:end], rounded[first:end], rtol,
                              verdict[first:end], missed[first:end])  # fmt: skip
             else:
-                _decide(sums, doubts[j], values[first:end], bars[first:end], rtol,
+                _decide(sums, doubts[j], values[first:end], bars[first:end], rounded[first:end], rtol,
                         verdict[first:end], missed[first:end])  # fmt: skip
 
 
 @splice
-def _decide(d, bar, values, bars, rtol, verdict, missed):
+def _decide(d, bar, values, bars, rounded, rtol, verdict, missed):
     """D, their common bar and the verdict of neighbouring points, and who missed. Views: an offset
     index is not vector code.
     """
-    bars[0] = np.float32(bar)
-    up = np.nextafter(bars[0], np.float32(np.inf)) if bars[0] < bar else bars[0]
     low, high = 2.0 - bar, 2.0 + bar
+    for i in range(len(bars)):
+        bars[i] = bar
+    up = np.float32(bar)
+    up = np.nextafter(up, np.float32(np.inf)) if up < bar else up
+    for i in range(len(rounded)):
+        rounded[i] = up
     for i in range(len(verdict)):
         size = abs(d[i])
-        values[i], bars[i] = d[i], up
+        values[i] = d[i]
         verdict[i] = (
             np.int8(STABLE)
             if size < low
@@ -146,9 +152,11 @@ def _decide(d, bar, values, bars, rtol, verdict, missed):
 
 
 @splice
-def _decide_each(d, bar, values, bars, rtol, verdict, missed):
+def _decide_each(d, bar, values, bars, rounded, rtol, verdict, missed):
     """As `_decide`, with a bar of each point."""
-    fill_up(bar, bars)
+    fill_up(bar, rounded)
+    for i in range(len(bars)):
+        bars[i] = bar[i]
     for i in range(len(verdict)):
         values[i] = d[i]
         stable, unstable = abs(d[i]) < 2.0 - bar[i], abs(d[i]) > 2.0 + bar[i]
@@ -309,7 +317,7 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
 
 @kernel
 def discriminants_at(
-    first, coefficients, number, bar, x, even, rtol, values, bars, verdict, missed
+    first, coefficients, number, bar, x, even, rtol, values, bars, rounded, verdict, missed
 ):
     """As `discriminants` at points on their own, from the `first` on: series and x as in `points`,
     of one function, D, within `bar`.
@@ -336,6 +344,7 @@ def discriminants_at(
             bar,
             values[begin:end],
             bars[begin:end],
+            rounded[begin:end],
             rtol,
             verdict[begin:end],
             missed[begin:end],

@@ -29,7 +29,7 @@ from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.floquet.stability import CROSSINGS
 from survey.measures.hill.edges import close_in
 from survey.measures.sampled import FLAT, LONGEST, joined
-from survey.scene import Output, Request, answers_of
+from survey.scene import Output, Request
 
 CLASSES = {
     name: CROSSINGS[name] for name in ("plus_one", "minus_one", "neimark_sacker", "collision")
@@ -358,12 +358,13 @@ def _about(matrices, x, error, M, E):
 def _solved(scene, square, axes, fixed, options, method, variables):
     """solved(positions (N, axes), rtol) -> {name: values}, these variables of the scene."""
 
-    def at(x, rtol):
+    def solved(x, rtol):
         values = square.parameters(x)
         point = fixed | {name: values[:, k] for k, name in enumerate(axes)}
-        return answers_of(scene, point, Request(options, method, rtol, frozenset(variables)))
+        with np.errstate(all="ignore"):
+            return scene.solve(point, Request(options, method, rtol, frozenset(variables)))
 
-    return at
+    return solved
 
 
 def _lines(function, grain, values, tried=TRIED):

@@ -6,9 +6,11 @@ import numpy as np
 
 from survey import status, waiting
 from survey.kernels.hill import answers as kernels
+from survey.kernels.math.rounding import round_up
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
+NO_BARS = np.zeros(0, np.float32)
 NO_SQUARES = np.zeros((0, kernels.SQUARES))
 
 
@@ -31,8 +33,8 @@ class Asked:
 
 
 class Answers(answers.Answers):
-    """`floats`, an array (N) for each of `kernels.hill.answers.FLOATS`, if wanted, and `bars` (float32),
-    their error bounds, rounded up; and the `verdict`. Those that are in `out`, by name, are filled.
+    """`floats`, an array (N) for each of `kernels.hill.answers.FLOATS`, if wanted, and their error
+    bounds; and the `verdict`. Arrays that are in `out`, by name, are filled, with bounds rounded up.
 
     `results` (N, RESULTS) is what they follow from, where all points were solved one by one.
     """
@@ -42,29 +44,43 @@ class Answers(answers.Answers):
     def __init__(self, size, asked, out=answers.NOTHING):
         super().__init__(size, ("verdict",), out)
         self.asked = asked
-        sizes = [size if wanted else 0 for wanted in asked.wanted]
-        self.floats, self.bars = (
-            tuple(
-                out[name + end] if name + end in out else np.empty(n, kind)
-                for name, n in zip(kernels.FLOATS, sizes, strict=True)
-            )
-            for end, kind in (("", np.float64), ("_error", np.float32))
+        needed = asked.wanted.copy()
+        needed[kernels.DISCRIMINANT] = True  # a verdict alone may follow from it
+        sizes = np.where(needed, size, 0)
+        places = [(out.get(name), out.get(f"{name}_error")) for name in kernels.FLOATS]
+        if asked.wanted[kernels.EXPONENT]:  # which may follow from D and its bounds
+            places[kernels.DISCRIMINANT] = places[kernels.DISCRIMINANT][0], None
+        self.floats = tuple(
+            np.empty(n) if own is None else own for n, (own, _) in zip(sizes, places, strict=True)
         )
+        self._bars = tuple(
+            np.empty(n if own is None else 0) for n, (_, own) in zip(sizes, places, strict=True)
+        )
+        self._rounded = tuple(NO_BARS if own is None else own for _, own in places)
 
-    @property
-    def rows(self):
-        """See there."""
-        kept = np.flatnonzero(self.asked.wanted)
-        return [of[row] for of in (self.floats, self.bars) for row in kept]
+    def bars(self, row):
+        """The error bounds of one of the floats, as they are kept."""
+        return self._rounded[row] if self._rounded[row].size else self._bars[row]
+
+    def _replace_floats(self, points, other, those):
+        for row in np.flatnonzero(self.asked.wanted):
+            self.floats[row][points] = other.floats[row][those]
+            bars = other.bars(row)[those]
+            if bars.dtype == self.bars(row).dtype:
+                self.bars(row)[points] = bars
+            else:
+                up = np.empty(bars.shape, np.float32)
+                round_up(np.ascontiguousarray(bars), up)
+                self.bars(row)[points] = up
 
     @property
     def found(self):
-        """What kernels fill: values, bars, verdicts, and who has missed."""
-        return self.floats, self.bars, self.verdict, self.missed
+        """What kernels fill: values, bars, rounded ones, verdicts, and who has missed."""
+        return self.floats, self._bars, self._rounded, self.verdict, self.missed
 
     def of(self, row):
         """What of this a kernel fills that answers one question alone."""
-        return self.floats[row], self.bars[row], self.verdict, self.missed
+        return self.floats[row], self._bars[row], self._rounded[row], self.verdict, self.missed
 
     def assess(self, results, rule, squares=NO_SQUARES, first=0):
         """Answer the points from the `first` on, if their status is ok, from their results (n,

@@ -55,7 +55,7 @@ def solve(problem, asked, answers):
         _exactly(problem, answers, np.flatnonzero(left), asked, taylor_double.STEP_LIMIT)
         if asked.rtol < ILL and asked.wanted[DISCRIMINANT]:
             d = abs(answers.floats[DISCRIMINANT])
-            bar = answers.bars[DISCRIMINANT]
+            bar = answers.bars(DISCRIMINANT)
             _exactly(
                 problem, answers, np.flatnonzero(ours & (bar > ILL * (1 + d))), asked, FEW_STEPS
             )

@@ -619,8 +619,8 @@ def _series(problem, method, accuracy, rows, n, axis, sought):
     own = Answers(nodes.p.size, finer)
     pointwise.solve(nodes, method, finer, own)
     values, at_nodes = (
-        np.array([of[row] for row in sought.rows], float).reshape(-1, *nodes.p.shape)
-        for of in (own.floats, own.bars)
+        np.array([of(row) for row in sought.rows]).reshape(-1, *nodes.p.shape)
+        for of in (own.floats.__getitem__, own.bars)
     )
     bars = at_nodes.max(axis=2)
     turns = None

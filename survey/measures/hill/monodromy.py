@@ -217,8 +217,8 @@ def of_rows(rows, sample, walk, exact=None):
 
 
 def solve(problem, method, rtol, wanted=(), out=NOTHING):
-    """The wanted outputs (R, L; all by default) with `_error` each (float32), `verdict`, `status`;
-    in the arrays `out` (R L), by name, as far as these are given.
+    """The wanted outputs (R, L; all by default) with `_error` each, `verdict`, `status`; in
+    the arrays `out` (R L), by name, as far as these are given, error bounds rounded up to float32.
 
     `method` is the name of a method, or "auto" (see `auto`); points climb its ladder until
     `rtol` is met or more work is of no use.
@@ -243,7 +243,7 @@ def _outputs(answers, asked, shape):
     out = {"verdict": answers.verdict.reshape(shape), "status": answers.status.reshape(shape)}
     for i in np.flatnonzero(asked.wanted):
         out[FLOATS[i]] = answers.floats[i].reshape(shape)
-        out[f"{FLOATS[i]}_error"] = answers.bars[i].reshape(shape)
+        out[f"{FLOATS[i]}_error"] = answers.bars(i).reshape(shape)
     return out
 
 

@@ -7,7 +7,7 @@ They are zeros of the four factors at half a period, as the edges on rows are (s
 import numpy as np
 
 from survey.measures.hill.edges import CLASSES, FACTORS
-from survey.scene import Request, answers_of
+from survey.scene import Request
 
 __all__ = ["ALONG", "CLASSES", "TITLE", "Functions"]
 TITLE = "kind of the periodic solution at the edge"
@@ -38,6 +38,8 @@ class Functions:
     def _factors(self, x, rtol, names):
         values = self.box.parameters(x)
         point = self.fixed | {name: values[:, k] for k, name in enumerate(self.axes)}
-        request = Request(self.options, self.method, rtol, frozenset(names))
-        out = answers_of(self.scene, point, request)
+        with np.errstate(all="ignore"):
+            out = self.scene.solve(
+                point, Request(self.options, self.method, rtol, frozenset(names))
+            )
         return {FACTORS.index(name): (out[name], out[f"{name}_error"]) for name in names}

@@ -28,7 +28,6 @@ from survey.measures.floquet.curves import ALONG, CLASSES, NUMBER, TITLE, refusa
 from survey.measures.floquet.multipliers import MINUS_ONE, PLUS_ONE
 from survey.measures.hill.edges import COUNTS, has_factors
 from survey.measures.segments import UNKNOWN
-from survey.scene import answers_of
 
 ENTRIES = ("y1", "y2", "dy1", "dy2")  # by rows
 
@@ -58,7 +57,7 @@ class _System:
         """These outputs of the scene."""
         # `auto` would go on to more digits beside the curves, which are of no use here
         own = replace(request, method="taylor16", variables=frozenset(wanted), out={})
-        return answers_of(self.scene, point, own)
+        return self.scene.solve(point, own)
 
 
 class _Undamped(_System):

@@ -15,11 +15,11 @@ def by_the_kernel(x, n):
     at_nodes = np.zeros((n, -(-n // TERMS) * TERMS))
     at_nodes[:, :n] = np.eye(n)
     size = n * x.size
-    values, bars = np.empty(size), np.empty(size, np.float32)
+    values, bars = np.empty(size), np.empty(size)
     verdict, missed = np.empty(size, np.int8), np.empty(size, np.bool_)
     zeros = np.zeros_like(at_nodes)
     given = np.arange(n), zeros, zeros[:, 0].copy(), at_nodes, n, x, 1e-9
-    discriminants(*given, values, bars, verdict, missed)
+    discriminants(*given, values, bars, np.empty(0, np.float32), verdict, missed)
     assert (missed == ~(bars <= 1e-9)).all() and (values == 0).all()
     return bars.reshape(n, x.size)
 
