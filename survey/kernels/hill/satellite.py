@@ -7,6 +7,8 @@ and `which` says which one it is. `scenes/satellite.md`: The equation: z = (rho 
 sn^2 (OL), cn^2 (PR), -sn^2 (OR): no cancelling constant.
 """
 
+from math import sqrt
+
 import numpy as np
 
 from survey.kernels.jit import inline, kernel
@@ -16,6 +18,7 @@ from survey.kernels.math.sines import sin_cos
 
 # A relative gap of the means whose square is below the rounding of extended floats.
 CLOSE = 1e-10
+FEW = 4  # rows for which numpy costs more than loops
 MODULUS, COMPLEMENT, HALF, OBLATE, GIVEN, WHICH = range(6)
 ROW = 6
 
@@ -24,6 +27,9 @@ def complete_integrals(k, kc):
     """K and E of arrays of moduli and complements, as `elliptic.complete` in numpy, which has
     nothing to compile.
     """
+    if kc.size <= FEW:
+        found = [_complete_one(*given) for given in zip(k.tolist(), kc.tolist(), strict=True)]
+        return tuple(np.array(found).reshape(-1, 2).T)
     a, b, weight, total = np.ones_like(kc), kc, 0.5, 0.5 * k * k
     for _ in range(MEANS):
         gap = a - b
@@ -45,6 +51,20 @@ def complete_integrals(k, kc):
     return first, first * (1.0 - total)
 
 
+def _complete_one(k, kc):
+    """The same of one modulus, by the same operations."""
+    a, b, weight, total = 1.0, kc, 0.5, 0.5 * k * k
+    for _ in range(MEANS):
+        gap = a - b
+        if not abs(gap) > GAP * a:
+            break
+        c, a, b = 0.5 * gap, 0.5 * (a + b), sqrt(a * b)
+        weight *= 2.0
+        total += weight * c * c
+    first = np.pi / (a + b)
+    return first, first * (1.0 - total)
+
+
 def half_periods(k, kc):
     """2 K(k), or K(1/k) / k for rotations, rounded, and the rest, as phases are rho times as long
     (DLMF 19.8.5).
@@ -53,14 +73,26 @@ def half_periods(k, kc):
     compile.
     """
     a, b = np.ones_like(kc, dtype=np.longdouble), kc.astype(np.longdouble)
-    wide = np.flatnonzero(b < a)
-    while wide.size:  # each row goes its own way, so that its bits do not depend on others
+    if kc.size <= FEW:
+        a[:] = [_mean(*given) for given in zip(a, b, strict=True)]
+    wide = np.flatnonzero(b < a) if kc.size > FEW else ()
+    while len(wide):  # each row goes its own way, so that its bits do not depend on others
         one, other = a[wide], b[wide]
         a[wide], b[wide] = (one + other) / 2, np.sqrt(one * other)
         wide = wide[one - other > CLOSE * one]
     two = (np.longdouble(dd.PI[0]) + np.longdouble(dd.PI[1])) / a
     half = np.where(k > 1, two / (2 * np.maximum(k, 1)), two)
     return half.astype(float), (half - half.astype(float)).astype(float)
+
+
+def _mean(a, b):
+    """The arithmetic-geometric mean of two numbers, by the same operations as in `half_periods`."""
+    if b < a:
+        wide = True
+        while wide:
+            wide = a - b > CLOSE * a
+            a, b = (a + b) / 2, np.sqrt(a * b)
+    return a
 
 
 @inline

@@ -14,6 +14,7 @@ from survey.kernels.jit import kernel, splice
 from survey.kernels.math.chebyshev import TERMS, WIDTH, add_several, next_term
 from survey.kernels.math.rounding import fill_up
 from survey.kernels.math.roundoff import EPS
+from survey.kernels.unroll import consecutive, put, unroll
 
 TILE = 64
 ROOT_2 = math.sqrt(2.0)
@@ -36,23 +37,28 @@ LOW_ACROSS, HIGH_ACROSS, LOW_ALONG, HIGH_ALONG = range(4)
 
 
 @splice
-def _polynomials(x, tile):
-    """T_0 ... at x, in the first lanes of the rows of `tile`."""
-    for i in range(len(x)):
-        tile[0, i], tile[1, i] = 1.0, x[i]
+def _table(x, even, odd, tile):
+    """T_k at x (or of y = 2 x^2 - 1 if `even`; T_{2k + 1} if `odd`) in the first lanes of the rows
+    of `tile`, and in those up to a multiple of WIDTH numbers that are finite; its last row is used meanwhile.
+    """
+    end = (len(x) + WIDTH - 1) // WIDTH * WIDTH
+    last = len(tile) - 1
+    for i in range(end):
+        at = x[i] if i < len(x) else 0.0
+        y = 2.0 * at * at - 1.0 if even or odd else at
+        tile[0, i] = at if odd else 1.0
+        tile[1, i] = (2.0 * y - 1.0) * at if odd else y
+        tile[last, i] = 2.0 * y
     for k in range(2, len(tile)):
-        for i in range(len(x)):
-            tile[k, i] = next_term(2.0 * x[i], tile[k - 1, i], tile[k - 2, i])
-    _complete(tile, len(x))
+        for i in range(0, end, WIDTH):
+            _next_terms(tile, last, k, i)
 
 
-@splice
-def _complete(tile, count):
-    """Zeros in the lanes from `count` on up to a multiple of WIDTH."""
-    end = (count + WIDTH - 1) // WIDTH * WIDTH
-    for k in range(len(tile) if end > count else 0):
-        for i in range(count, end):
-            tile[k, i] = 0.0
+@unroll
+def _next_terms(tile, twice, k, i):
+    """T_k from the two before and 2 y, in the row `twice`, in WIDTH lanes from i on."""
+    y, last, before = (consecutive(tile, (row, i), WIDTH) for row in (twice, k + (-1), k + (-2)))
+    put(tile, (k, i), next_term(y, last, before))
 
 
 @splice
@@ -79,7 +85,9 @@ def _lagrange(n, x, tile, top, weights):
         node, share = math.cos(angle), math.sin(angle) / n if k < n else 0.0
         for i in range(len(x)):
             weights[k, i] = min((share * top[i] + 2.0 * EPS) / abs(x[i] - node), ROOT_2)
-    _complete(weights, len(x))
+    for k in range(len(weights)):
+        for i in range(len(x), (len(x) + WIDTH - 1) // WIDTH * WIDTH):
+            weights[k, i] = 0.0
 
 
 @kernel
@@ -104,7 +112,7 @@ def discriminants(
         count, slot = len(x) - t * TILE if t == tiles - 1 else TILE, t if kept > 1 else 0
         if start == 0:
             own = x[t * TILE : t * TILE + count]
-            _polynomials(own, table[slot])
+            _table(own, False, False, table[slot])
             if n > 0:
                 _lagrange(n, own, table[slot], sums, weights[slot])
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
@@ -165,22 +173,6 @@ def _decide_each(d, bar, values, bars, rounded, rtol, verdict, missed):
         )
     for i in range(len(verdict)):
         missed[i] = (verdict[i] == UNDECIDED) | (not bar[i] <= rtol * (1.0 + abs(d[i])))
-
-
-@splice
-def _table(x, even, odd, tile):
-    """T_k at x (or of y = 2 x^2 - 1 if `even`; T_{2k + 1} if `odd`) in the first lanes of the rows
-    of `tile`.
-    """
-    for i in range(len(x)):
-        y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
-        tile[0, i] = x[i] if odd else 1.0
-        tile[1, i] = (2.0 * y - 1.0) * x[i] if odd else y
-    for k in range(2, len(tile)):
-        for i in range(len(x)):
-            y = 2.0 * x[i] * x[i] - 1.0 if even or odd else x[i]
-            tile[k, i] = next_term(2.0 * y, tile[k - 1, i], tile[k - 2, i])
-    _complete(tile, len(x))
 
 
 @splice

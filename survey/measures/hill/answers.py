@@ -10,7 +10,7 @@ from survey.kernels.math.rounding import round_up
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
-NO_BARS = np.zeros(0, np.float32)
+NO_FLOATS, NO_BARS = np.zeros(0), np.zeros(0, np.float32)
 NO_SQUARES = np.zeros((0, kernels.SQUARES))
 
 
@@ -44,19 +44,17 @@ class Answers(answers.Answers):
     def __init__(self, size, asked, out=answers.NOTHING):
         super().__init__(size, ("verdict",), out)
         self.asked = asked
-        needed = asked.wanted.copy()
-        needed[kernels.DISCRIMINANT] = True  # a verdict alone may follow from it
-        sizes = np.where(needed, size, 0)
-        places = [(out.get(name), out.get(f"{name}_error")) for name in kernels.FLOATS]
-        if asked.wanted[kernels.EXPONENT]:  # which may follow from D and its bounds
-            places[kernels.DISCRIMINANT] = places[kernels.DISCRIMINANT][0], None
-        self.floats = tuple(
-            np.empty(n) if own is None else own for n, (own, _) in zip(sizes, places, strict=True)
-        )
-        self._bars = tuple(
-            np.empty(n if own is None else 0) for n, (_, own) in zip(sizes, places, strict=True)
-        )
-        self._rounded = tuple(NO_BARS if own is None else own for _, own in places)
+        floats, bars, rounded = [], [], []
+        wanted = asked.wanted.tolist()
+        for row, name in enumerate(kernels.FLOATS):
+            # a verdict alone may follow from D, and an exponent from D and its bounds
+            needed = wanted[row] or row == kernels.DISCRIMINANT
+            kept = row == kernels.DISCRIMINANT and wanted[kernels.EXPONENT]
+            own, up = out.get(name), None if kept else out.get(f"{name}_error")
+            floats.append(own if own is not None else np.empty(size) if needed else NO_FLOATS)
+            bars.append(np.empty(size) if needed and up is None else NO_FLOATS)
+            rounded.append(NO_BARS if up is None else up)
+        self.floats, self._bars, self._rounded = tuple(floats), tuple(bars), tuple(rounded)
 
     def bars(self, row):
         """The error bounds of one of the floats, as they are kept."""
