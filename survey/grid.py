@@ -35,12 +35,16 @@ class Grid:
     @cached_property
     def lines(self):
         """`lines` of its parameters."""
-        return lines(self.parameters)
+        return lines(self.parameters, self._alone)
 
     @cached_property
     def ranges(self):
         """`ranges` of its parameters."""
-        return ranges(self.parameters)
+        return ranges(self.parameters, self._alone)
+
+    @cached_property
+    def _alone(self):
+        return _alone(self.parameters)
 
     @cached_property
     def fixed(self):
@@ -115,19 +119,19 @@ class Grid:
         }
 
 
-def lines(parameters):
+def lines(parameters, alone=None):
     """{name: (number, least, greatest)} of each parameter that has an axis which no other shares.
 
     `parameters` is {name: (its dimensions, its values)}; least and greatest are those of the finite
     values.
     """
-    alone = _alone(parameters)
+    alone = _alone(parameters) if alone is None else alone
     return {name: (np.size(parameters[name][1]), *_ends(parameters[name][1])) for name in alone}
 
 
-def ranges(parameters):
+def ranges(parameters, alone=None):
     """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`."""
-    alone = _alone(parameters)
+    alone = _alone(parameters) if alone is None else alone
     return {
         name: (np.size(values), *_ends(values))
         for name, (dims, values) in parameters.items()
@@ -137,7 +141,7 @@ def ranges(parameters):
 
 def _alone(parameters):
     """The names of the parameters that have an axis which no other shares."""
-    number = Counter(dim for dims, _ in parameters.values() for dim in dims)
+    number = Counter([dim for dims, _ in parameters.values() for dim in dims])
     return [
         name for name, (dims, _) in parameters.items() if len(dims) == 1 and number[dims[0]] == 1
     ]

@@ -242,20 +242,20 @@ class Tally:
     def add(self, arrays):
         """Count the points of a piece: {variable: array}."""
         size = np.size(arrays["status"])
-        missed = np.zeros(size, bool)
+        missed = None
         for name in arrays:
             if f"{name}_error" not in arrays:
                 continue
-            value, error = (
-                np.asarray(arrays[key]).reshape(size, -1).T for key in (name, f"{name}_error")
-            )
+            error = np.asarray(arrays[f"{name}_error"])
             if not error.size or error.max() <= self.rtol:  # none is missed
                 continue
+            missed = np.zeros(size, bool) if missed is None else missed
+            value, error = (np.asarray(of).reshape(size, -1).T for of in (arrays[name], error))
             for first in range(0, size, CHUNK):
                 for one, bar in zip(value, error, strict=True):
                     some = first + np.flatnonzero(bar[first : first + CHUNK] > self.rtol)
                     missed[some] |= _exceeds(one[some], bar[some], self.rtol)
-        self.missed += int(np.count_nonzero(missed))
+        self.missed += 0 if missed is None else int(np.count_nonzero(missed))
         self.points += size
         for name, codes in self.codes.items():
             for key, number in zip(codes, _numbers(arrays[name], codes.values()), strict=True):

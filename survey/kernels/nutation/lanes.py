@@ -576,10 +576,10 @@ def wells(work, steps):
 
 @kernel
 def means(work, number):
+    last, weight = 2.0**number, 0.5  # a power within the loop would keep it from being vector code
     for i in range(TILE):
         prepare(work, i)
-        work[WEIGHT + i] = 2.0**number
-    weight = 0.5
+        work[WEIGHT + i] = last
     for _ in range(number):
         for i in range(TILE):
             take_mean(work, weight, i)

@@ -149,9 +149,11 @@ def solve(problem, method, asked, answers):
     """Answer the points of the rows that a proxy serves; returns the points (N, bool) still to be solved."""
     open_points = np.ones(problem.p.shape, np.bool_)
     even = np.zeros(len(problem.p), np.bool_) if problem.even is None else problem.even
-    for symmetric in np.unique(even):
+    for symmetric in (False, True):
         rows = np.flatnonzero(even == symmetric)
-        axis = _axis(problem.line, bool(symmetric))
+        if not rows.size:
+            continue
+        axis = _axis(problem.line, symmetric)
         if problem.row_axis is not None:
             rows = _surfaces(problem, method, asked, answers, rows, axis, open_points)
         _rows(problem, method, asked, answers, rows, axis, open_points)
@@ -292,11 +294,12 @@ def _rows(problem, method, asked, answers, chosen, axis, open_points):
         return
     sought = _sought(asked)
     degree = np.full(len(problem.p), DEGREES.size)
-    argument = _argument(problem, axis, sought)
-    degree[chosen] = _enough(argument, _smallest(problem, asked.rtol, sought))[chosen]
+    sizes = _sizes(_argument(problem, axis, sought)[chosen])
+    enough = _below(sizes, _smallest(problem, asked.rtol, sought))
     if problem.c2 and not sought.factors:  # not beyond what pays, where less may do
-        enough = np.minimum(_enough(argument, ROWS_SHARE * asked.rtol), axis.most - 1)
-        degree[chosen] = np.maximum(degree, enough)[chosen]
+        more = np.minimum(_below(sizes, ROWS_SHARE * asked.rtol), axis.most - 1)
+        enough = np.maximum(enough, more)
+    degree[chosen] = enough
     first = degree.copy()
     # a row whose series has not converged goes on to the next degree
     while (at := int(degree.min(initial=axis.most))) < axis.most:
@@ -588,10 +591,20 @@ def _enough(argument, rtol):
 
     |J_n(x)| <= (x/2)^n / n! (DLMF 10.14.4).
     """
+    return _below(_sizes(argument), rtol)
+
+
+def _sizes(argument):
+    """log (|argument| / 2)^n / n! (R, DEGREES)."""
     with np.errstate(divide="ignore"):
-        size = DEGREES * np.log(argument)[:, None] + _OF_DEGREES
-    enough = size < log(0.01 * rtol)
-    return np.where(enough.any(axis=1), enough.argmax(axis=1), DEGREES.size)
+        return DEGREES * np.log(argument)[:, None] + _OF_DEGREES
+
+
+def _below(sizes, rtol):
+    """The index of the first degree whose size is below a hundredth of rtol; beyond the last where
+    there is none.
+    """
+    return np.count_nonzero(~(sizes < log(0.01 * rtol)), axis=1)
 
 
 def _series(problem, method, accuracy, rows, n, axis, sought):
