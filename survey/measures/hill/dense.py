@@ -383,9 +383,11 @@ def _between(x, number, kept):
     """Which of the `kept` first of `number` nodes are on both sides of x (twice the last where
     there is none beyond), and the share of the way from one to the other.
     """
-    node = np.arccos(np.clip(np.nan_to_num(x), -1, 1)) * (number / np.pi) - 0.5
-    left = np.clip(np.floor(node), 0, kept - 1).astype(np.int64)
-    right = np.clip(np.floor(node) + 1, 0, kept - 1).astype(np.int64)
+    node = np.clip(x, -1.0, 1.0)
+    node[np.isnan(node)] = 0.0
+    node = np.arccos(node, out=node) * (number / np.pi) - 0.5
+    first = np.floor(node).astype(np.int64)
+    left, right = np.clip(first, 0, kept - 1), np.minimum(first + 1, kept - 1)
     return left, right, np.where(right > left, node - left, 0.0)
 
 
