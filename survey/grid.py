@@ -123,7 +123,7 @@ def lines(parameters, alone=None):
     """{name: (number, least, greatest)} of each parameter that has an axis which no other shares.
 
     `parameters` is {name: (its dimensions, its values)}; least and greatest are those of the finite
-    values.
+    values. `alone`: the names of these parameters, if they are known.
     """
     alone = _alone(parameters) if alone is None else alone
     return {name: (np.size(parameters[name][1]), *_ends(parameters[name][1])) for name in alone}

@@ -130,8 +130,8 @@ class Request:
     """What is asked at every point of a survey: option values, method, accuracy and the requested
     outputs.
 
-    `out` holds the arrays in which these are stored, in the block's shape; a scene may fill them itself
-    and return them, or parts of them, or take no notice.
+    `out` holds the arrays in which these are stored, in the block's shape; a scene may fill some of
+    them itself and return them, or take no notice.
     """
 
     options: Mapping[str, str]

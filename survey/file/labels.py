@@ -57,7 +57,7 @@ def round_up(errors):
     """float64 error bars (not negative) as float32, rounded up."""
     from survey.kernels.math import rounding  # numba: reading files needs none
 
-    errors = np.ascontiguousarray(errors, dtype=float)
+    errors = np.asarray(errors, dtype=float, order="C")
     out = np.empty(errors.shape, np.float32)
     rounding.round_up(errors.reshape(-1), out.reshape(-1))
     return out

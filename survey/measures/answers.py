@@ -20,8 +20,8 @@ NOTHING = MappingProxyType({})
 
 
 class Answers:
-    """Answers at N points: `floats` (rows, N), `codes` (int8 each, N), `status`, and which points
-    have `missed` the requested accuracy.
+    """Answers at N points: `codes` (int8 each, N), `status`, and which points have `missed` the
+    requested accuracy; and `floats`, arrays (N each), which each family makes.
 
     Codes and status that are in `out`, by name, are kept there.
     """

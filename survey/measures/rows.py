@@ -68,15 +68,17 @@ class Rows:
         return np.broadcast_to(np.asarray(array, dtype=float), self.shape).transpose(self.order)
 
     def straight(self, out):
-        """The arrays `out`, in the block's shape, as those of its points (rows x lanes); none of them
-        where points are in another order there.
+        """The arrays `out`, in the block's shape, as flat ones (rows times lanes); none of them where
+        they are not contiguous, or the points are in another order.
         """
         if self.order != sorted(self.order) or not all(a.flags.c_contiguous for a in out.values()):
             return {}
         return {name: array.reshape(-1) for name, array in out.items()}
 
     def back(self, array):
-        """(rows, lanes) in the block's shape; or (rows, 1), as a view to read alone."""
+        """An array (rows, lanes) in the block's shape; one that is broadcast to that, as (rows, 1), as a
+        view to read alone.
+        """
         full = array.shape == (self.rows, self.lanes)
         wide = array if full else np.broadcast_to(array, (self.rows, self.lanes))
         moved = wide.reshape(self.sorted_shape).transpose(self.back_order)

@@ -93,6 +93,7 @@ def _round_up(values, out):
     """
     few = tuple(slice(None) if step else slice(1) for step in values.strides)
     bars = np.asarray(values[few], dtype=float, order="C")
+    bars = bars if bars.flags.writeable else bars.copy()  # the kernel would be compiled again
     whole = out.flags.c_contiguous and bars.shape == out.shape
     kept = out if whole else np.empty(bars.shape, np.float32)
     infinite = round_up(bars.reshape(-1), kept.reshape(-1))

@@ -503,7 +503,7 @@ def _steepest(sine, sine_bar, cosine, cosine_bar):
 
 @inline
 def _is_near(steep, sine, sine_bar, cosine, cosine_bar):
-    """Is the point in a gap, or `steep` less than `_farthest`?"""
+    """Is the point in a gap, or `steep` surely less than `_farthest`?"""
     low_sine, low_cosine = max(sine - sine_bar, 0.0), max(cosine - cosine_bar, 0.0)
     square = steep * steep
     less = (square * low_cosine <= sine) & (square * low_sine <= cosine) & (steep <= 1.0)

@@ -24,12 +24,12 @@ ROW = 6
 
 
 def complete_integrals(k, kc):
-    """K and E of arrays of moduli and complements, as `elliptic.complete` in numpy, which has
-    nothing to compile.
+    """K and E of arrays of moduli and complements, as `elliptic.complete`, with nothing to compile: in
+    numpy, or number by number where there are few.
     """
     if kc.size <= FEW:
         found = [_complete_one(*given) for given in zip(k.tolist(), kc.tolist(), strict=True)]
-        return tuple(np.array(found).reshape(-1, 2).T)
+        return tuple(np.array(found).reshape(-1, 2).T.copy())
     a, b, weight, total = np.ones_like(kc), kc, 0.5, 0.5 * k * k
     for _ in range(MEANS):
         gap = a - b

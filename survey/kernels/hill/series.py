@@ -1,7 +1,7 @@
 """Discriminants, or factors, of many rows from their Chebyshev series: rows share nothing, lanes of
 a row share their coefficients.
 
-Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 2.4.1.
+Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 1.2.1.
 """
 
 import math
@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from survey.kernels import lanes
-from survey.kernels.hill.answers import STABLE, UNDECIDED, UNSTABLE
+from survey.kernels.hill.answers import LARGEST, STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
 from survey.kernels.math.chebyshev import TERMS, WIDTH, add_several, next_term
 from survey.kernels.math.rounding import fill_up
@@ -99,7 +99,8 @@ def discriminants(
 
     Row rows[j]: D = sum_k coefficients[j, k] T_k(x) within doubts[j], to which is added, if n > 0,
     what is `at_nodes` (R, K), of which n count, times the magnitudes of Lagrange's polynomials; K
-    and terms are multiples of TERMS. Rows as in `kernels.hill.answers.measure`.
+    and terms are multiples of TERMS. `values`, `bars` and `rounded` are those of D in
+    `kernels.hill.answers.measure`: one of the latter two is empty.
     """
     terms, tiles = coefficients.shape[1], (len(x) + TILE - 1) // TILE
     kept = tiles if len(rows) > ROWS else 1  # of the tables: of no more than what is read again
@@ -156,7 +157,7 @@ def _decide(d, bar, values, bars, rounded, rtol, verdict, missed):
         missed[i] = verdict[i] == UNDECIDED
     if not bar <= rtol:
         for i in range(len(verdict)):
-            missed[i] |= not bar <= rtol * (1.0 + abs(d[i]))
+            missed[i] |= not bar <= min(rtol * (1.0 + abs(d[i])), LARGEST)
 
 
 @splice
@@ -172,7 +173,8 @@ def _decide_each(d, bar, values, bars, rounded, rtol, verdict, missed):
             np.int8(STABLE) if stable else np.int8(UNSTABLE) if unstable else np.int8(UNDECIDED)
         )
     for i in range(len(verdict)):
-        missed[i] = (verdict[i] == UNDECIDED) | (not bar[i] <= rtol * (1.0 + abs(d[i])))
+        wide = not bar[i] <= min(rtol * (1.0 + abs(d[i])), LARGEST)
+        missed[i] = wide | (verdict[i] == UNDECIDED)
 
 
 @splice

@@ -14,12 +14,13 @@ from functools import cache
 
 import numpy as np
 
-from survey.kernels.jit import kernel, splice
+from survey.kernels.jit import HAS_FMA, kernel, splice
 from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import consecutive, fma, put, unroll
 
 # How many rows of a matrix are added at once, and in how many columns.
 TERMS = WIDTH = 8
+_OF_TERMS = 0.5 if HAS_FMA else 0.75  # see `next_term`
 
 
 def angles(n):
@@ -156,8 +157,8 @@ def _combine(values, matrix, out):
 
 @splice
 def add(c, rows, sums):
-    """Add sum_k c[k] rows[k] to `sums`, row after row of TERMS at once, the last ones first; each of
-    `sums` as if it were alone.
+    """Add sum_k c[k] rows[k] to `sums`, the last term first, TERMS of them at once; none of `sums`
+    depends on the others.
     """
     whole = len(sums) - len(sums) % WIDTH
     top = len(c) % TERMS
@@ -229,7 +230,7 @@ def _doubt(sizes, ulps):
     T_k' <= k^2.
     """
     k = np.arange(sizes.shape[1])
-    rounding = (sizes * (4.0 + k + (0.5 + ulps) * k * k)).sum(axis=1)
+    rounding = (sizes * (4.0 + k + (_OF_TERMS + ulps) * k * k)).sum(axis=1)
     return tail(sizes) + EPS * rounding
 
 
@@ -247,5 +248,5 @@ def restrict(series, x, out):
 
 @unroll
 def next_term(twice, last, before):
-    """T_k from the two before, within k^2 EPS / 4 with those."""
+    """T_k from the two before; with those within k^2 EPS / 4, or 3/4 where a b + c is rounded twice."""
     return fma(twice, last, -before)

@@ -10,6 +10,8 @@ from survey.kernels.math.rounding import round_up
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
+# A discriminant with a wider bar, relative to 1 + |D|, is ill conditioned.
+ILL = 1e-11
 NO_FLOATS, NO_BARS = np.zeros(0), np.zeros(0, np.float32)
 NO_SQUARES = np.zeros((0, kernels.SQUARES))
 
@@ -33,8 +35,11 @@ class Asked:
 
 
 class Answers(answers.Answers):
-    """`floats`, an array (N) for each of `kernels.hill.answers.FLOATS`, if wanted, and their error
-    bounds; and the `verdict`. Arrays that are in `out`, by name, are filled, with bounds rounded up.
+    """`floats`, an array (N) for each of `kernels.hill.answers.FLOATS` (D, and what is wanted; else
+    empty), and their error `bars`; and the `verdict`.
+
+    Arrays that are in `out`, by name, are filled, with bounds rounded up; but bounds of D from which
+    more follows are kept in float64.
 
     `results` (N, RESULTS) is what they follow from, where all points were solved one by one.
     """
@@ -47,9 +52,10 @@ class Answers(answers.Answers):
         floats, bars, rounded = [], [], []
         wanted = asked.wanted.tolist()
         for row, name in enumerate(kernels.FLOATS):
-            # a verdict alone may follow from D, and an exponent from D and its bounds
+            # a verdict alone may follow from D; an exponent from D and its bounds, and whether more
+            # digits are asked for
             needed = wanted[row] or row == kernels.DISCRIMINANT
-            kept = row == kernels.DISCRIMINANT and wanted[kernels.EXPONENT]
+            kept = row == kernels.DISCRIMINANT and (wanted[kernels.EXPONENT] or asked.rtol < ILL)
             own, up = out.get(name), None if kept else out.get(f"{name}_error")
             floats.append(own if own is not None else np.empty(size) if needed else NO_FLOATS)
             bars.append(np.empty(size) if needed and up is None else NO_FLOATS)

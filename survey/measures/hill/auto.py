@@ -15,11 +15,11 @@ from survey.kernels.hill.answers import DISCRIMINANT, LEAST, UNDECIDED
 from survey.kernels.lanes import RESULTS
 from survey.kernels.math.roundoff import EPS
 from survey.measures.hill import dense, pointwise
-from survey.measures.hill.answers import NO_SQUARES, Answers
+from survey.measures.hill.answers import ILL, NO_SQUARES, Answers
 from survey.methods import taylor16
 
-# A discriminant with a wider bar, relative to 1 + |D|, is ill conditioned, if so few steps (0.2 s a hundred points) do.
-ILL, FEW_STEPS = 1e-11, 500
+# Discriminants that are ill conditioned are solved again if so few steps (0.2 s a hundred points) do.
+FEW_STEPS = 500
 # Keep a call of the double-double kernel below about a second.
 CALL_STEPS = 20_000
 

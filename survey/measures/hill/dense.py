@@ -460,9 +460,10 @@ def _surfaces(problem, method, asked, answers, chosen, axis, open_points):
             # points may miss it: bounds of the rows themselves, which cost more
             if (bars > asked.rtol).any():
                 tails, bars_there = of_nodes
-                bar = np.minimum(
-                    bar, tails[:, None] + bars_there @ chebyshev.lagrange(x, bars_there.shape[1])
+                own_bars = chebyshev.combined(
+                    bars_there, chebyshev.lagrange(x, bars_there.shape[1])
                 )
+                bar = np.minimum(bar, tails[:, None] + own_bars)
             if len(own) > 1:
                 own[DY2], bar[DY2] = own[DY2] * odd[:, None], bar[DY2] * odd
             wide = nodal is not None and not (bar[0] <= asked.rtol).all()

@@ -218,7 +218,7 @@ def of_rows(rows, sample, walk, exact=None):
 
 def solve(problem, method, rtol, wanted=(), out=NOTHING):
     """The wanted outputs (R, L; all by default) with `_error` each, `verdict`, `status`; in
-    the arrays `out` (R L), by name, as far as these are given, error bounds rounded up to float32.
+    the arrays `out` (R L), by name, as far as these are given (see `Answers`).
 
     `method` is the name of a method, or "auto" (see `auto`); points climb its ladder until
     `rtol` is met or more work is of no use.

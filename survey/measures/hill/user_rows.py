@@ -114,7 +114,7 @@ def _from_corners(z, axes, points, ranges, even):
         return (
             np.einsum("ekp,kr->erp", size, between),
             np.repeat(rate.max(axis=0)[None], len(points), axis=0),
-            np.where(known, scale @ between, np.nan),
+            np.where(known, scale[0] * between[0] + scale[1] * between[1], np.nan),
             np.zeros(len(points), bool),
         )
 
