@@ -204,6 +204,7 @@ def test_bits_do_not_depend_on_the_block(scene, options, seed, monkeypatch):
     point = draw(scene, options, seed)
     whole = evaluate(scene, options, point)
     monkeypatch.setattr(cost, "BLOCK_POINTS", 1)
+    monkeypatch.setattr(cost, "IN_MEMORY", 1)
     xr.testing.assert_identical(whole.drop_attrs(), evaluate(scene, options, point).drop_attrs())
 
 

@@ -9,7 +9,7 @@ from survey.file.map_file import TILE_POINTS
 from survey.wording import counted
 
 BLOCK_SECONDS = 0.5
-BLOCK_POINTS = 2**17
+BLOCK_POINTS, IN_MEMORY = 2**17, 8
 MAX_BLOCKS = 4 * 10**6  # each is a file
 # what the writer holds at a time: enough for square tiles, little compared to the rest of the
 # process
@@ -40,9 +40,12 @@ def lone_cost(scene, request, grid):
     return scene.cost(request.options, dict.fromkeys(grid.parameters, 1))
 
 
-def points_per_block(scene, request, grid, most=BLOCK_POINTS):
-    """The number of points for which a block takes about BLOCK_SECONDS of kernel time, at `most`."""
-    return int(min(max(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1), most))
+def points_per_block(scene, request, grid, share=0):
+    """The number of points for which a block takes about BLOCK_SECONDS of kernel time: at most
+    BLOCK_POINTS; or in memory, where a thread's `share` is more, that and IN_MEMORY times as many.
+    """
+    points = max(BLOCK_SECONDS / seconds_per_point(scene, request, grid), 1)
+    return int(min(points, max(BLOCK_POINTS, min(share, IN_MEMORY * BLOCK_POINTS))))
 
 
 def regions_of(workflow):

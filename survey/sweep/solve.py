@@ -11,11 +11,11 @@ from survey.file.labels import layout
 from survey.kernels.math.rounding import round_up
 from survey.sweep import dispatch
 from survey.sweep.compile_ahead import compiling_ahead
-from survey.sweep.cost import BLOCK_POINTS, bytes_per_point, points_per_block, seconds_per_point
+from survey.sweep.cost import bytes_per_point, points_per_block, seconds_per_point
 from survey.wording import listed
 
 QUICK_SECONDS, QUICK_BYTES = 0.05, 2**23  # what takes no more is done before threads have begun
-MOST_POINTS, BLOCKS_PER_THREAD = 2**20, 4  # of a block in memory; files are written in smaller ones
+BLOCKS_PER_THREAD = 4
 
 
 def solve_block(scene, request, grid, block, out=None):
@@ -135,8 +135,7 @@ def compute(grid, scene, request, threads=None, progress=None):
     workers = 1 if quick else threads or dispatch.cpus()
     # the fewer blocks the better, but threads should end at the same time
     share = grid.points if workers == 1 else grid.points // (BLOCKS_PER_THREAD * workers)
-    most = max(BLOCK_POINTS, min(share, MOST_POINTS))
-    blocks = grid.blocks(points_per_block(scene, request, grid, most))
+    blocks = grid.blocks(points_per_block(scene, request, grid, share))
 
     def report(done, _=None):
         if progress:

@@ -277,6 +277,7 @@ def test_times_are_solved_together_whatever_the_blocks(axes, monkeypatch):
 
     whole = solved()
     monkeypatch.setattr(cost, "BLOCK_POINTS", 1)
+    monkeypatch.setattr(cost, "IN_MEMORY", 1)
     xr.testing.assert_identical(whole.drop_attrs(), solved().drop_attrs())
     alone = solved(t=values["t"][1:2])
     for name in ("phi", "w"):

@@ -304,6 +304,7 @@ def test_a_dense_map_has_the_same_bits_in_any_block(monkeypatch):
     given = {"mu": np.linspace(0.0, 0.05, 90), "e": np.array([0.0, 0.2, 0.314, 0.9])}
     whole = survey.evaluate("libration_elliptic", **given)
     monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
+    monkeypatch.setattr(cost, "IN_MEMORY", 1)
     xr.testing.assert_identical(
         whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs()
     )

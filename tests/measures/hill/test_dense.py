@@ -235,6 +235,7 @@ def test_scattered_points_agree_with_points_on_their_own(
     assert int(one.verdict[10]) == int(few.verdict[10])
     with monkeypatch.context() as patch:
         patch.setattr(cost, "BLOCK_POINTS", 1700)
+        patch.setattr(cost, "IN_MEMORY", 1)
         xr.testing.assert_identical(
             survey.evaluate(scene, **given, **options, variables=variables), many
         )

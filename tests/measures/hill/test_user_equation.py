@@ -302,6 +302,7 @@ def test_bits_do_not_depend_on_the_block(monkeypatch):
     for one, given in ((scene, point), (SHIFTED, {"a": A, "q": Q})):
         whole = survey.evaluate(one, **given)
         monkeypatch.setattr(cost, "BLOCK_POINTS", 1)
+        monkeypatch.setattr(cost, "IN_MEMORY", 1)
         xr.testing.assert_identical(whole.drop_attrs(), survey.evaluate(one, **given).drop_attrs())
         monkeypatch.undo()
 

@@ -91,6 +91,7 @@ def test_blocks_of_a_map_have_the_same_bits(monkeypatch):
         whole = survey.evaluate(scene, **axes, variables=variables)
         with monkeypatch.context() as patch:
             patch.setattr(cost, "BLOCK_POINTS", 700)
+            patch.setattr(cost, "IN_MEMORY", 1)
             part = survey.evaluate(scene, **axes, variables=variables)
         xr.testing.assert_identical(whole.drop_attrs(), part.drop_attrs())
 

@@ -129,6 +129,7 @@ def test_a_row_in_double_double_has_the_same_bits_in_any_block(monkeypatch):
     given = {"mu": np.linspace(0.0, 0.05, 90), "e": np.array([0.2, 0.9]), "rtol": 1e-14}
     whole = survey.evaluate("libration_elliptic", **given)
     monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
+    monkeypatch.setattr(cost, "IN_MEMORY", 1)
     xr.testing.assert_identical(
         whole.drop_attrs(), survey.evaluate("libration_elliptic", **given).drop_attrs()
     )

@@ -100,6 +100,7 @@ def test_points_agree_with_steps_and_keep_their_bits_in_any_block(monkeypatch):
             known = other[name] != -1
             assert (other[name] == many[name])[known].all() and known.mean() > 0.95
     monkeypatch.setattr(cost, "BLOCK_POINTS", 17)
+    monkeypatch.setattr(cost, "IN_MEMORY", 1)
     xr.testing.assert_identical(
         many.drop_attrs(), survey.evaluate("libration_elliptic", **points).drop_attrs()
     )
