@@ -93,6 +93,7 @@ class Answers(answers.Answers):
         asked, own = self.asked, (*self.found, self.status)
         rule = NONE if rule is None else rule
         columns = np.ascontiguousarray(results.T)
+        waiting.wait("measure")
         kernels.measure(
             first,
             columns,

@@ -44,6 +44,7 @@ from survey.kernels.hill.series import (
 )
 from survey.kernels.lanes import DY2, RESULTS, Y1, Y1_ZEROS
 from survey.kernels.math import chebyshev
+from survey.kernels.math.rounding import round_up
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked
 
@@ -125,15 +126,16 @@ def compile_ahead(sample, no_rows, variables):
         {"exponent"} if grows else set()
     )
     answers = Answers(1, Asked(1.0, np.array([name in named for name in kernels.FLOATS])))
+    Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
+    yield "measure"
     if named <= ANSWERS:
-        Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
         _discriminants(answers, np.zeros(1, int), np.ones((1, TERMS)), np.ones(1), np.ones(1), None)
         if grows:
             kernels.exponents(np.zeros(1, int), 1, 1.0, *answers.found)
         answers.assess(np.ones((1, RESULTS)), None)
     else:
-        Answers(1, Asked(1.0, DISCRIMINANT)).assess(np.ones((1, RESULTS)), None)
-        yield "answers"  # a few points need no more
+        yield "answers"  # a few points need no more, but for what stores them
+        round_up(np.zeros(1), np.zeros(1, np.float32))
         _factors(
             np.ones((4, 1, TERMS)),
             np.ones((4, 1)),
