@@ -55,12 +55,9 @@ def _layout(scene, names, options):
 
 def round_up(errors):
     """float64 error bars (not negative) as float32, rounded up."""
-    from survey.kernels.math import rounding  # numba: reading files needs none
+    from survey.kernels.math.rounding import rounded_up  # numba: reading files needs none
 
-    errors = np.asarray(errors, dtype=float, order="C")
-    out = np.empty(errors.shape, np.float32)
-    rounding.round_up(errors.reshape(-1), out.reshape(-1))
-    return out
+    return rounded_up(errors)
 
 
 def percent(fraction, bar):
@@ -260,8 +257,8 @@ class Tally:
         for name, codes in self.codes.items():
             for key, number in zip(codes, _numbers(arrays[name], codes.values()), strict=True):
                 self.counts[name][key] += number
-        other = arrays["status"] != status.OK if np.any(arrays["status"]) else None
-        if "verdict" in self.codes and other is not None:
+        if "verdict" in self.codes and np.any(arrays["status"]):
+            other = arrays["status"] != status.OK
             why = arrays["status"][(arrays["verdict"] == UNDECIDED) & other]
             for key in self.unanswered if why.size else ():
                 self.unanswered[key] += int(np.count_nonzero(why == self.codes["status"][key]))

@@ -74,9 +74,9 @@ def half_periods(k, kc):
     """
     a, b = np.ones_like(kc, dtype=np.longdouble), kc.astype(np.longdouble)
     if kc.size <= FEW:
-        a[:] = [_mean(*given) for given in zip(a, b, strict=True)]
-    wide = np.flatnonzero(b < a) if kc.size > FEW else ()
-    while len(wide):  # each row goes its own way, so that its bits do not depend on others
+        a[:] = b[:] = [_mean(*given) for given in zip(a, b, strict=True)]
+    wide = np.flatnonzero(b < a)
+    while wide.size:  # each row goes its own way, so that its bits do not depend on others
         one, other = a[wide], b[wide]
         a[wide], b[wide] = (one + other) / 2, np.sqrt(one * other)
         wide = wide[one - other > CLOSE * one]

@@ -11,7 +11,7 @@ import numpy as np
 from survey.kernels import lanes
 from survey.kernels.hill.answers import LARGEST, STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
-from survey.kernels.math.chebyshev import TERMS, WIDTH, add_several, next_term
+from survey.kernels.math.chebyshev import WIDTH, add_turns, next_term
 from survey.kernels.math.rounding import fill_up
 from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import consecutive, put, unroll
@@ -66,10 +66,7 @@ def _sum(c, tile, sums, count):
     """sum_k c_k T_k in `count` lanes, and in those up to a multiple of WIDTH; TERMS terms a turn."""
     for i in range(len(sums)):
         sums[i] = 0.0
-    for k in range(len(c) - TERMS, -1, -TERMS):
-        own = (c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7])
-        for i in range(0, count, WIDTH):
-            add_several(own, tile, k, sums, i)
+    add_turns(c, tile, sums, count)
 
 
 @kernel

@@ -161,20 +161,23 @@ def add(c, rows, sums):
     depends on the others.
     """
     whole = len(sums) - len(sums) % WIDTH
-    top = len(c) % TERMS
-    for k in range(len(c) - TERMS, top - 1, -TERMS):
-        own = (c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7])
-        for i in range(0, whole, WIDTH):
-            add_several(own, rows, k, sums, i)
-        for i in range(whole, len(sums)):
-            sums[i] = _more(own, rows, k, sums[i], i)
-    for k in range(top - 1, -1, -1):
-        for i in range(len(sums)):
+    add_turns(c, rows, sums, whole)
+    for k in range(len(c) - 1, -1, -1):
+        for i in range(0 if k < len(c) % TERMS else whole, len(sums)):
             sums[i] = _one_more(c[k], rows[k, i], sums[i])
 
 
+@splice
+def add_turns(c, rows, sums, count):
+    """Add the terms from c[len(c) % TERMS] on, in the first `count` sums, and in those up to a multiple of WIDTH."""
+    for k in range(len(c) - TERMS, -1, -TERMS):
+        own = (c[k], c[k + 1], c[k + 2], c[k + 3], c[k + 4], c[k + 5], c[k + 6], c[k + 7])
+        for i in range(0, count, WIDTH):
+            _add_several(own, rows, k, sums, i)
+
+
 @unroll
-def add_several(c, rows, first, sums, i):
+def _add_several(c, rows, first, sums, i):
     """Add TERMS numbers c times as many rows, from the `first` on, to WIDTH `sums` from i on; the
     last one first.
     """
@@ -182,13 +185,6 @@ def add_several(c, rows, first, sums, i):
     for k in reversed(range(TERMS)):
         total = fma(c[k], consecutive(rows, (first + k, i), WIDTH), total)
     put(sums, (i,), total)
-
-
-@unroll
-def _more(c, rows, first, total, i):
-    for k in reversed(range(TERMS)):
-        total = fma(c[k], rows[first + k, i], total)
-    return total
 
 
 @unroll

@@ -19,6 +19,14 @@ def round_up(bars, out):
     return infinite
 
 
+def rounded_up(bars):
+    """The bars (any shape, not negative) as float32, rounded up."""
+    bars = np.asarray(bars, dtype=float, order="C")
+    out = np.empty(bars.shape, np.float32)
+    round_up(bars.reshape(-1), out.reshape(-1))
+    return out
+
+
 @splice
 def fill_up(bars, out):
     """Fill `out` (N, float32) with as many of the bars, rounded up."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from survey import status, waiting
 from survey.kernels.hill import answers as kernels
-from survey.kernels.math.rounding import round_up
+from survey.kernels.math.rounding import rounded_up
 from survey.measures import answers
 
 NONE = np.zeros(0, np.int8)
@@ -69,13 +69,8 @@ class Answers(answers.Answers):
     def _replace_floats(self, points, other, those):
         for row in np.flatnonzero(self.asked.wanted):
             self.floats[row][points] = other.floats[row][those]
-            bars = other.bars(row)[those]
-            if bars.dtype == self.bars(row).dtype:
-                self.bars(row)[points] = bars
-            else:
-                up = np.empty(bars.shape, np.float32)
-                round_up(np.ascontiguousarray(bars), up)
-                self.bars(row)[points] = up
+            own, bars = self.bars(row), other.bars(row)[those]
+            own[points] = bars if own.dtype == bars.dtype else rounded_up(bars)
 
     @property
     def found(self):

@@ -33,7 +33,6 @@ from survey import status, waiting
 from survey.kernels.hill import answers as kernels
 from survey.kernels.hill.series import (
     NEAR,
-    TERMS,
     TURNS,
     Y1_MOST,
     Y2_MOST,
@@ -44,6 +43,7 @@ from survey.kernels.hill.series import (
 )
 from survey.kernels.lanes import DY2, RESULTS, Y1, Y1_ZEROS
 from survey.kernels.math import chebyshev
+from survey.kernels.math.chebyshev import TERMS
 from survey.kernels.math.rounding import round_up
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked

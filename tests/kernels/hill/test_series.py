@@ -4,8 +4,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from survey.kernels.hill.series import TERMS, discriminants
+from survey.kernels.hill.series import discriminants
 from survey.kernels.math import chebyshev
+from survey.kernels.math.chebyshev import TERMS
 
 
 def by_the_kernel(x, n):
