@@ -8,9 +8,10 @@ Above 1 survey is faster. All is called as users call it, by `survey.evaluate`, 
 sides meet |error| <= 1e-9 (1 + |value|), checked against heyoka at a tolerance of 1e-15. heyoka at its best:
 batches of 16, fast_math, half periods by symmetry, elliptic and circular functions as states, points sorted
 by effort; it gives the factors of Hill's equation alone.
-Times are of the processor (`time.process_time`), medians of REPEATS interleaved repetitions; ranges of parameters move
-by a rounding from one to the next, so that no map is remembered. Needs heyoka; exit code 1 where a ratio is below its
-floor or an error too large.
+Times are of the processor (`time.process_time`): medians of interleaved repetitions, at least REPEATS and for
+at least SECONDS, as Python is slower in its first dozen calls and a row takes a millisecond. Ranges of parameters
+move by a rounding from one to the next, so that no map is remembered. Needs heyoka; exit code 1 where a ratio is below
+its floor or an error too large.
 
 FLOORS are 0.7 of the ratios measured on one thread of an AMD EPYC (AVX-512), 2026-11-28 and 29; of rows of those of an
 Intel Xeon, 2026-11-30, where a busy machine may leave Danby's map and Brun's problem below theirs.
@@ -68,6 +69,7 @@ FLOORS = {
     "brun_periods": 12,
 }
 REPEATS = 9
+SECONDS = 0.5
 WORST = 1e-9
 LANES = 16
 SAMPLE = 16_000  # points that heyoka solves of a map
@@ -141,8 +143,8 @@ class Harness:
         """
         ours(0), theirs()
         times = [], []
-        for i in range(REPEATS):
-            for kept, call in zip(times, (lambda i=i: ours(i + 1), theirs), strict=True):
+        while len(times[0]) < REPEATS or sum(map(sum, times)) < SECONDS:
+            for kept, call in zip(times, (lambda: ours(1 + len(times[0])), theirs), strict=True):
                 begin = time.process_time()
                 call()
                 kept.append(time.process_time() - begin)

@@ -37,6 +37,8 @@ SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
 SAME = 8 * user_equation.SLACK
 # Points of an axis from which on rows pay.
 LANES = 8
+# The most points whose measures are kept: the corners of a map are asked for twice.
+KEPT = 16
 # Meaning of two of the common codes here.
 STATUS = {
     "invalid_parameters": "outside the domain, or z or T is not finite there, or z is declared even but is not",
@@ -121,31 +123,42 @@ class HillScene(FunctionScene):
 
     def _solve_points(self, points, request):
         """The outputs (N, 1) of points one by one."""
-        problem, rough = self._problem(points)
-        return self._answers(problem, rough, self._ranges(points)[0], request)
+        problem, rough = self._called(user_equation.problem, self._equation, points)
+        return self._answers(problem, rough, points, request)
 
-    def _problem(self, points):
+    @cached_property
+    def _equation(self):
+        return user_equation.Equation(
+            self.z, self.HASH, self.EVEN, self._ranges, self._measured, self._more_digits
+        )
+
+    def _measured(self, points):
+        """What steps need of z at these points (N, n): see `user_equation.measured`."""
+        if len(points) <= KEPT:
+            return _measured(self, points.shape, points.tobytes())
+        return self._measured_anew(points)
+
+    def _measured_anew(self, points, probes=user_equation.PROBES, mirrored=True):
         period, edges, slack = self._ranges(points)
-        given = (edges, period, slack, self.EVEN, self._more_digits)
-        return self._called(user_equation.problem, self.z, points, *given)
+        period = period if self.EVEN and mirrored else None
+        return user_equation.measured(self.z, points, edges, period, slack, probes)
 
     def _solve_scattered(self, points, axes, request):
         """The outputs (N, 1) of points on their own, from series on the box that holds them."""
         rough = np.zeros(len(points), np.bool_)
 
         def problem_of(left):
-            problem, rough[left] = self._problem(points[left])
+            problem, rough[left] = self._called(user_equation.problem, self._equation, points[left])
             return problem
 
-        box = user_rows.box(self.z, self.HASH, axes, points[0], self._ranges, self.EVEN)
+        box = user_rows.box(self._equation, axes, points[0])
         position = np.ascontiguousarray(points[:, axes.across])
         p = np.ascontiguousarray(points[:, axes.lane])
         out = self._called(
             monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables,
             {name: array.reshape(-1) for name, array in request.out.items()},
         )  # fmt: skip
-        period = np.full(len(points), self._ranges(points[:1])[0][0])
-        return self._labelled(out, rough, period, request.variables)
+        return self._labelled(out, rough, points, request.variables)
 
     def _box_axes(self, point, request):
         """The parameters on the axes of a box that holds points on their own, two of which alone
@@ -195,12 +208,11 @@ class HillScene(FunctionScene):
         families = self._families(points, axes)
         for rows in families:
             problem, rough, bad = self._called(
-                user_rows.problem, self.z, self.HASH, axes, points[rows], lanes[rows], self._ranges, self.EVEN,
-                self._more_digits,
-            )  # fmt: skip
+                user_rows.problem, self._equation, axes, points[rows], lanes[rows]
+            )
             bad = np.flatnonzero(bad)
             into = {} if bad.size or len(families) > 1 else block.straight(request.out)
-            found = self._answers(problem, rough, self._ranges(points[rows])[0], request, into)
+            found = self._answers(problem, rough, points[rows], request, into)
             if bad.size:  # z may be smooth, or finite, at some of its points
                 alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
                 alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)
@@ -225,16 +237,17 @@ class HillScene(FunctionScene):
         _, family = np.unique(others, axis=0, return_inverse=True)
         return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
 
-    def _answers(self, problem, rough, period, request, out=NOTHING):
+    def _answers(self, problem, rough, points, request, out=NOTHING):
         out = self._called(
             monodromy.solve, problem, request.method, request.rtol, request.variables, out
         )
-        return self._labelled(out, rough, period, request.variables)
+        return self._labelled(out, rough, points, request.variables)
 
-    def _labelled(self, out, rough, period, wanted):
+    def _labelled(self, out, rough, points, wanted):
         """The outputs with the period, if it is wanted, and the status of points whose z is rough."""
         out["status"][rough] = status.NO_CONVERGENCE
         if "period" in wanted:
+            period = self._ranges(points)[0]
             out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
             out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
         return out
@@ -291,9 +304,8 @@ class HillScene(FunctionScene):
     def trajectory(self, point, answer, options, time=None, damping=0.0):
         """Solutions and multipliers of a point (see `survey.scenes`), damped or not."""
         points = np.array([[point[p.name] for p in self.PARAMETERS]])
-        period, edges, slack = self._ranges(points)
         problem, _ = self._called(
-            user_equation.problem, self.z, points, edges, period, slack, self.EVEN
+            user_equation.problem, replace(self._equation, exact=None), points
         )
         return motion.solve(problem, answer, time, "u", damping)
 
@@ -304,10 +316,11 @@ class HillScene(FunctionScene):
         if callable(self.period) or callable(self.breaks):
             period, edges, slack = self._ranges_of(points)
         else:
-            period, edges, slack = (
-                np.repeat(values, len(points), axis=0) for values in self._same_ranges
-            )
-        edges[~np.isfinite(points).all(axis=1)] = np.nan
+            same = np.zeros(len(points), int)
+            period, edges, slack = (values[same] for values in self._same_ranges)
+        finite = np.isfinite(points)
+        if not finite.all():
+            edges[~finite.all(axis=1)] = np.nan
         return period, edges, slack
 
     @cached_property
@@ -380,6 +393,15 @@ class HillScene(FunctionScene):
         ]
         return lambda u: z(u, p), [mp.mpf(0), *rows, end]
 
+    @property
+    def linear(self):
+        """The names of the parameters that z is linear in: between two of their values it is a mean,
+        as smooth, as even and with no other spikes.
+        """
+        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
+        degrees = zip(self.PARAMETERS, of_z, of_ranges, strict=True)
+        return frozenset(p.name for p, z, ranges in degrees if z <= 1 and not ranges)
+
     def check(self, points):
         """Raise BadInput if z cannot be compiled, or contradicts the scene's other entries at these
         points (N, n).
@@ -390,18 +412,16 @@ class HillScene(FunctionScene):
         self._try(points[0] if len(points) else np.ones(len(self.PARAMETERS)))
         if not len(points):
             return
-        where = self._where(points[0])
-        period, edges, slack = self._ranges(points)
+        period, edges, _ = self._ranges(points)
         if np.isnan(period).all():
+            where = self._where(points[0])
             self._refuse(f"PERIOD is {self._period(points[0]):g} at {where}", "make it positive")
         if np.isnan(edges).all():
+            where = self._where(points[0])
             self._refuse(
                 f"BREAKS lie outside 0 <= u <= T at {where}", "name positions within a period"
             )
-        mirror = period if self.EVEN else None
-        size, _, scale, rough = self._called(
-            user_equation.measured, self.z, points, edges, mirror, slack
-        )
+        size, _, scale, rough, spikeless = self._called(self._measured, points)
         finite = np.isfinite(size).all(axis=1)
         if not finite.any():
             self._refuse(
@@ -412,29 +432,24 @@ class HillScene(FunctionScene):
             remedy = "name the positions where it jumps or has a kink in BREAKS"
             self._refuse(f"z is not smooth at {self._where(points[i])}", remedy)
         for i in np.flatnonzero(finite & np.isnan(scale)):
+            period = self._ranges(points[i : i + 1])[0][0]
             self._refuse(
-                f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period[i]:g}",
+                f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period:g}",
                 "set EVEN = False, or correct z or PERIOD",
             )
-        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
-        # a mean of two z has no other spikes than these
-        for i in np.flatnonzero(np.array(of_z) <= 1):
-            if not of_ranges[i]:
-                finite &= (points[:, i] == points[:, i].min()) | (
-                    points[:, i] == points[:, i].max()
-                )
-        finite &= ~user_equation.unprobed(self.z, points, edges, slack, size.max(axis=1))
-        if finite.any():
-            self._check_spikes(points[finite], edges[finite], slack[finite])
+        hidden = finite & ~spikeless
+        if hidden.any():
+            self._check_spikes(points[hidden])
         if not self.EVEN:
-            self._check_period(points, period, size.max(axis=1))
+            self._check_period(points, size.max(axis=1))
 
-    def _check_spikes(self, points, edges, slack):
+    def _check_spikes(self, points):
         """Refuse features of z that a much finer sampling shows, but that of a run does not."""
         one, fine = (
-            self._called(user_equation.measured, self.z, points, edges, None, slack, probes)
+            self._called(self._measured_anew, points, probes, False)
             for probes in (user_equation.PROBES, user_equation.CHECKED)
         )
+        edges = self._ranges(points)[1]
         for i in np.flatnonzero((one.rate != fine.rate).any(axis=1) | (one.rough != fine.rough)):
             u = np.linspace(0, edges[i, -1], user_equation.CHECKED)
             position = u[
@@ -447,8 +462,9 @@ class HillScene(FunctionScene):
                 "name its position in BREAKS",
             )
 
-    def _check_period(self, points, period, size):
+    def _check_period(self, points, size):
         """Refuse z(T) that is not z(0), unless z jumps there."""
+        period = self._ranges(points)[0]
         ends = user_equation.at(self.z, points, np.stack([0 * period, period], axis=1))
         for i in np.flatnonzero(abs(ends[:, 1] - ends[:, 0]) > user_equation.MIRRORED * size):
             breaks = np.atleast_1d(self._value("BREAKS", self.breaks, points[i]))
@@ -517,6 +533,12 @@ def _checked(scene, shape, values):
     """`check` once for the same points: what it raises is raised again."""
     # kernels would be compiled again for what is read-only
     scene._check(np.frombuffer(values).reshape(shape).copy())
+
+
+@lru_cache(maxsize=64)
+def _measured(scene, shape, values):
+    # kernels would be compiled again for what is read-only
+    return scene._measured_anew(np.frombuffer(values).reshape(shape).copy())
 
 
 @lru_cache(maxsize=64)

@@ -446,14 +446,28 @@ def check(scene: Any, grid: Any = None) -> None:
     """Raise BadInput if `scene` is a user's and is wrong at the ends and middles of the grid's axes."""
     if not isinstance(scene, FunctionScene):
         return
-    values, inside = np.empty((0, len(scene.own))), np.empty(0, bool)
-    if grid:
-        some = grid.ends_and_middles()
-        values = np.stack([some[p.name] for p in scene.own], axis=1)
-        held = [p.holds(values[:, i]) for i, p in enumerate(scene.own)]
-        inside = np.logical_and.reduce(held)
+    if not grid:
+        _check(scene, np.empty((0, len(scene.own))))
+        return
+    try:
+        _check(scene, _tried(scene, grid, scene.linear))
+    except BadInput:
+        if not scene.linear:
+            raise
+        _check(scene, _tried(scene, grid))  # at the middles it may be right
+
+
+def _tried(scene: FunctionScene, grid: Any, extremes: frozenset[str] = frozenset()) -> Any:
+    """The points (N, n) of the grid within the domains at which a user's scene is tried."""
+    some = grid.ends_and_middles(extremes)
+    values = np.stack([some[p.name] for p in scene.own], axis=1)
+    held = [p.holds(values[:, i]) for i, p in enumerate(scene.own)]
+    return values[np.logical_and.reduce(held)]
+
+
+def _check(scene: FunctionScene, points: Any) -> None:
     with np.errstate(all="ignore"):  # values that are not finite are found by the check
-        scene.check(values[inside])
+        scene.check(points)
 
 
 def of_dataset(ds: Any) -> Any:
@@ -512,11 +526,16 @@ def _read(name: str | os.PathLike[str], near: str | Path | None) -> tuple[Path, 
             f"scene = {shown(str(name), 120)}: there is no file {tried}; name the file of your own equation"
         )
     try:
-        with open(
-            path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NONBLOCK)
-        ) as file:
-            regular = stat.S_ISREG(os.fstat(file.fileno()).st_mode)
-            content = file.read(MAX_BYTES + 1) if regular else b""
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        try:
+            regular = stat.S_ISREG(os.fstat(descriptor).st_mode)
+            content = b""
+            while regular and len(content) <= MAX_BYTES:
+                if not (more := os.read(descriptor, MAX_BYTES + 1)):
+                    break
+                content += more
+        finally:
+            os.close(descriptor)
         if not regular or len(content) > MAX_BYTES:
             raise BadInput(
                 f"{path}: this is not a scene: it is not a regular file, or has more than {MAX_BYTES:,} bytes"

@@ -13,6 +13,7 @@ import survey
 from survey.errors import BadInput
 from survey.file import blocks
 from survey.request import user_scene, workflow
+from survey.status import INVALID_PARAMETERS, OK
 from survey.sweep import cost, engine, fingerprint, solve
 
 SCENE = '''"""Mathieu's equation of my own.
@@ -289,3 +290,22 @@ def test_further_arguments_have_defaults():
     assert abs(one - value(lambda u, p: p[0] + p[1] * np.cos(u))) < 1e-11
     assert abs(two - value(lambda u, p: p[0] + p[1] * np.cos(2 * u))) < 1e-11
     assert abs(one - two) > 1e-3
+
+
+def test_z_that_is_finite_in_the_middle_of_an_axis_alone_is_answered():
+    z = survey.hill(
+        lambda u, p: p[0] * (1e308 + math.cos(u)), period=math.tau, parameters="a", even=True
+    )
+    ds = survey.evaluate(z, a=[-2.0, 0.0, 2.0])
+    assert (ds.status.values == [INVALID_PARAMETERS, OK, INVALID_PARAMETERS]).all()
+
+
+def test_a_kink_is_refused_where_z_is_linear_in_its_parameters():
+    z = survey.hill(
+        lambda u, p: p[0] + p[1] * abs(math.cos(u) - 0.3),
+        period=math.tau,
+        parameters=("a", "b"),
+        even=True,
+    )
+    with pytest.raises(BadInput, match="not smooth at a = 0, b = 1;"):
+        survey.evaluate(z, a=[0.0, 1.0, 2.0], b=[1.0, 0.0, -1.0])

@@ -1,7 +1,8 @@
 """Discriminants, or factors, of many rows from their Chebyshev series: rows share nothing, lanes of
 a row share their coefficients.
 
-Source: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 1.2.1.
+Sources: J. C. Mason, D. C. Handscomb, Chebyshev Polynomials (2003), 1.2.1; M. Abramowitz, I. A.
+Stegun, Handbook of Mathematical Functions (1964), 4.4.46.
 """
 
 import math
@@ -34,6 +35,9 @@ BETWEEN = 4
 # Around a point of a panel: the two nodes across the rows, and the two along them.
 ACROSS, ALONG = range(2)
 LOW_ACROSS, HIGH_ACROSS, LOW_ALONG, HIGH_ALONG = range(4)
+# arccos x / sqrt(1 - x) on [0, 1], to 2e-8: A&S 4.4.46.
+ARCCOS = (1.5707963050, -0.2145988016, 0.0889789874, -0.0501743046,
+          0.0308918810, -0.0170881256, 0.0066700901, -0.0012624911)  # fmt: skip
 
 
 @splice
@@ -67,6 +71,28 @@ def _sum(c, tile, sums, count):
     for i in range(len(sums)):
         sums[i] = 0.0
     add_turns(c, tile, sums, count)
+
+
+@kernel
+def neighbours(x, number, kept, left, right, share):
+    """Which of the `kept` first of `number` nodes are on both sides of x (N; `left` and `right`, twice
+    the last where there is none beyond), and the `share` of the way from one to the other.
+
+    A point nearer to a node than 1e-8 `number` may be given the nodes on that one's other side.
+    """
+    for i in range(len(x)):
+        at = min(max(-1.0, x[i]), 1.0)  # -1 where x is NaN
+        size = abs(at)
+        total = 0.0
+        for k in range(len(ARCCOS) - 1, -1, -1):
+            total = total * size + ARCCOS[k]
+        angle = math.sqrt(1.0 - size) * total
+        angle = math.pi - angle if at < 0.0 else angle
+        node = angle * (number / math.pi) - 0.5
+        first = min(max(math.floor(node), 0.0), kept - 1.0)
+        last = min(math.floor(node) + 1.0, kept - 1.0)
+        left[i], right[i] = np.int64(first), np.int64(last)
+        share[i] = node - first if last > first else 0.0
 
 
 @kernel

@@ -212,10 +212,7 @@ def tail(sizes):
     """What series with coefficients of these sizes (..., n) leave out and fold back, from the rate
     of their decay.
     """
-    last, before = sizes[..., -4:].max(axis=-1), sizes[..., -8:-4].max(axis=-1, initial=0.0)
-    with np.errstate(invalid="ignore"):
-        rate = np.clip(last / (before + 1e-300), 0.1, 0.9)
-    return 4.0 * last / (1.0 - rate)
+    return _left_out(sizes.reshape(-1, sizes.shape[-1]), 0.0)[0].reshape(sizes.shape[:-1])
 
 
 def _doubt(sizes, ulps):
@@ -225,9 +222,33 @@ def _doubt(sizes, ulps):
     Rounding is that of the transform, of T_k (see `next_term`) and the sum, and of the argument, where
     T_k' <= k^2.
     """
-    k = np.arange(sizes.shape[1])
-    rounding = (sizes * (4.0 + k + (_OF_TERMS + ulps) * k * k)).sum(axis=1)
-    return tail(sizes) + EPS * rounding
+    tails, rounding = _left_out(sizes, ulps)
+    return tails + EPS * rounding
+
+
+def _left_out(sizes, ulps):
+    out = np.empty((2, len(sizes)))
+    _doubts(np.ascontiguousarray(sizes), ulps, out)
+    return out
+
+
+@kernel
+def _doubts(sizes, ulps, out):
+    """`tail` of each row, and in ulps the rounding that `_doubt` adds."""
+    n = sizes.shape[1]
+    for r in range(len(sizes)):
+        last = before = rounding = 0.0
+        for k in range(max(n - 8, 0), n):
+            size = sizes[r, k]
+            if k < n - 4:
+                before = max(before, size)
+            elif not size <= last and last == last:  # NaN stays
+                last = size
+        for k in range(n):
+            rounding += sizes[r, k] * (4.0 + k + (_OF_TERMS + ulps) * k * k)
+        rate = min(max(last / (before + 1e-300), 0.1), 0.9)
+        out[0, r] = 4.0 * last / (1.0 - rate)
+        out[1, r] = rounding
 
 
 @kernel

@@ -39,6 +39,7 @@ from survey.kernels.hill.series import (
     discriminants,
     discriminants_at,
     factors,
+    neighbours,
     points,
 )
 from survey.kernels.lanes import DY2, RESULTS, Y1, Y1_ZEROS
@@ -382,15 +383,11 @@ def _factors(series, bars, x, even, turns, between, full_period):
 
 
 def _between(x, number, kept):
-    """Which of the `kept` first of `number` nodes are on both sides of x (twice the last where
-    there is none beyond), and the share of the way from one to the other.
-    """
-    node = np.clip(x, -1.0, 1.0)
-    node[np.isnan(node)] = 0.0
-    node = np.arccos(node, out=node) * (number / np.pi) - 0.5
-    first = np.floor(node).astype(np.int64)
-    left, right = np.clip(first, 0, kept - 1), np.minimum(first + 1, kept - 1)
-    return left, right, np.where(right > left, node - left, 0.0)
+    """The nodes around x and the share between them: see `neighbours`."""
+    left, right = np.empty((2, x.size), np.int64)
+    share = np.empty(x.size)
+    neighbours(np.ascontiguousarray(x), number, kept, left, right, share)
+    return left, right, share
 
 
 def _discriminants(answers, rows, series, bars, x, nodal):

@@ -15,7 +15,9 @@ Source: L. N. Trefethen, Approximation Theory and Approximation Practice (2013),
 8.
 """
 
-from functools import cache, lru_cache
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import cache, cached_property, lru_cache
 from math import inf, isfinite, log, sqrt
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -61,8 +63,8 @@ SAME_Z = 1000
 
 @lru_cache(maxsize=32)
 def kernels(z):
-    """Kernels of the function z(u, p): `sample(points, u, out)`, z at u (N, M); `probe`, z between
-    these; `walk`, DOP853 point by point.
+    """Kernels of the function z(u, p): `sample(points, u, out)`, see `at`; `probe`, z between
+    samples; `walk`, DOP853 point by point.
     """
     z = inline(getattr(z, "py_func", z))
 
@@ -70,7 +72,8 @@ def kernels(z):
     def sample(points, u, out):
         for i in range(u.shape[0]):
             for j in range(u.shape[1]):
-                out[i, j] = z(u[i, j], points[i])
+                for k in range(len(points)):  # what does not depend on p is computed before this
+                    out[k, i, j] = z(u[i, j], points[k, i])
 
     @fresh
     def probe(points, ends, values, size, x, number, missed):
@@ -126,13 +129,31 @@ class Raised(Exception):
 
 
 def at(z, points, u):
-    """z at u (N, M) of the points (N, n)."""
-    out = np.empty(u.shape)
+    """z (K, N, M) at u (N, M) of the points (K, N, n); (N, M) of points (N, n)."""
+    several = points if points.ndim == 3 else points[None]
+    out = np.empty((len(several), *u.shape))
     try:
-        kernels(z).sample(np.ascontiguousarray(points), np.ascontiguousarray(u), out)
+        kernels(z).sample(np.ascontiguousarray(several), np.ascontiguousarray(u), out)
     except Exception as error:
         raise Raised from error
-    return out
+    return out if points.ndim == 3 else out[0]
+
+
+@dataclass(frozen=True)
+class Equation:
+    """Hill's equation with a user's z, named by the hashable `key`.
+
+    `ranges(points)`: periods, edges and slack of points (N, n), and `measured(points)` the Measured,
+    as `problem` takes and `measured` gives them. `exact(point, edges)`, if given: z(u) and the
+    `edges` (P + 1) of a point in more digits (`multiprecision`).
+    """
+
+    z: Callable
+    key: Hashable
+    even: bool
+    ranges: Callable
+    measured: Callable
+    exact: Callable | None = None
 
 
 class Steps:
@@ -141,17 +162,32 @@ class Steps:
     """
 
     def __init__(self, edges, slack, size, rate):
-        self.edges, self.slack, self.rate = edges, slack, rate
+        self.edges, self.slack, self.rate, self._size = edges, slack, rate, size
         self.length, self.end = np.diff(edges, axis=1), edges[:, -1]
-        self.pieces = np.count_nonzero(self.length > 0, axis=1)
-        self.more = np.where(self.pieces > 1, self.pieces, 0) / self.end
-        # Each piece gets steps by its weight: enough in all that each has what it needs, and one
-        # more.
-        self.weight = self.length * np.maximum(
-            np.maximum(BY_PHASE * np.sqrt(size), rate), 1 / self.end[:, None]
+        self.whole = edges.shape[1] == 2  # one piece has all steps
+
+    @cached_property
+    def pieces(self):
+        return np.count_nonzero(self.length > 0, axis=1)
+
+    @cached_property
+    def more(self):
+        return np.where(self.pieces > 1, self.pieces, 0) / self.end
+
+    @cached_property
+    def weight(self):
+        """Each piece gets steps by its weight: enough in all that each has what it needs, and one more."""
+        return self.length * np.maximum(
+            np.maximum(BY_PHASE * np.sqrt(self._size), self.rate), 1 / self.end[:, None]
         )
-        self.total = np.cumsum(self.weight, axis=1)[:, -1:]
-        self.need = (
+
+    @cached_property
+    def total(self):
+        return np.cumsum(self.weight, axis=1)[:, -1:]
+
+    @cached_property
+    def need(self):
+        return (
             self.length
             * self.total
             / (np.where(self.weight > 0, self.weight, 1) * self.end[:, None])
@@ -159,18 +195,22 @@ class Steps:
 
     def frequency(self, size):
         """What stands for the fastest phase of a whole row with this `size` of z."""
+        if self.whole:
+            return np.sqrt(size[:, 0])
         return (self.need * np.sqrt(size)).max(axis=1) + pointwise.LONGEST * self.more
 
     @property
     def rates(self):
         """What stands for the rate of a whole row."""
+        if self.whole:
+            return self.rate[:, 0]
         return (self.need * self.rate).max(axis=1) + 2 * self.more
 
     def of(self, rows, number):
         """Starts and lengths of the steps (rows, number), and the ends between which z may be asked
         for in each.
         """
-        if self.length.shape[1] == 1:
+        if self.whole:
             low, high, slack = self.edges[rows, :1], self.edges[rows, 1:], self.slack[rows, None]
             h = np.repeat(self.length[rows] / number, number, axis=1)
             return low + np.arange(number) * h, h, low + slack, high - slack
@@ -190,18 +230,15 @@ class Steps:
         return np.clip(start + h * nodes, low, high)
 
 
-def problem(z, points, edges, period, slack, even, exact=None):
-    """The Hill problem of z at the points (N, n), and where z is `rough`, not smooth between its
-    breaks.
+def problem(equation, points):
+    """The Hill problem of an `Equation` at the points (N, n), and where z is `rough`, not smooth
+    between its breaks.
 
-    `exact(point, edges)`, if given, says z(u) and the `edges` (P + 1) of a point in more digits
-    (`multiprecision`).
-
-    `edges` (N, P + 1): 0, the breaks, and the end of the part that is solved, T/2 if `even`, else
-    T; where a point has fewer, its last one repeated. Points whose z is rough, not finite, or not
-    even where it should be, have span NaN.
+    Points whose z is rough, not finite, or not even where it should be, have span NaN.
     """
-    size, rate, scale, rough = measured(z, points, edges, period if even else None, slack)
+    z = equation.z
+    _, edges, slack = equation.ranges(points)
+    size, rate, scale, rough, _ = equation.measured(points)
     steps = Steps(edges, slack, size, rate)
 
     def sample(rows, nodes, number):
@@ -215,7 +252,7 @@ def problem(z, points, edges, period, slack, even, exact=None):
         return walked(z, points[rows], rows, steps, scale, tolerance)
 
     def exactly(rows, p, low, number):
-        return solved_exactly(z, points[rows], rows, steps, scale, even, exact, number)
+        return solved_exactly(equation, points[rows], rows, steps, scale, number)
 
     frequency = steps.frequency(size)
     sizes = monodromy.RowSizes(
@@ -225,8 +262,8 @@ def problem(z, points, edges, period, slack, even, exact=None):
     )
     own = monodromy.Problem(
         p=np.ones((len(points), 1)), sizes=lambda: sizes, c2=0.0,
-        sample=sample, walk=walk, cut=lambda rows, number: steps.of(rows, number)[1], full_period=not even,
-        exact=exactly if exact else None,
+        sample=sample, walk=walk, cut=lambda rows, number: steps.of(rows, number)[1],
+        full_period=not equation.even, exact=exactly if equation.exact else None,
     )  # fmt: skip
     return own, rough
 
@@ -243,19 +280,21 @@ def walked(z, points, rows, steps, scale, tolerance):
     return out, reached
 
 
-def solved_exactly(z, points, rows, steps, scale, even, exact, number):
+def solved_exactly(equation, points, rows, steps, scale, number):
     """The results of the `points`, each of one of the `rows`, in double-double, in its `number` of steps."""
-    out = np.full((rows.size, RESULTS + (0 if even else SQUARES)), np.nan)
+    out = np.full((rows.size, RESULTS + (0 if equation.even else SQUARES)), np.nan)
     for i in np.flatnonzero(number <= EXACT_STEPS):
         start = steps.of(rows[i : i + 1], number[i])[0][0]
         with multiprecision.LOCK:
             found = multiprecision.series(
-                *exact(points[i], steps.edges[rows[i]]), start, sampled_double.NODES
+                *equation.exact(points[i], steps.edges[rows[i]]), start, sampled_double.NODES
             )
-        if found is None or not _agree(z, points[i], scale[rows[i]], *found[3:]):
+        if found is None or not _agree(equation.z, points[i], scale[rows[i]], *found[3:]):
             continue
         terms, lengths, sizes = found[:3]
-        sampled_double.solve(terms, sampled_double.missing(*sizes), lengths, not even, out[i])
+        sampled_double.solve(
+            terms, sampled_double.missing(*sizes), lengths, not equation.even, out[i]
+        )
     return out
 
 
@@ -293,14 +332,17 @@ class Measured(NamedTuple):
     rate: np.ndarray
     scale: np.ndarray
     rough: np.ndarray
+    spikeless: np.ndarray
 
 
 def measured(z, points, edges, period, slack, probes=PROBES):
     """The Measured of points: for each piece `size` = max |z| and `rate` (N, P); for each point
-    `scale` = B, NaN if z is not finite, and `rough`.
+    `scale` = B, NaN if z is not finite, whether it is `rough`, and whether it is known to be
+    `spikeless` (see `unprobed`).
 
-    With a `period` (N), z is compared with its mirror image, and scale is NaN where they differ.
-    `probes` as PROBES.
+    `edges` (N, P + 1): 0, the breaks, and the end of the part that is solved, T/2 if z is even, else
+    T; where a point has fewer, its last one repeated. With a `period` (N), z is compared with its
+    mirror image, and scale is NaN where they differ. `probes` as PROBES.
     """
     shape = (len(points), edges.shape[1] - 1)
     owner = np.repeat(np.arange(len(points)), edges.shape[1] - 1)
@@ -345,19 +387,23 @@ def measured(z, points, edges, period, slack, probes=PROBES):
 
     size, rate, noise, last = np.empty((4, owner.size))
     unresolved, off = np.arange(owner.size), np.zeros(owner.size)
+    spikeless = np.zeros(owner.size, np.bool_)
     for number in SIZES:
         for some in _parts(unresolved, number):
             own, u = owner[some], nodes(some, number)
+            mirrored = number == SIZES[0] and period is not None
+            if mirrored:
+                u = np.concatenate([u, period[own, None] - u], axis=1)
             known = at(z, points[own], u)
+            if mirrored:
+                known, image = known[:, :number].copy(), known[:, number:]
+                off[some] = abs(known - image).max(axis=1)
             size[some], rate[some], noise[some], last[some] = spectrum(known)
-            if number == SIZES[0] and period is not None:
-                mirrored = at(z, points[own], period[own, None] - u)
-                off[some] = abs(known - mirrored).max(axis=1)
             smooth = np.flatnonzero((last[some] <= RESOLVED * size[some]) | (number == SIZES[-1]))
             if number == SIZES[0]:
-                own = own[smooth]
-                spikeless = unprobed(z, points[own], edges[own], slack[own], size[some[smooth]])
-                smooth = smooth[~spikeless]
+                own, pieces = own[smooth], some[smooth]
+                spikeless[pieces] = unprobed(z, points[own], edges[own], slack[own], size[pieces])
+                smooth = smooth[~spikeless[pieces]]
             some = some[smooth]
             if not some.size:
                 continue
@@ -380,6 +426,7 @@ def measured(z, points, edges, period, slack, probes=PROBES):
         rate=rate,
         scale=np.where(off <= MIRRORED * scale, known, np.nan),
         rough=(last > ROUGH * size).any(axis=1),
+        spikeless=spikeless.reshape(shape).all(axis=1),
     )
 
 

@@ -8,13 +8,13 @@ four corners of the map, and what steps need is measured there. All depends on t
 axes, never on the block.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
 from survey.measures.hill import monodromy, user_equation
-from survey.measures.hill.user_equation import Steps, at, measured
+from survey.measures.hill.user_equation import Steps, at
 
 
 @dataclass(frozen=True)
@@ -30,17 +30,16 @@ class Axes:
     linear: bool = False
 
 
-def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
-    """The Hill problem of z in rows of `points` (R, n) by `lanes` (R, L), where a row is `rough` (R),
-    and where its span is NaN, as z is rough or not finite (R).
+def problem(equation, axes, points, lanes, known=None):
+    """The Hill problem of an `Equation` in rows of `points` (R, n) by `lanes` (R, L), where a row is
+    `rough` (R), and where its span is NaN, as z is rough or not finite (R).
 
-    `ranges(points)` gives periods, edges and slack as `user_equation` takes them; what it gives,
-    and z, is named by the hashable `key`. `known`: what `_from_corners` gave for their map.
+    `known`: what `_from_corners` gave for their map.
     """
-    _, edges, slack = ranges(points)
-    ends = [_with(points, axes.lane, end) for end in axes.line[1:]]
-    known = known or _from_corners(z, axes, points, ranges, even)
-    sizes, rate, scale, rough = known(points) if known else _measured(z, axes, points, ranges, even)
+    z = equation.z
+    _, edges, slack = equation.ranges(points)
+    known = known or _from_corners(equation, axes, points)
+    sizes, rate, scale, rough = known(points) if known else _measured(equation, axes, points)
     bad = rough | np.isnan(scale)
 
     @cache
@@ -55,7 +54,8 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
 
     def sample(rows, nodes, number):
         u = steps().at_nodes(rows, nodes, number)
-        low, high = (at(z, end[rows], u.reshape(rows.size, -1)).reshape(u.shape) for end in ends)
+        both = np.stack([_with(points[rows], axes.lane, end) for end in axes.line[1:]])
+        low, high = at(z, both, u.reshape(rows.size, -1)).reshape(2, *u.shape)
         out = np.zeros((rows.size, number, 2, nodes.size + 1))
         out[:, :, 1, :-1] = (high - low) / (axes.line[2] - axes.line[1])
         out[:, :, 0, :-1] = low - axes.line[1] * out[:, :, 1, :-1]
@@ -69,79 +69,78 @@ def problem(z, key, axes, points, lanes, ranges, even, exact=None, known=None):
 
     def exactly(rows, p, low, number):
         own = _with(points[rows], axes.lane, p)
-        return user_equation.solved_exactly(z, own, rows, steps(), scale, even, exact, number)
+        return user_equation.solved_exactly(equation, own, rows, steps(), scale, number)
 
+    row_axis = None if axes.across is None else _row_axis(equation, axes, points, known)
     own = monodromy.Problem(
         p=lanes, sizes=sizes_of_rows, c2=0.0,
-        sample=sample, walk=walk, cut=lambda rows, number: steps().of(rows, number)[1], full_period=not even,
-        exact=exactly if exact else None, line=axes.line,
-        row_axis=_row_axis(z, key, axes, points, ranges, even, known) if axes.across is not None else None,
-        positions=points[:, axes.across] if axes.across is not None else None,
+        sample=sample, walk=walk, cut=lambda rows, number: steps().of(rows, number)[1],
+        full_period=not equation.even, exact=exactly if equation.exact else None,
+        line=axes.line, row_axis=row_axis, positions=None if row_axis is None else points[:, axes.across],
     )  # fmt: skip
     return own, rough, bad
 
 
-def _measured(z, axes, points, ranges, even):
+def _measured(equation, axes, points):
     """What steps need of z in rows of `points` (R, n): its size (2, R, P) at both ends of the rows, its
     rate (R, P) and scale (R), and where it is `rough` (R); see `user_equation.measured`.
     """
-    period, edges, slack = ranges(points)
-    ends = np.concatenate([_with(points, axes.lane, end) for end in axes.line[1:]])
-    edges, slack = np.tile(edges, (2, 1)), np.tile(slack, 2)
-    known = measured(z, ends, edges, np.tile(period, 2) if even else None, slack)
+    ends = np.repeat(points, 2, axis=0)
+    ends[::2, axes.lane], ends[1::2, axes.lane] = axes.line[1:]
     size, rate, scale, rough = (
-        values.reshape(2, len(points), *values.shape[1:]) for values in known
+        values.reshape(len(points), 2, *values.shape[1:]) for values in equation.measured(ends)[:4]
     )
-    return size, rate.max(axis=0), scale.max(axis=0), rough.any(axis=0)
+    return size.swapaxes(0, 1), rate.max(axis=1), scale.max(axis=1), rough.any(axis=1)
 
 
-def _from_corners(z, axes, points, ranges, even):
+def _from_corners(equation, axes, points):
     """The function of points (R, n) that gives what `_measured` does, bounds from the corners of their
     map; None where z has to be measured row by row.
     """
     if not axes.linear:
         return None
     low, high = axes.row_line[1:]
-    ends = np.concatenate([_with(points[:1], axes.across, end) for end in (low, high)])
-    size, rate, scale, rough = _measured(z, axes, ends, ranges, even)
+    ends = _with(np.repeat(points[:1], 2, axis=0), axes.across, [low, high])
+    size, rate, scale, rough = _measured(equation, axes, ends)
     if rough.any() or np.isnan(scale).any():
         return None
+    rates = rate.max(axis=0)[None]
 
     def at_rows(points):
-        x = np.clip(points[:, axes.across], low, high)
-        between = np.stack([high - x, x - low]) / (high - low)
+        x = np.minimum(np.maximum(points[:, axes.across], low), high)
+        before, after = (high - x) / (high - low), (x - low) / (high - low)
         known = np.isfinite(points).all(axis=1)
         return (
-            np.einsum("ekp,kr->erp", size, between),
-            np.repeat(rate.max(axis=0)[None], len(points), axis=0),
-            np.where(known, scale[0] * between[0] + scale[1] * between[1], np.nan),
+            size[:, :1] * before[:, None] + size[:, 1:] * after[:, None],
+            rates[np.zeros(len(points), int)],
+            np.where(known, scale[0] * before + scale[1] * after, np.nan),
             np.zeros(len(points), bool),
         )
 
     return at_rows
 
 
-def _row_axis(z, key, axes, points, ranges, even, known):
+def _row_axis(equation, axes, points, known):
     """The axis across the rows; all other parameters are the same in these `points`."""
     same = points[:1]
     others = tuple(np.delete(same[0], [axes.lane, axes.across]).tolist())
+    nodes = replace(equation, exact=None)  # their bars are wide enough for float64
 
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
         lanes = np.zeros((positions.size, 0))
-        return problem(z, key, Axes(axes.lane, axes.line), own, lanes, ranges, even, None, known)[0]
+        return problem(nodes, Axes(axes.lane, axes.line), own, lanes, known)[0]
 
-    return monodromy.RowAxis((key, axes, others), *axes.row_line, at=rows_at)
+    return monodromy.RowAxis((equation.key, axes, others), *axes.row_line, at=rows_at)
 
 
-def box(z, key, axes, point, ranges, even):
+def box(equation, axes, point):
     """The box of points on their own between the ends of both axes; all other parameters are those
     of a `point`.
     """
     point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
-    known = _from_corners(z, axes, point, ranges, even)
-    row_axis = _row_axis(z, key, axes, point, ranges, even, known)
-    return monodromy.Box(row_axis, axes.line, full_period=not even)
+    row_axis = _row_axis(equation, axes, point, _from_corners(equation, axes, point))
+    return monodromy.Box(row_axis, axes.line, full_period=not equation.even)
 
 
 def _bound(low_square, high_square, low, high):

@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from survey.kernels.hill.series import discriminants
+from survey.kernels.hill.series import discriminants, neighbours
 from survey.kernels.math import chebyshev
 from survey.kernels.math.chebyshev import TERMS
 
@@ -50,3 +50,22 @@ def test_lagranges_polynomials_are_bounded_at_and_beside_their_nodes(magnitudes,
             assert (found[i] >= exact * (1 - 1e-15)).all()
             far = abs(x - nodes[i]) > 1e-5
             assert (found[i][far] <= exact[far] + 1e-9).all() and (found[i] <= 1.4143).all()
+
+
+@pytest.mark.parametrize("number", [1, 2, 17, 384])
+@pytest.mark.parametrize("half", [False, True])
+def test_nodes_around_a_point_are_those_by_the_angle(number, half):
+    rng = np.random.default_rng(number)
+    x = np.concatenate([rng.uniform(-1, 1, 5000), [-1.0, 0.0, 1.0, 1.0 + 2.0**-52]])
+    kept = (number + 1) // 2 if half else number
+    left, right = np.empty((2, x.size), np.int64)
+    share = np.empty(x.size)
+    neighbours(x, number, kept, left, right, share)
+    node = np.arccos(np.clip(x, -1.0, 1.0)) * number / np.pi - 0.5
+    assert (np.clip(node, 0, kept - 1) - left - share < 1e-5).all()
+    assert (left - np.clip(node, 0, kept - 1) < 1e-5).all()
+    assert ((right - left == 1) | ((right == left) & (share == 0))).all()
+    assert ((left == 0) | (left - node < 1e-5)).all()
+    assert ((right == kept - 1) | (node - right < 1e-5)).all()
+    inside = (node > 1e-5) & (node < kept - 1 - 1e-5)
+    assert abs(left + share - node)[inside].max(initial=0.0) < 1e-5

@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 import survey
 from survey import status
 from survey.file.labels import error_bars
+from survey.measures.hill import user_equation
 from survey.sweep import cost
 
 METHODS = ["auto", "taylor16", "magnus6", "rk4", "dop853"]
@@ -356,3 +357,12 @@ def test_a_spike_that_a_run_would_miss_is_refused_with_its_place_and_resolved_wi
     trace = 2 * cos(2.0) - 2.0 * np.sqrt(pi) / 2 * sin(2.0)
     assert abs(float(named.discriminant) - trace) < 5e-3 and float(named.discriminant_error) < 1e-8
     assert named.attrs["z_resolved_width"] == 1 / 128 and "breaks" in named.attrs["z_resolution"]
+
+
+def test_z_of_several_points_at_the_same_u_has_the_bits_of_each():
+    rng = np.random.default_rng(3)
+    u, points = rng.uniform(0, pi, (4, 50)), rng.normal(size=(3, 4, 3))
+    found = user_equation.at(scaled, points, u)
+    for own, values in zip(points, found, strict=True):
+        assert (user_equation.at(scaled, own, u) == values).all()
+        assert values[2, 7] == scaled(u[2, 7], own[2])
