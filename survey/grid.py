@@ -144,13 +144,31 @@ def lines(parameters, alone=None):
 
 
 def ranges(parameters, alone=None):
-    """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`."""
+    """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`;
+    found when asked for, as few scenes do.
+    """
     alone = _alone(parameters) if alone is None else alone
-    return {
-        name: (np.size(values), *_ends(values))
-        for name, (dims, values) in parameters.items()
-        if dims and name not in alone
-    }
+    return _Ranges({n: of for n, (dims, of) in parameters.items() if dims and n not in alone})
+
+
+class _Ranges(Mapping):
+    def __init__(self, values):
+        self._values, self._found = values, {}
+
+    def __getitem__(self, name):
+        if name not in self._found:
+            values = self._values[name]
+            self._found[name] = (np.size(values), *_ends(values))
+        return self._found[name]
+
+    def __contains__(self, name):
+        return name in self._values
+
+    def __iter__(self):
+        return iter(self._values)
+
+    def __len__(self):
+        return len(self._values)
 
 
 def _alone(parameters):

@@ -307,12 +307,11 @@ def parameter(gap, near, far, q_far, root_near, incline, g, xy):
     """p^2/(x y) of the sum R as a fraction, of (S13) where that is used, and l at the pole."""
     line = root_near + incline * near
     slanted = line <= SLANT * root_near
-    here, there, across = q_far * near, g * far, near * far * line * line
-    return (
-        (here + there) ** 2 if slanted else gap * gap * g,
-        xy * (4.0 * here * far if slanted else across),
-        line,
-    )
+    here = q_far * near
+    both = here + g * far
+    # all known before one is chosen: vector code, where a branch would keep the loop from it
+    over, square, under, across = both * both, gap * gap * g, 4.0 * here * far, near * far * line * line
+    return over if slanted else square, xy * (under if slanted else across), line
 
 
 @inline
