@@ -6,7 +6,10 @@ methods call it before they need those kernels.
 
 import time
 
+import numpy as np
+
 from survey.kernels import jit
+from survey.kernels.math.rounding import rounded_up
 
 # at a first use, waits for the next of what is compiled elsewhere, and names it; empty at the end
 other_compiler = None
@@ -16,11 +19,12 @@ _waited = 0.0
 
 def wait(name):
     """Wait for what has this name, or else for all that is compiled elsewhere: it is done sooner than
-    if this process began now.
+    if this process began now, which compiles meanwhile what stores error bars.
     """
     global _waited
     function = other_compiler
     if function is not None and name not in _done:
+        rounded_up(np.empty(0))
         began = time.perf_counter()
         while name not in _done and (line := function()):
             _done.add(line.strip())

@@ -45,7 +45,6 @@ from survey.kernels.hill.series import (
 from survey.kernels.lanes import DY2, RESULTS, Y1, Y1_ZEROS
 from survey.kernels.math import chebyshev
 from survey.kernels.math.chebyshev import TERMS
-from survey.kernels.math.rounding import round_up
 from survey.measures.hill import pointwise
 from survey.measures.hill.answers import Answers, Asked
 
@@ -135,8 +134,7 @@ def compile_ahead(sample, no_rows, variables):
             kernels.exponents(np.zeros(1, int), 1, 1.0, *answers.found)
         answers.assess(np.ones((1, RESULTS)), None)
     else:
-        yield "answers"  # a few points need no more, but for what stores them
-        round_up(np.zeros(1), np.zeros(1, np.float32))
+        yield "answers"  # a few points need no more
         _factors(
             np.ones((4, 1, TERMS)),
             np.ones((4, 1)),
