@@ -11,12 +11,13 @@ lambda + 1 / lambda = 2 + 4 w for the two eigenvalues w of S'Q, whose discrimina
 (`survey.measures.libration.danby`).
 """
 
-from math import isfinite, sqrt
+from math import inf, sqrt
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math import double as dd
+from survey.kernels.math.chebyshev import add_turns, next_term
 from survey.kernels.math.roundoff import EPS
 
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
@@ -29,57 +30,107 @@ RESULTS, INVARIANTS = 10, 5  # columns, and how many of them are values
 SUM, SUM_BAR, PAIRS, PAIRS_BAR = range(4)
 NODES = 24  # of a row's series
 TILE = 64
+GROUP = 8  # rows that share a table of T_n, as long as their mu are the same
+# Rows of a tile of points, after their results: is the point to be answered?, AB, CD, a and b, each with its bar,
+# is all of that finite?, K with its bar, and what is decided.
+(
+    OPEN,
+    AB,
+    AB_BAR,
+    CD,
+    CD_BAR,
+    OWN_SUM,
+    OWN_SUM_BAR,
+    OWN_PAIRS,
+    OWN_PAIRS_BAR,
+    FINITE,
+    K,
+    K_BAR,
+    DECIDED,
+    MEETING,
+) = range(RESULTS, RESULTS + 14)
+TILE_ROWS = RESULTS + 14
 
 
-@kernel
-def measure(results, rtol, overflow, floats, verdict, collision, missed, status):
-    """a, its bar, b, its bar (4, N), verdict and collision from `results` (N, RESULTS); who misses
-    `rtol` is `missed`.
+@splice
+def _settle(tile, rtol, overflow, floats, verdict, collision, missed, status):
+    """Answer those points of a tile that are OPEN from their A, B, C, D, t and the bars of these.
 
-    Points whose `status` is not 0 are skipped; those that leave the range of floats get the status
-    `overflow`.
+    Loops over rows of one array, without branches: vector code.
     """
-    for i in range(len(results)):
-        if status[i] == 0:
-            r = results[i]
-            values = (r[A], r[B], r[C], r[D], r[T])
-            bars = (r[A_BAR], r[B_BAR], r[C_BAR], r[D_BAR], r[T_BAR])
-            _settle(values, bars, i, rtol, overflow, floats, verdict, collision, missed, status)
+    for i in range(len(status)):
+        tile[AB, i], tile[AB_BAR, i] = product(
+            tile[A, i], tile[B, i], tile[A_BAR, i], tile[B_BAR, i]
+        )
+        tile[CD, i], tile[CD_BAR, i] = product(
+            tile[C, i], tile[D, i], tile[C_BAR, i], tile[D_BAR, i]
+        )
+    for i in range(len(status)):
+        t, t_bar, ab, cd = tile[T, i], tile[T_BAR, i], tile[AB, i], tile[CD, i]
+        ab_bar, cd_bar = tile[AB_BAR, i], tile[CD_BAR, i]
+        a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
+        by_ab = ab_bar <= cd_bar
+        one, other = 6.0 - 8.0 * t + 16.0 * ab, 8.0 * t - 10.0 + 16.0 * cd
+        b, product_of_two = one if by_ab else other, ab if by_ab else cd
+        b_bar = 16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar
+        b_bar += EPS * (16.0 * abs(product_of_two) + 16.0 * abs(t) + 20.0)
+        finite = (abs(a) < inf) & (abs(b) < inf) & (a_bar < LARGEST) & (b_bar < LARGEST)
+        tile[OWN_SUM, i], tile[OWN_SUM_BAR, i] = a, a_bar
+        tile[OWN_PAIRS, i], tile[OWN_PAIRS_BAR, i] = b, b_bar
+        tile[FINITE, i] = 1.0 if finite else 0.0
+        tile[K, i], tile[K_BAR, i] = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
+    for i in range(len(status)):
+        t, t_bar, k, k_bar = tile[T, i], tile[T_BAR, i], tile[K, i], tile[K_BAR, i]
+        given = (
+            t,
+            t - 2.0,
+            tile[AB, i],
+            tile[CD, i],
+            k,
+            t_bar,
+            tile[AB_BAR, i],
+            tile[CD_BAR, i],
+            k_bar,
+        )
+        found = decide(*given)
+        alike = (tile[B, i] > 0.0) == (tile[D, i] > 0.0)
+        first, where_lost = nearest(t, k, t_bar, k_bar), lost(*given)
+        if_stable = MINUS_ONE if alike else first
+        meeting = where_lost if found == UNSTABLE else if_stable
+        tile[DECIDED, i], tile[MEETING, i] = found, UNDECIDED if found == UNDECIDED else meeting
+    for own, row in (
+        (SUM, OWN_SUM),
+        (SUM_BAR, OWN_SUM_BAR),
+        (PAIRS, OWN_PAIRS),
+        (PAIRS_BAR, OWN_PAIRS_BAR),
+    ):
+        _keep(tile, row, floats[own])
+    for i in range(len(status)):
+        wide = inaccurate(
+            tile[OWN_SUM, i], tile[OWN_SUM_BAR, i], tile[OWN_PAIRS, i], tile[OWN_PAIRS_BAR, i], rtol
+        )
+        known, found = tile[FINITE, i] == 1.0, tile[DECIDED, i]
+        open_, left = tile[OPEN, i] == 1.0, wide | (found == UNDECIDED)
+        tile[DECIDED, i] = found if known else UNDECIDED
+        tile[MEETING, i] = tile[MEETING, i] if known else UNDECIDED
+        missed[i] = (left | (not known)) if open_ else missed[i]
+        status[i] = np.int8(overflow) if open_ & (not known) else status[i]
+    for i in range(len(status)):
+        verdict[i] = np.int8(tile[DECIDED, i]) if tile[OPEN, i] == 1.0 else verdict[i]
+        collision[i] = np.int8(tile[MEETING, i]) if tile[OPEN, i] == 1.0 else collision[i]
 
 
-@inline
-def _settle(values, bars, i, rtol, overflow, floats, verdict, collision, missed, status):
-    """Answer point i from its A, B, C, D, t and their bars."""
-    missed[i] = False
-    t, t_bar = values[T], bars[T]
-    ab, ab_bar = product(values[A], values[B], bars[A], bars[B])
-    cd, cd_bar = product(values[C], values[D], bars[C], bars[D])
-    a, a_bar = 4.0 * t - 4.0, 4.0 * t_bar + EPS * (4.0 * abs(t) + 4.0)
-    by_ab = ab_bar <= cd_bar
-    b = 6.0 - 8.0 * t + 16.0 * ab if by_ab else 8.0 * t - 10.0 + 16.0 * cd
-    b_bar = 16.0 * min(ab_bar, cd_bar) + 8.0 * t_bar
-    b_bar += EPS * (16.0 * abs(ab if by_ab else cd) + 16.0 * abs(t) + 20.0)
-    if not (isfinite(a) and isfinite(b) and a_bar < LARGEST and b_bar < LARGEST):
-        status[i] = overflow
-        floats[SUM, i] = floats[SUM_BAR, i] = floats[PAIRS, i] = floats[PAIRS_BAR, i] = np.nan
-        verdict[i] = collision[i] = UNDECIDED
-        missed[i] = True
-        return
-    floats[SUM, i], floats[SUM_BAR, i], floats[PAIRS, i], floats[PAIRS_BAR, i] = a, a_bar, b, b_bar
-    k, k_bar = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
-    verdict[i] = decide(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
-    collision[i] = UNDECIDED
-    if verdict[i] == UNSTABLE:
-        collision[i] = lost(t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar)
-    elif verdict[i] == STABLE:
-        definite = (values[B] > 0.0) == (values[D] > 0.0)
-        collision[i] = MINUS_ONE if definite else nearest(t, k, t_bar, k_bar)
-    missed[i] = inaccurate(a, a_bar, b, b_bar, rtol) or verdict[i] == UNDECIDED
+@splice
+def _keep(tile, row, values):
+    """Fill the `values` of points that are OPEN from a row of the tile, NaN where not all is FINITE."""
+    for i in range(len(values)):
+        known = tile[row, i] if tile[FINITE, i] == 1.0 else np.nan
+        values[i] = known if tile[OPEN, i] == 1.0 else values[i]
 
 
 @inline
 def inaccurate(a, a_bar, b, b_bar, rtol):
-    return not (a_bar <= rtol * (1.0 + abs(a)) and b_bar <= rtol * (1.0 + abs(b)))
+    return not ((a_bar <= rtol * (1.0 + abs(a))) & (b_bar <= rtol * (1.0 + abs(b))))
 
 
 @inline
@@ -107,23 +158,18 @@ def decide(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
 
     `beyond` is t - 2, whose bar is that of t.
     """
-    if ab < -ab_bar or cd < -cd_bar or k < -k_bar or t < -t_bar or beyond > t_bar:
-        return UNSTABLE
-    if ab > ab_bar and cd > cd_bar and k > k_bar and t > t_bar and beyond < -t_bar:
-        return STABLE
-    return UNDECIDED
+    off = (ab < -ab_bar) | (cd < -cd_bar) | (k < -k_bar) | (t < -t_bar) | (beyond > t_bar)
+    on = (ab > ab_bar) & (cd > cd_bar) & (k > k_bar) & (t > t_bar) & (beyond < -t_bar)
+    return UNSTABLE if off else STABLE if on else UNDECIDED
 
 
 @inline
 def lost(t, beyond, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar):
     """Which multipliers are off the circle: a complex quadruple, a negative pair, or positive ones alone."""
-    if k < -k_bar:
-        return KREIN
-    if ab < -ab_bar or (k > k_bar and t < -t_bar):
-        return MINUS_ONE
-    if k > k_bar and ab > ab_bar and (cd < -cd_bar or beyond > t_bar):
-        return NONE
-    return UNDECIDED
+    real = k > k_bar
+    through = (ab < -ab_bar) | (real & (t < -t_bar))
+    none = real & (ab > ab_bar) & ((cd < -cd_bar) | (beyond > t_bar))
+    return KREIN if k < -k_bar else MINUS_ONE if through else NONE if none else UNDECIDED
 
 
 @inline
@@ -139,9 +185,8 @@ def nearest(t, k, t_bar, k_bar):
     one, two = t - 1.0 + root, t - 1.0 - root
     gap = one - two * (4.0 * two * two - 3.0)
     margin = bar * (1.0 + abs(12.0 * two * two - 3.0) + 24.0 * bar)
-    if gap > margin and two < -0.5 - bar:
-        return MINUS_ONE
-    return KREIN if gap < -margin or two > -0.5 + bar else UNDECIDED
+    inside, between = (gap > margin) & (two < -0.5 - bar), (gap < -margin) | (two > -0.5 + bar)
+    return MINUS_ONE if inside else KREIN if between else UNDECIDED
 
 
 @inline
@@ -152,31 +197,61 @@ def coordinate(mu):
 
 
 @kernel
-def dense(series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status):
-    """Answer the `missed` points of `rows` of mu (R, L) from their Chebyshev series in 4 s - 3
-    (rows, 5, NODES).
+def answer(
+    results, series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status
+):
+    """a, its bar, b, its bar (4, N), verdict and collision; who misses `rtol` or is undecided is
+    `missed`, and those that leave the range of floats get the status `overflow`.
 
-    `bars` (rows, 5) hold for the whole row; `missed` remain those that miss `rtol` or are
-    undecided.
+    Of the points whose `status` is 0 from their `results` (N, RESULTS); or, where there are none, of the
+    `missed` ones of `rows` of mu (R, L) from the rows' Chebyshev series in 4 s - 3 (rows, 5, NODES),
+    of which `bars` (rows, 5) hold for the whole row. One kernel, as most of it is the same code.
     """
-    here, x = np.empty((INVARIANTS, TILE)), np.empty(TILE)
-    for r in range(len(rows)):
-        bar = bars[r, A], bars[r, B], bars[r, C], bars[r, D], bars[r, T]
-        for first in range(0, mu.shape[1], TILE):
-            count = min(TILE, mu.shape[1] - first)
-            for i in range(count):
-                x[i] = coordinate(mu[rows[r], first + i])
-            for j in range(INVARIANTS):
-                # Clenshaw; NODES is a constant, so that the inner loop is unrolled
-                for i in range(count):
-                    one = two = 0.0
-                    for n in range(NODES - 1, 0, -1):
-                        one, two = series[r, j, n] + 2.0 * x[i] * one - two, one
-                    here[j, i] = series[r, j, 0] + x[i] * one - two
-            for i in range(count):
-                at = rows[r] * mu.shape[1] + first + i
-                if missed[at]:
-                    values = here[A, i], here[B, i], here[C, i], here[D, i], here[T, i]
-                    _settle(
-                        values, bar, at, rtol, overflow, floats, verdict, collision, missed, status
-                    )
+    table, tile, known = np.empty((NODES, TILE)), np.empty((TILE_ROWS, TILE)), np.empty(TILE)
+    by_points = len(results) > 0
+    number, size = (1, len(results)) if by_points else (len(rows), mu.shape[1])
+    for start in range(0, number, GROUP):
+        for first in range(0, size, TILE):
+            count = min(TILE, size - first)
+            for r in range(start, min(start + GROUP, number)):
+                at = first if by_points else rows[r] * size + first
+                end = at + count
+                left, state = missed[at:end], status[at:end]
+                if by_points:
+                    for i in range(count):
+                        for j in range(RESULTS):
+                            tile[j, i] = results[first + i, j]
+                        tile[OPEN, i] = 1.0 if state[i] == 0 else 0.0
+                else:
+                    own = mu[rows[r], first : first + count]
+                    if r == start or _differ(own, known):
+                        _table(own, known, table)
+                    for j in range(INVARIANTS):
+                        for i in range(TILE):
+                            tile[j, i], tile[INVARIANTS + j, i] = 0.0, bars[r, j]
+                        add_turns(series[r, j], table, tile[j], count)
+                    for i in range(count):
+                        tile[OPEN, i] = 1.0 if left[i] else 0.0
+                _settle(tile, rtol, overflow, floats[:, at:end], verdict[at:end], collision[at:end], left,
+                        state)  # fmt: skip
+
+
+@splice
+def _differ(one, other):
+    """Is any of the numbers another than that of the first of `other`?"""
+    number = 0
+    for i in range(len(one)):
+        number += one[i] != other[i]
+    return number > 0
+
+
+@splice
+def _table(mu, known, table):
+    """T_n, n < NODES, at the points mu, which are noted, and at 0 in the other lanes."""
+    for i in range(TILE):
+        known[i] = mu[i] if i < len(mu) else 0.0
+    for i in range(TILE):
+        table[0, i], table[1, i] = 1.0, coordinate(known[i])
+    for n in range(2, NODES):
+        for i in range(TILE):
+            table[n, i] = next_term(2.0 * table[1, i], table[n - 1, i], table[n - 2, i])

@@ -20,7 +20,7 @@ from survey.kernels.unroll import consecutive, fma, put, unroll
 
 # How many rows of a matrix are added at once, and in how many columns.
 TERMS = WIDTH = 8
-_OF_TERMS = 0.5 if HAS_FMA else 0.75  # see `next_term`
+OF_TERMS = 0.5 if HAS_FMA else 0.75  # see `next_term`
 
 
 def angles(n):
@@ -245,7 +245,7 @@ def _doubts(sizes, ulps, out):
             elif not size <= last and last == last:  # NaN stays
                 last = size
         for k in range(n):
-            rounding += sizes[r, k] * (4.0 + k + (_OF_TERMS + ulps) * k * k)
+            rounding += sizes[r, k] * (4.0 + k + (OF_TERMS + ulps) * k * k)
         rate = min(max(last / (before + 1e-300), 0.1), 0.9)
         out[0, r] = 4.0 * last / (1.0 - rate)
         out[1, r] = rounding

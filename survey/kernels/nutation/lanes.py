@@ -310,7 +310,12 @@ def parameter(gap, near, far, q_far, root_near, incline, g, xy):
     here = q_far * near
     both = here + g * far
     # all known before one is chosen: vector code, where a branch would keep the loop from it
-    over, square, under, across = both * both, gap * gap * g, 4.0 * here * far, near * far * line * line
+    over, square, under, across = (
+        both * both,
+        gap * gap * g,
+        4.0 * here * far,
+        near * far * line * line,
+    )
     return over if slanted else square, xy * (under if slanted else across), line
 
 

@@ -7,6 +7,14 @@ from survey.kernels.libration import traces
 from survey.kernels.libration.traces import PAIRS, PAIRS_BAR, SUM, SUM_BAR, UNDECIDED
 from survey.measures import answers
 
+_NO_RESULTS = np.empty((0, traces.RESULTS))
+_NO_ROWS = (
+    np.empty((0, traces.INVARIANTS, traces.NODES)),
+    np.empty((0, traces.INVARIANTS)),
+    np.empty(0, np.int64),
+    np.empty((0, 0)),
+)
+
 
 class Answers(answers.Answers):
     """`floats` (4, N): a, b, each followed by its error bound; `verdict` and `collision`."""
@@ -22,7 +30,11 @@ class Answers(answers.Answers):
 
     def assess(self, results, rtol):
         """Answer every point whose status is ok from its results (N, RESULTS)."""
-        traces.measure(results, rtol, status.OVERFLOW, *self.all)
+        traces.answer(results, *_NO_ROWS, rtol, status.OVERFLOW, *self.all)
+
+    def of_rows(self, series, bars, rows, mu, rtol):
+        """Answer the `missed` points of `rows` of mu (R, L) from the rows' series and their bars."""
+        traces.answer(_NO_RESULTS, series, bars, rows, mu, rtol, status.OVERFLOW, *self.all)
 
     def inaccurate(self, rtol):
         """Which points have error bounds above rtol (1 + |value|), or no answer (N)."""

@@ -138,7 +138,7 @@ def _by_series(e, mu, rtol, answers, left):
     some = np.flatnonzero(left.any(axis=1))
     series, bars = panels.rows(e[some])
     answers.missed |= left.reshape(-1)
-    traces.dense(series, bars, some, mu, rtol, status.OVERFLOW, *answers.all)
+    answers.of_rows(series, bars, some, mu, rtol)
 
 
 def _by_steps(e, mu, method, rtol, answers):
