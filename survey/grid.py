@@ -108,29 +108,15 @@ class Grid:
             aligned[name] = part.copy()
         return aligned
 
-    def ends_and_middles(self, extremes=frozenset()):
-        """{name: values (N)} of the points at the ends and middles of all dimensions; on the axes that
-        parameters in `extremes` have alone, at their least and greatest values.
-        """
-        some = {dim: sorted({0, size // 2, size - 1}) for dim, size in self.sizes.items()}
-        for name, (_, low, high) in self.lines.items():
-            (dim,), values = self.parameters[name]
-            if name in extremes and low < high:
-                some[dim] = [_where(values, end) for end in (low, high)]
-        index = dict(zip(some, np.ix_(*some.values()), strict=True))
-        shape = tuple(map(len, some.values()))
+    def ends_and_middles(self):
+        """{name: values (N)} of the points at the ends and middles of all dimensions."""
+        some = [sorted({0, size // 2, size - 1}) for size in self.shape]
+        index = dict(zip(self.sizes, np.ix_(*some), strict=True))
+        shape = tuple(map(len, some))
         return {
             name: np.broadcast_to(values[tuple(index[dim] for dim in dims)], shape).ravel()
             for name, (dims, values) in self.parameters.items()
         }
-
-
-def _where(values, wanted):
-    """An index at which the `wanted` one of the values is: an end, as a rule."""
-    for index in (0, len(values) - 1):
-        if values[index] == wanted:
-            return index
-    return int((values == wanted).argmax())
 
 
 def lines(parameters, alone=None):
@@ -145,7 +131,7 @@ def lines(parameters, alone=None):
 
 def ranges(parameters, alone=None):
     """{name: (number, least, greatest)} of each parameter that shares an axis with another, as `lines`;
-    found when asked for, as few scenes do.
+    each is found when it is asked for: few scenes ask.
     """
     alone = _alone(parameters) if alone is None else alone
     return _Ranges({n: of for n, (dims, of) in parameters.items() if dims and n not in alone})

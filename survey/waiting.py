@@ -19,7 +19,7 @@ _waited = 0.0
 
 def wait(name):
     """Wait for what has this name, or else for all that is compiled elsewhere: it is done sooner than
-    if this process began now, which compiles meanwhile what stores error bars.
+    if this process began now. Meanwhile it compiles what stores error bars.
     """
     global _waited
     function = other_compiler

@@ -133,13 +133,3 @@ def test_ends_and_middles_are_those_points_of_the_whole_grid():
     assert found["c"].tolist() == [100, 105, 102, 107, 104, 109]
     alone = Grid({}, {"a": ((), np.array(3.0))}).ends_and_middles()
     assert alone["a"].tolist() == [3]
-
-
-def test_of_an_axis_the_least_and_the_greatest_values_may_be_enough():
-    a, b = np.array([2.0, np.nan, 7.0, -1.0, 3.0]), np.array([4.0, 4.0])
-    pair = ("p",), np.arange(5.0)
-    given = {"a": (("a",), a), "b": (("b",), b), "c": pair, "d": pair}
-    found = Grid({"a": 5, "b": 2, "p": 5}, given).ends_and_middles({"a", "b", "c"})
-    assert sorted(set(found["a"])) == [-1.0, 7.0]
-    assert found["b"].size == 2 * 2 * 3  # no range, and an axis that others share
-    assert sorted(set(found["c"])) == [0.0, 2.0, 4.0]

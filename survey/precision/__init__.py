@@ -337,6 +337,8 @@ def _solver(module, method, error):
         floquet.panels.cache_clear()
         fate.forget()
         basins.forget()
+        if hasattr(module, "forget"):
+            module.forget()
         return module.solve(
             {key: v if v.ndim else v.reshape((1,) * ndim) for key, v in arrays.items()}, request
         )

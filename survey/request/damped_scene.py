@@ -77,11 +77,6 @@ class DampedScene(FunctionScene):
         """Seconds per point, roughly."""
         return self._inner.cost(options, sizes)
 
-    @property
-    def linear(self):
-        """As of the undamped equation."""
-        return self._inner.linear
-
     def check(self, points):
         """Raise BadInput if z cannot be used at these points (N, n)."""
         self._inner.check(points)

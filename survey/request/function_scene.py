@@ -52,11 +52,6 @@ class FunctionScene:
         """All parameters: those of the functions, unless a family adds its own."""
         return self.own
 
-    @property
-    def linear(self) -> frozenset[str]:
-        """The names of parameters between whose least and greatest values `check` finds nothing new."""
-        return frozenset()
-
     def check(self, points: Any) -> None:
         """Raise BadInput if the functions are wrong at these points (N, n)."""
         raise NotImplementedError

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -37,8 +37,9 @@ SYMBOLS = {"y1": "y_1(T)", "y2": "y_2(T)", "dy1": "y_1'(T)", "dy2": "y_2'(T)"}
 SAME = 8 * user_equation.SLACK
 # Points of an axis from which on rows pay.
 LANES = 8
-# The most points whose measures are kept: the corners of a map are asked for twice.
-KEPT = 16
+# Of at most so many points at once what is measured is kept, and of so many in all: the corners of a map are
+# asked for twice.
+FEW, KEPT = 32, 256
 # Meaning of two of the common codes here.
 STATUS = {
     "invalid_parameters": "outside the domain, or z or T is not finite there, or z is declared even but is not",
@@ -99,7 +100,8 @@ class HillScene(FunctionScene):
 
     def cost(self, options, sizes):
         """Seconds per point, roughly: those of rows share their samples."""
-        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
+        number = len(self.PARAMETERS)
+        of_z, of_ranges = _degrees(self, ((1.0, 1.0),) * number, (None,) * number)
         names = [p.name for p in self.PARAMETERS]
         rows = [
             sizes.get(name, 1) >= LANES and of_z[i] <= 1 and not of_ranges[i]
@@ -123,8 +125,9 @@ class HillScene(FunctionScene):
 
     def _solve_points(self, points, request):
         """The outputs (N, 1) of points one by one."""
-        problem, rough = self._called(user_equation.problem, self._equation, points)
-        return self._answers(problem, rough, points, request)
+        ranges = self._ranges(points)
+        problem, rough = self._called(user_equation.problem, self._equation, points, ranges)
+        return self._answers(problem, rough, ranges[0], request)
 
     @cached_property
     def _equation(self):
@@ -132,14 +135,33 @@ class HillScene(FunctionScene):
             self.z, self.HASH, self.EVEN, self._ranges, self._measured, self._more_digits
         )
 
-    def _measured(self, points):
-        """What steps need of z at these points (N, n): see `user_equation.measured`."""
-        if len(points) <= KEPT:
-            return _measured(self, points.shape, points.tobytes())
-        return self._measured_anew(points)
+    @cached_property
+    def _kept(self):
+        """{a point and its edges: its Measured}."""
+        return {}
 
-    def _measured_anew(self, points, probes=user_equation.PROBES, mirrored=True):
-        period, edges, slack = self._ranges(points)
+    def forget(self):
+        """Measure everything anew: what is timed includes it."""
+        self._kept.clear()
+
+    def _measured(self, points, ranges):
+        """What steps need of z at these points (N, n) with these ranges: see `user_equation.measured`."""
+        if len(points) > FEW:
+            return self._measured_anew(points, ranges)
+        keys = [
+            point.tobytes() + own.tobytes() for point, own in zip(points, ranges[1], strict=True)
+        ]
+        known = [self._kept.get(key) for key in keys]
+        if any(one is None for one in known):
+            found = self._measured_anew(points, ranges)
+            if len(self._kept) + len(keys) > KEPT:
+                self._kept.clear()
+            self._kept.update(zip(keys, zip(*found, strict=True), strict=True))
+            return found
+        return user_equation.Measured(*map(np.array, zip(*known, strict=True)))
+
+    def _measured_anew(self, points, ranges, probes=user_equation.PROBES, mirrored=True):
+        period, edges, slack = ranges
         period = period if self.EVEN and mirrored else None
         return user_equation.measured(self.z, points, edges, period, slack, probes)
 
@@ -148,7 +170,10 @@ class HillScene(FunctionScene):
         rough = np.zeros(len(points), np.bool_)
 
         def problem_of(left):
-            problem, rough[left] = self._called(user_equation.problem, self._equation, points[left])
+            some = points[left]
+            problem, rough[left] = self._called(
+                user_equation.problem, self._equation, some, self._ranges(some)
+            )
             return problem
 
         box = user_rows.box(self._equation, axes, points[0])
@@ -158,7 +183,8 @@ class HillScene(FunctionScene):
             monodromy.solve_scattered, box, position, p, problem_of, request.rtol, request.variables,
             {name: array.reshape(-1) for name, array in request.out.items()},
         )  # fmt: skip
-        return self._labelled(out, rough, points, request.variables)
+        period = np.full(len(points), self._ranges(points[:1])[0][0])
+        return self._labelled(out, rough, period, request.variables)
 
     def _box_axes(self, point, request):
         """The parameters on the axes of a box that holds points on their own, two of which alone
@@ -180,19 +206,30 @@ class HillScene(FunctionScene):
         number = monodromy.boxed(min(given[0] for given in ranges.values()))
         if number is None or any(not given[2] > given[1] for given in ranges.values()):
             return None
-        of_z, _ = _dependence(self, self._numbers(point, request))
+        of_z, _ = self._dependence(point, request)
         for lane, across in (free, free[::-1]):
             if of_z[lane] <= 1 and of_z[across] <= dependence.ENTIRE:
                 ends = ((number, *ranges[i][1:]) for i in (lane, across))
                 return user_rows.Axes(lane, next(ends), across, next(ends), of_z[across] <= 1)
         return None
 
-    def _numbers(self, point, request):
-        """The parameters that are single numbers; None for others."""
-        names = [p.name for p in self.PARAMETERS]
-        return tuple(
-            float(np.ravel(point[name])[0]) if name in request.fixed else None for name in names
-        )
+    def _dependence(self, point, request):
+        """`_degrees` for what is asked: some parameters are single numbers, others have an axis."""
+        fixed, spans = [], []
+        for p in self.PARAMETERS:
+            alone = p.name in request.fixed
+            value = float(np.ravel(point[p.name])[0]) if alone else None
+            fixed.append(value)
+            spans.append((value, value) if alone else (1.0, 1.0))
+            if not alone and (callable(self.period) or callable(self.breaks)):
+                spans[-1] = (request.line(p.name) or request.ranges[p.name])[1:]
+        return _degrees(self, tuple(spans), tuple(fixed))
+
+    def _spans(self, points):
+        """The least and the greatest value of each parameter at the points, if they matter."""
+        if callable(self.period) or callable(self.breaks):
+            return tuple(zip(points.min(axis=0).tolist(), points.max(axis=0).tolist(), strict=True))
+        return ((1.0, 1.0),) * points.shape[1]
 
     def _solve_rows(self, point, request, axes):
         """As `solve`, in rows along an axis of which z is a linear function."""
@@ -207,12 +244,13 @@ class HillScene(FunctionScene):
         out = {}
         families = self._families(points, axes)
         for rows in families:
+            ranges = self._ranges(points[rows])
             problem, rough, bad = self._called(
-                user_rows.problem, self._equation, axes, points[rows], lanes[rows]
+                user_rows.problem, self._equation, axes, points[rows], lanes[rows], ranges
             )
             bad = np.flatnonzero(bad)
             into = {} if bad.size or len(families) > 1 else block.straight(request.out)
-            found = self._answers(problem, rough, points[rows], request, into)
+            found = self._answers(problem, rough, ranges[0], request, into)
             if bad.size:  # z may be smooth, or finite, at some of its points
                 alone = np.repeat(points[rows[bad]], lanes.shape[1], axis=0)
                 alone[:, axes.lane] = lanes[rows[bad]].reshape(-1)
@@ -237,17 +275,16 @@ class HillScene(FunctionScene):
         _, family = np.unique(others, axis=0, return_inverse=True)
         return [np.flatnonzero(family.reshape(-1) == i) for i in range(family.max() + 1)]
 
-    def _answers(self, problem, rough, points, request, out=NOTHING):
+    def _answers(self, problem, rough, period, request, out=NOTHING):
         out = self._called(
             monodromy.solve, problem, request.method, request.rtol, request.variables, out
         )
-        return self._labelled(out, rough, points, request.variables)
+        return self._labelled(out, rough, period, request.variables)
 
-    def _labelled(self, out, rough, points, wanted):
+    def _labelled(self, out, rough, period, wanted):
         """The outputs with the period, if it is wanted, and the status of points whose z is rough."""
         out["status"][rough] = status.NO_CONVERGENCE
         if "period" in wanted:
-            period = self._ranges(points)[0]
             out["period"] = np.where(out["status"] == status.OK, period[:, None], np.nan)
             out["period_error"] = (4 if callable(self.period) else 1) * EPS * out["period"]
         return out
@@ -261,7 +298,7 @@ class HillScene(FunctionScene):
         }
         if not lines:
             return None
-        of_z, of_ranges = _dependence(self, self._numbers(point, request))
+        of_z, of_ranges = self._dependence(point, request)
         lanes = [i for i in lines if of_z[i] <= 1 and not of_ranges[i]]
         if not lanes:
             return None
@@ -305,7 +342,7 @@ class HillScene(FunctionScene):
         """Solutions and multipliers of a point (see `survey.scenes`), damped or not."""
         points = np.array([[point[p.name] for p in self.PARAMETERS]])
         problem, _ = self._called(
-            user_equation.problem, replace(self._equation, exact=None), points
+            user_equation.problem, replace(self._equation, exact=None), points, self._ranges(points)
         )
         return motion.solve(problem, answer, time, "u", damping)
 
@@ -393,15 +430,6 @@ class HillScene(FunctionScene):
         ]
         return lambda u: z(u, p), [mp.mpf(0), *rows, end]
 
-    @property
-    def linear(self):
-        """The names of the parameters that z is linear in: between two of their values it is a mean,
-        as smooth, as even and with no other spikes.
-        """
-        of_z, of_ranges = _dependence(self, (None,) * len(self.PARAMETERS))
-        degrees = zip(self.PARAMETERS, of_z, of_ranges, strict=True)
-        return frozenset(p.name for p, z, ranges in degrees if z <= 1 and not ranges)
-
     def check(self, points):
         """Raise BadInput if z cannot be compiled, or contradicts the scene's other entries at these
         points (N, n).
@@ -412,7 +440,7 @@ class HillScene(FunctionScene):
         self._try(points[0] if len(points) else np.ones(len(self.PARAMETERS)))
         if not len(points):
             return
-        period, edges, _ = self._ranges(points)
+        ranges = period, edges, _ = self._ranges(points)
         if np.isnan(period).all():
             where = self._where(points[0])
             self._refuse(f"PERIOD is {self._period(points[0]):g} at {where}", "make it positive")
@@ -421,7 +449,7 @@ class HillScene(FunctionScene):
             self._refuse(
                 f"BREAKS lie outside 0 <= u <= T at {where}", "name positions within a period"
             )
-        size, _, scale, rough, spikeless = self._called(self._measured, points)
+        size, _, scale, rough, spikeless = self._called(self._measured, points, ranges)
         finite = np.isfinite(size).all(axis=1)
         if not finite.any():
             self._refuse(
@@ -432,40 +460,48 @@ class HillScene(FunctionScene):
             remedy = "name the positions where it jumps or has a kink in BREAKS"
             self._refuse(f"z is not smooth at {self._where(points[i])}", remedy)
         for i in np.flatnonzero(finite & np.isnan(scale)):
-            period = self._ranges(points[i : i + 1])[0][0]
             self._refuse(
-                f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period:g}",
+                f"EVEN = True, but z(T - u) is not z(u) at {self._where(points[i])}, T = {period[i]:g}",
                 "set EVEN = False, or correct z or PERIOD",
             )
         hidden = finite & ~spikeless
         if hidden.any():
-            self._check_spikes(points[hidden])
+            hidden &= self._at_ends(points)
+            self._check_spikes(points[hidden], [values[hidden] for values in ranges])
         if not self.EVEN:
-            self._check_period(points, size.max(axis=1))
+            self._check_period(points, period, size.max(axis=1))
 
-    def _check_spikes(self, points):
+    def _at_ends(self, points):
+        """Which of the points (N, n) lie at the least or greatest value of each parameter that z is
+        linear in: a mean of two z has no other spikes than these.
+        """
+        of_z, of_ranges = _degrees(self, self._spans(points), (None,) * len(self.PARAMETERS))
+        linear = [z <= 1 and not ranges for z, ranges in zip(of_z, of_ranges, strict=True)]
+        own = points[:, linear]
+        return ((own == own.min(axis=0)) | (own == own.max(axis=0))).all(axis=1)
+
+    def _check_spikes(self, points, ranges):
         """Refuse features of z that a much finer sampling shows, but that of a run does not."""
+        if not len(points):
+            return
         one, fine = (
-            self._called(self._measured_anew, points, probes, False)
+            self._called(self._measured_anew, points, ranges, probes, False)
             for probes in (user_equation.PROBES, user_equation.CHECKED)
         )
-        edges = self._ranges(points)[1]
         for i in np.flatnonzero((one.rate != fine.rate).any(axis=1) | (one.rough != fine.rough)):
-            u = np.linspace(0, edges[i, -1], user_equation.CHECKED)
-            position = u[
-                3
-                + abs(np.diff(user_equation.at(self.z, points[i : i + 1], u[None])[0], 6)).argmax()
-            ]
+            u = np.linspace(0, ranges[1][i, -1], user_equation.CHECKED)
+            values = self._called(user_equation.at, self.z, points[i : i + 1], u[None])[0]
+            position = u[3 + abs(np.diff(values, 6)).argmax()]
             narrow = f"too narrow to be seen by {self._sampling}"
             self._refuse(
                 f"z has a spike near u = {position:.6g} at {self._where(points[i])}, {narrow}",
                 "name its position in BREAKS",
             )
 
-    def _check_period(self, points, size):
+    def _check_period(self, points, period, size):
         """Refuse z(T) that is not z(0), unless z jumps there."""
-        period = self._ranges(points)[0]
-        ends = user_equation.at(self.z, points, np.stack([0 * period, period], axis=1))
+        u = np.stack([0 * period, period], axis=1)
+        ends = self._called(user_equation.at, self.z, points, u)
         for i in np.flatnonzero(abs(ends[:, 1] - ends[:, 0]) > user_equation.MIRRORED * size):
             breaks = np.atleast_1d(self._value("BREAKS", self.breaks, points[i]))
             if (
@@ -536,24 +572,24 @@ def _checked(scene, shape, values):
 
 
 @lru_cache(maxsize=64)
-def _measured(scene, shape, values):
-    # kernels would be compiled again for what is read-only
-    return scene._measured_anew(np.frombuffer(values).reshape(shape).copy())
-
-
-@lru_cache(maxsize=64)
-def _dependence(scene, fixed):
+def _degrees(scene, spans, fixed):
     """The degrees of z, and of the period and the breaks, in each parameter but those `fixed`
     numbers; OPAQUE if unknown.
+
+    `spans`: the least and the greatest value of each parameter. Where these change the period or the
+    breaks, z is run on the periods of all their corners, as it may branch on u.
     """
     nothing = [dependence.OPAQUE] * len(fixed)
-    example = np.array([[1.0 if value is None else value for value in fixed]])
     try:
         ranges = [dependence.degrees(f, fixed) for f in (scene.period, scene.breaks) if callable(f)]
         of_ranges = [max(degrees) for degrees in zip(*ranges, strict=True)] or [0] * len(fixed)
-        _, edges, _ = scene._ranges(example)
-        ends = np.stack([edges[0, :-1], edges[0, 1:]], axis=1)
-        u = ends[:, :1] + np.diff(ends, axis=1) * chebyshev.with_ends(user_equation.SIZES[0])
+        ends = [span if degree else span[:1] for span, degree in zip(spans, of_ranges, strict=True)]
+        _, edges, _ = scene._ranges(np.array(list(product(*ends))))
+        low, high = edges[:, :-1].reshape(-1, 1), edges[:, 1:].reshape(-1, 1)
+        known = (high > low)[:, 0]
+        if not known.any():
+            return nothing, nothing
+        u = (low + (high - low) * chebyshev.with_ends(user_equation.SIZES[0]))[known]
         return dependence.degrees(scene.z, fixed, u[:, 1:-1].ravel().tolist()), of_ranges
     except dependence.Unknown:
         return nothing, nothing

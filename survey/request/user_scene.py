@@ -446,28 +446,14 @@ def check(scene: Any, grid: Any = None) -> None:
     """Raise BadInput if `scene` is a user's and is wrong at the ends and middles of the grid's axes."""
     if not isinstance(scene, FunctionScene):
         return
-    if not grid:
-        _check(scene, np.empty((0, len(scene.own))))
-        return
-    try:
-        _check(scene, _tried(scene, grid, scene.linear))
-    except BadInput:
-        if not scene.linear:
-            raise
-        _check(scene, _tried(scene, grid))  # at the middles it may be right
-
-
-def _tried(scene: FunctionScene, grid: Any, extremes: frozenset[str] = frozenset()) -> Any:
-    """The points (N, n) of the grid within the domains at which a user's scene is tried."""
-    some = grid.ends_and_middles(extremes)
-    values = np.stack([some[p.name] for p in scene.own], axis=1)
-    held = [p.holds(values[:, i]) for i, p in enumerate(scene.own)]
-    return values[np.logical_and.reduce(held)]
-
-
-def _check(scene: FunctionScene, points: Any) -> None:
+    values, inside = np.empty((0, len(scene.own))), np.empty(0, bool)
+    if grid:
+        some = grid.ends_and_middles()
+        values = np.stack([some[p.name] for p in scene.own], axis=1)
+        held = [p.holds(values[:, i]) for i, p in enumerate(scene.own)]
+        inside = np.logical_and.reduce(held)
     with np.errstate(all="ignore"):  # values that are not finite are found by the check
-        scene.check(points)
+        scene.check(values[inside])
 
 
 def of_dataset(ds: Any) -> Any:

@@ -300,6 +300,49 @@ def test_z_that_is_finite_in_the_middle_of_an_axis_alone_is_answered():
     assert (ds.status.values == [INVALID_PARAMETERS, OK, INVALID_PARAMETERS]).all()
 
 
+@pytest.mark.parametrize(
+    ("z", "given", "words"),
+    [
+        (lambda u, p: p[0] + 1e-6 * math.sin(2 * u), {"even": True}, r"z\(T - u\) is not z\(u\)"),
+        (lambda u, p: p[0] + 1e-6 * abs(math.cos(2 * u) - 0.3), {"even": True}, "not smooth"),
+        (lambda u, p: p[0] + 1e-6 * math.sin(u), {"even": False}, r"z\(T\) is not z\(0\)"),
+    ],
+)
+def test_what_is_wrong_where_z_is_small_is_refused(z, given, words):
+    """Between two values of a parameter z is a mean of both, and may be far smaller."""
+    scene = survey.hill(z, period=math.pi / (1 if given["even"] else 1.5), parameters="a", **given)
+    with pytest.raises(BadInput, match=words + ".* at a = 0"):
+        survey.evaluate(scene, a=[-1000.0, 0.0, 1000.0])
+
+
+def test_branches_on_u_are_seen_over_the_longest_period():
+    """A degree in p found in one branch does not hold in the other: rows would be wrong."""
+
+    def z(u, p):
+        wave = math.cos(math.tau * u / p[1])
+        return p[0] ** 2 + wave if u > 5.0 else p[0] + wave
+
+    given = {"period": lambda p: p[1], "breaks": (0.0, 5.0), "parameters": ("a", "T")}
+    scene = survey.hill(z, **given)
+    a, T = np.linspace(0.1, 2.0, 20), [6.0, 7.0]
+    ds = survey.evaluate(scene, a=a, T=T)
+    alone = survey.evaluate(scene, a=a, T=T, method="taylor16")
+    off = abs(ds.discriminant - alone.discriminant)
+    assert (off <= ds.discriminant_error.astype(float) + alone.discriminant_error).all()
+    assert (ds.verdict == alone.verdict).all()
+
+
+def test_what_z_raises_at_the_ends_of_its_period_is_one_line():
+    def z(u, p):
+        if u == 0.0:
+            raise ValueError("not at 0")
+        return p[0]
+
+    scene = survey.hill(z, period=math.pi, parameters="a", breaks=0.0)
+    with pytest.raises(BadInput, match=r"z\(u, p\) raises ValueError"):
+        survey.evaluate(scene, a=1.0)
+
+
 def test_a_kink_is_refused_where_z_is_linear_in_its_parameters():
     z = survey.hill(
         lambda u, p: p[0] + p[1] * abs(math.cos(u) - 0.3),

@@ -75,8 +75,8 @@ def _sum(c, tile, sums, count):
 
 @kernel
 def neighbours(x, number, kept, left, right, share):
-    """Which of the `kept` first of `number` nodes are on both sides of x (N; `left` and `right`, twice
-    the last where there is none beyond), and the `share` of the way from one to the other.
+    """Which of the `kept` first of `number` nodes are on both sides of x (N; `left` and `right`, the same
+    where there is none beyond), and the `share` of the way from one to the other.
 
     A point nearer to a node than 1e-8 `number` may be given the nodes on that one's other side.
     """

@@ -241,9 +241,9 @@ def _doubts(sizes, ulps, out):
         for k in range(max(n - 8, 0), n):
             size = sizes[r, k]
             if k < n - 4:
-                before = max(before, size)
-            elif not size <= last and last == last:  # NaN stays
-                last = size
+                before = before if size <= before or before != before else size  # NaN stays
+            else:
+                last = last if size <= last or last != last else size
         for k in range(n):
             rounding += sizes[r, k] * (4.0 + k + (OF_TERMS + ulps) * k * k)
         rate = min(max(last / (before + 1e-300), 0.1), 0.9)

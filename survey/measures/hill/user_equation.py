@@ -71,9 +71,15 @@ def kernels(z):
     @fresh
     def sample(points, u, out):
         for i in range(u.shape[0]):
-            for j in range(u.shape[1]):
-                for k in range(len(points)):  # what does not depend on p is computed before this
-                    out[k, i, j] = z(u[i, j], points[k, i])
+            if len(points) == 1:
+                for j in range(u.shape[1]):
+                    out[0, i, j] = z(u[i, j], points[0, i])
+            else:
+                for j in range(u.shape[1]):
+                    for k in range(
+                        len(points)
+                    ):  # what does not depend on p is computed before this
+                        out[k, i, j] = z(u[i, j], points[k, i])
 
     @fresh
     def probe(points, ends, values, size, x, number, missed):
@@ -141,10 +147,10 @@ def at(z, points, u):
 
 @dataclass(frozen=True)
 class Equation:
-    """Hill's equation with a user's z, named by the hashable `key`.
+    """Hill's equation with a user's z; equal `key`s (hashable) mean the same equation.
 
-    `ranges(points)`: periods, edges and slack of points (N, n), and `measured(points)` the Measured,
-    as `problem` takes and `measured` gives them. `exact(point, edges)`, if given: z(u) and the
+    `ranges(points)` gives the periods (N), edges (N, P + 1) and slack (N) of points (N, n), and
+    `measured(points, ranges)` their Measured. `exact(point, edges)`, if given, gives z(u) and the
     `edges` (P + 1) of a point in more digits (`multiprecision`).
     """
 
@@ -230,15 +236,15 @@ class Steps:
         return np.clip(start + h * nodes, low, high)
 
 
-def problem(equation, points):
-    """The Hill problem of an `Equation` at the points (N, n), and where z is `rough`, not smooth
-    between its breaks.
+def problem(equation, points, ranges):
+    """The Hill problem of an `Equation` at the points (N, n) with these `ranges`, and where z is
+    `rough`, not smooth between its breaks.
 
     Points whose z is rough, not finite, or not even where it should be, have span NaN.
     """
     z = equation.z
-    _, edges, slack = equation.ranges(points)
-    size, rate, scale, rough, _ = equation.measured(points)
+    _, edges, slack = ranges
+    size, rate, scale, rough, _ = equation.measured(points, ranges)
     steps = Steps(edges, slack, size, rate)
 
     def sample(rows, nodes, number):

@@ -30,16 +30,18 @@ class Axes:
     linear: bool = False
 
 
-def problem(equation, axes, points, lanes, known=None):
-    """The Hill problem of an `Equation` in rows of `points` (R, n) by `lanes` (R, L), where a row is
-    `rough` (R), and where its span is NaN, as z is rough or not finite (R).
+def problem(equation, axes, points, lanes, ranges, known=None):
+    """The Hill problem of an `Equation` in rows of `points` (R, n) with these `ranges` by `lanes` (R, L),
+    where a row is `rough` (R), and where its span is NaN, as z is rough or not finite (R).
 
     `known`: what `_from_corners` gave for their map.
     """
     z = equation.z
-    _, edges, slack = equation.ranges(points)
-    known = known or _from_corners(equation, axes, points)
-    sizes, rate, scale, rough = known(points) if known else _measured(equation, axes, points)
+    _, edges, slack = ranges
+    known = known or _from_corners(equation, axes, points, ranges)
+    sizes, rate, scale, rough = (
+        known(points) if known else _measured(equation, axes, points, ranges)
+    )
     bad = rough | np.isnan(scale)
 
     @cache
@@ -81,19 +83,20 @@ def problem(equation, axes, points, lanes, known=None):
     return own, rough, bad
 
 
-def _measured(equation, axes, points):
+def _measured(equation, axes, points, ranges):
     """What steps need of z in rows of `points` (R, n): its size (2, R, P) at both ends of the rows, its
     rate (R, P) and scale (R), and where it is `rough` (R); see `user_equation.measured`.
     """
     ends = np.repeat(points, 2, axis=0)
     ends[::2, axes.lane], ends[1::2, axes.lane] = axes.line[1:]
+    known = equation.measured(ends, [np.repeat(values, 2, axis=0) for values in ranges])
     size, rate, scale, rough = (
-        values.reshape(len(points), 2, *values.shape[1:]) for values in equation.measured(ends)[:4]
+        values.reshape(len(points), 2, *values.shape[1:]) for values in known[:4]
     )
     return size.swapaxes(0, 1), rate.max(axis=1), scale.max(axis=1), rough.any(axis=1)
 
 
-def _from_corners(equation, axes, points):
+def _from_corners(equation, axes, points, ranges):
     """The function of points (R, n) that gives what `_measured` does, bounds from the corners of their
     map; None where z has to be measured row by row.
     """
@@ -101,7 +104,8 @@ def _from_corners(equation, axes, points):
         return None
     low, high = axes.row_line[1:]
     ends = _with(np.repeat(points[:1], 2, axis=0), axes.across, [low, high])
-    size, rate, scale, rough = _measured(equation, axes, ends)
+    same = [np.repeat(values[:1], 2, axis=0) for values in ranges]  # neither axis changes them
+    size, rate, scale, rough = _measured(equation, axes, ends, same)
     if rough.any() or np.isnan(scale).any():
         return None
     rates = rate.max(axis=0)[None]
@@ -129,7 +133,8 @@ def _row_axis(equation, axes, points, known):
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
         lanes = np.zeros((positions.size, 0))
-        return problem(nodes, Axes(axes.lane, axes.line), own, lanes, known)[0]
+        one_axis = Axes(axes.lane, axes.line)
+        return problem(nodes, one_axis, own, lanes, equation.ranges(own), known)[0]
 
     return monodromy.RowAxis((equation.key, axes, others), *axes.row_line, at=rows_at)
 
@@ -139,7 +144,8 @@ def box(equation, axes, point):
     of a `point`.
     """
     point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
-    row_axis = _row_axis(equation, axes, point, _from_corners(equation, axes, point))
+    known = _from_corners(equation, axes, point, equation.ranges(point))
+    row_axis = _row_axis(equation, axes, point, known)
     return monodromy.Box(row_axis, axes.line, full_period=not equation.even)
 
 

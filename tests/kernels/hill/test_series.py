@@ -56,16 +56,20 @@ def test_lagranges_polynomials_are_bounded_at_and_beside_their_nodes(magnitudes,
 @pytest.mark.parametrize("half", [False, True])
 def test_nodes_around_a_point_are_those_by_the_angle(number, half):
     rng = np.random.default_rng(number)
-    x = np.concatenate([rng.uniform(-1, 1, 5000), [-1.0, 0.0, 1.0, 1.0 + 2.0**-52]])
+    x = np.concatenate(
+        [rng.uniform(-1, 1, 5000), [-1.0, 0.0, 1.0, 1.0 + 2.0**-52, -np.inf, np.inf]]
+    )
     kept = (number + 1) // 2 if half else number
     left, right = np.empty((2, x.size), np.int64)
     share = np.empty(x.size)
     neighbours(x, number, kept, left, right, share)
-    node = np.arccos(np.clip(x, -1.0, 1.0)) * number / np.pi - 0.5
-    assert (np.clip(node, 0, kept - 1) - left - share < 1e-5).all()
-    assert (left - np.clip(node, 0, kept - 1) < 1e-5).all()
+    node, near = np.arccos(np.clip(x, -1.0, 1.0)) * number / np.pi - 0.5, 1e-8 * number
+    assert (np.clip(node, 0, kept - 1) - left - share < near).all()
+    assert (left - np.clip(node, 0, kept - 1) < near).all()
     assert ((right - left == 1) | ((right == left) & (share == 0))).all()
-    assert ((left == 0) | (left - node < 1e-5)).all()
-    assert ((right == kept - 1) | (node - right < 1e-5)).all()
-    inside = (node > 1e-5) & (node < kept - 1 - 1e-5)
-    assert abs(left + share - node)[inside].max(initial=0.0) < 1e-5
+    assert ((left == 0) | (left - node < near)).all()
+    assert ((right == kept - 1) | (node - right < near)).all()
+    inside = (node > near) & (node < kept - 1 - near)
+    assert abs(left + share - node)[inside].max(initial=0.0) < near
+    neighbours(np.array([np.nan]), number, kept, left[:1], right[:1], share[:1])
+    assert 0 <= left[0] <= right[0] < kept and 0 <= share[0] < 1

@@ -41,6 +41,13 @@ def test_the_tail_holds_what_a_series_leaves_out():
             assert chebyshev.tail(sizes[:n]) >= sizes[n:].sum()
 
 
+@pytest.mark.parametrize("at", range(8))
+def test_the_tail_of_what_is_unknown_is_unknown(at):
+    sizes = np.full((3, 8), 1e-3)
+    sizes[1, at] = np.nan
+    assert np.isnan(chebyshev.tail(sizes)).tolist() == [False, True, False]
+
+
 @pytest.mark.parametrize("terms", [5, 8, 29])
 @pytest.mark.parametrize("columns", [3, 8, 21])
 def test_the_bits_of_a_sum_depend_on_no_other(terms, columns):
