@@ -81,30 +81,16 @@ def _settle(tile, rtol, overflow, floats, verdict, collision, missed, status):
         tile[K, i], tile[K_BAR, i] = discriminant(t, ab, cd, t_bar, ab_bar, cd_bar)
     for i in range(len(status)):
         t, t_bar, k, k_bar = tile[T, i], tile[T_BAR, i], tile[K, i], tile[K_BAR, i]
-        given = (
-            t,
-            t - 2.0,
-            tile[AB, i],
-            tile[CD, i],
-            k,
-            t_bar,
-            tile[AB_BAR, i],
-            tile[CD_BAR, i],
-            k_bar,
-        )
+        ab, ab_bar, cd, cd_bar = tile[AB, i], tile[AB_BAR, i], tile[CD, i], tile[CD_BAR, i]
+        given = t, t - 2.0, ab, cd, k, t_bar, ab_bar, cd_bar, k_bar
         found = decide(*given)
         alike = (tile[B, i] > 0.0) == (tile[D, i] > 0.0)
         first, where_lost = nearest(t, k, t_bar, k_bar), lost(*given)
         if_stable = MINUS_ONE if alike else first
         meeting = where_lost if found == UNSTABLE else if_stable
         tile[DECIDED, i], tile[MEETING, i] = found, UNDECIDED if found == UNDECIDED else meeting
-    for own, row in (
-        (SUM, OWN_SUM),
-        (SUM_BAR, OWN_SUM_BAR),
-        (PAIRS, OWN_PAIRS),
-        (PAIRS_BAR, OWN_PAIRS_BAR),
-    ):
-        _keep(tile, row, floats[own])
+    for row in range(len(floats)):  # SUM to PAIRS_BAR
+        _keep(tile, OWN_SUM + row, floats[row])
     for i in range(len(status)):
         wide = inaccurate(
             tile[OWN_SUM, i], tile[OWN_SUM_BAR, i], tile[OWN_PAIRS, i], tile[OWN_PAIRS_BAR, i], rtol

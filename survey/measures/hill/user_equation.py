@@ -74,11 +74,9 @@ def kernels(z):
             if len(points) == 1:
                 for j in range(u.shape[1]):
                     out[0, i, j] = z(u[i, j], points[0, i])
-            else:
+            else:  # at one u after another: what does not depend on p is computed once
                 for j in range(u.shape[1]):
-                    for k in range(
-                        len(points)
-                    ):  # what does not depend on p is computed before this
+                    for k in range(len(points)):
                         out[k, i, j] = z(u[i, j], points[k, i])
 
     @fresh

@@ -38,7 +38,7 @@ def problem(equation, axes, points, lanes, ranges, known=None):
     """
     z = equation.z
     _, edges, slack = ranges
-    known = known or _from_corners(equation, axes, points, ranges)
+    known = known or _from_corners(equation, axes, points)
     sizes, rate, scale, rough = (
         known(points) if known else _measured(equation, axes, points, ranges)
     )
@@ -96,7 +96,7 @@ def _measured(equation, axes, points, ranges):
     return size.swapaxes(0, 1), rate.max(axis=1), scale.max(axis=1), rough.any(axis=1)
 
 
-def _from_corners(equation, axes, points, ranges):
+def _from_corners(equation, axes, points):
     """The function of points (R, n) that gives what `_measured` does, bounds from the corners of their
     map; None where z has to be measured row by row.
     """
@@ -104,8 +104,7 @@ def _from_corners(equation, axes, points, ranges):
         return None
     low, high = axes.row_line[1:]
     ends = _with(np.repeat(points[:1], 2, axis=0), axes.across, [low, high])
-    same = [np.repeat(values[:1], 2, axis=0) for values in ranges]  # neither axis changes them
-    size, rate, scale, rough = _measured(equation, axes, ends, same)
+    size, rate, scale, rough = _measured(equation, axes, ends, equation.ranges(ends))
     if rough.any() or np.isnan(scale).any():
         return None
     rates = rate.max(axis=0)[None]
@@ -128,7 +127,7 @@ def _row_axis(equation, axes, points, known):
     """The axis across the rows; all other parameters are the same in these `points`."""
     same = points[:1]
     others = tuple(np.delete(same[0], [axes.lane, axes.across]).tolist())
-    nodes = replace(equation, exact=None)  # their bars are wide enough for float64
+    nodes = replace(equation, exact=None)  # nodes are solved in float64
 
     def rows_at(positions):
         own = _with(np.repeat(same, positions.size, axis=0), axes.across, positions)
@@ -144,8 +143,7 @@ def box(equation, axes, point):
     of a `point`.
     """
     point = _with(_with(point[None], axes.lane, axes.line[1]), axes.across, axes.row_line[1])
-    known = _from_corners(equation, axes, point, equation.ranges(point))
-    row_axis = _row_axis(equation, axes, point, known)
+    row_axis = _row_axis(equation, axes, point, _from_corners(equation, axes, point))
     return monodromy.Box(row_axis, axes.line, full_period=not equation.even)
 
 
