@@ -79,8 +79,10 @@ def solve(e, mu, method="auto", rtol=1e-10, dense=False):
         points = np.flatnonzero((valid & (mu > 0)).reshape(-1) & answers.unsettled)
         if points.size:
             danby_double.solve(e, mu, rtol, answers, points, dense)
-    answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
-    answers.floats[:, answers.status != status.OK] = np.nan
+    if not valid.all():
+        answers.status[~valid.reshape(-1)] = status.INVALID_PARAMETERS
+    if answers.status.any():  # not all are OK
+        answers.floats[:, answers.status != status.OK] = np.nan
     names = ("a", "a_error", "b", "b_error")
     out = dict(zip(names, answers.floats.reshape(4, *mu.shape), strict=True))
     return out | {
