@@ -13,10 +13,10 @@ from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
 from survey.kernels.libration.traces import INVARIANTS, NODES, TILE, coordinate
 from survey.kernels.math import double as dd
+from survey.kernels.math.chebyshev import add_turns
 from survey.kernels.math.roundoff import EPS
 
 TERMS = 26  # in y; NODES in 4 s - 3
-VECTOR = 8
 
 
 @kernel
@@ -142,12 +142,12 @@ def rows(e, first, middle, coefficients, bars, series, row_bars):
 @kernel
 def points(e, mu, first, middle, coefficients, lengths, bars, out):
     """Fill `out` (N, RESULTS of `traces`) for points of one panel, whose series (5, TERMS, NODES) is in
-    float64; order k in y has `lengths`[k] terms, whole VECTORs.
+    float64; order k in y has `lengths`[k] terms, a multiple of `chebyshev.TERMS`.
 
     A tile of points at once; what is small is added first.
     """
     growth, part, total = np.empty(TILE), np.empty(TILE), np.empty(TILE)
-    in_y, in_s = np.empty((TERMS, TILE)), np.empty((NODES, TILE))
+    in_y, in_s = np.empty((TERMS, TILE)), np.zeros((NODES, TILE))
     for start in range(0, len(e), TILE):
         count = min(TILE, len(e) - start)
         for i in range(count):
@@ -163,14 +163,9 @@ def points(e, mu, first, middle, coefficients, lengths, bars, out):
             for i in range(count):
                 total[i] = 0.0
             for k in range(TERMS - 1, -1, -1):
-                for i in range(count):
+                for i in range(TILE):
                     part[i] = 0.0
-                for m in range(lengths[k] - VECTOR, -1, -VECTOR):
-                    for i in range(count):
-                        s = part[i]
-                        for n in range(VECTOR - 1, -1, -1):  # a constant, so that it is unrolled
-                            s += coefficients[j, k, m + n] * in_s[m + n, i]
-                        part[i] = s
+                add_turns(coefficients[j, k, : lengths[k]], in_s, part, count)
                 for i in range(count):
                     total[i] += in_y[k, i] * part[i]
             for i in range(count):

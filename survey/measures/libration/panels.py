@@ -18,6 +18,7 @@ from survey.kernels.libration import panels, traces
 from survey.kernels.libration.traces import INVARIANTS
 from survey.kernels.libration.traces_double import NODES
 from survey.kernels.math.chebyshev import OF_TERMS, lebesgue, tail
+from survey.kernels.math.chebyshev import TERMS as VECTOR
 from survey.kernels.math.roundoff import EPS, PAIR_ROUNDOFF, PAIR_SUM_ROUNDOFF
 from survey.measures.libration.answers import Answers
 
@@ -69,7 +70,7 @@ def panel(number):
     trimmed_bars = bars + beyond.sum(axis=(1, 2))
     short = np.ascontiguousarray(trimmed[:, 0])
     counts = (abs(short) > LEAST * abs(short).max(axis=(1, 2), keepdims=True)).any(axis=0)
-    lengths = -(-np.where(counts, IN_S + 1, 0).max(axis=1) // panels.VECTOR) * panels.VECTOR
+    lengths = -(-np.where(counts, IN_S + 1, 0).max(axis=1) // VECTOR) * VECTOR
     lengths[0] = lengths.max()
     left_out = magnitudes.copy()
     left_out[:, : panels.TERMS, : traces.NODES][:, IN_S < lengths[:, None]] = 0.0
