@@ -77,6 +77,10 @@ class DampedScene(FunctionScene):
         """Seconds per point, roughly."""
         return self._inner.cost(options, sizes)
 
+    def forget(self):
+        """As of the undamped equation."""
+        self._inner.forget()
+
     def check(self, points):
         """Raise BadInput if z cannot be used at these points (N, n)."""
         self._inner.check(points)

@@ -12,7 +12,7 @@ import numpy as np
 from survey.kernels import lanes
 from survey.kernels.hill.answers import LARGEST, STABLE, UNDECIDED, UNSTABLE
 from survey.kernels.jit import kernel, splice
-from survey.kernels.math.chebyshev import WIDTH, add_turns, next_term
+from survey.kernels.math.chebyshev import WIDTH, next_term, sum_turns
 from survey.kernels.math.rounding import fill_up
 from survey.kernels.math.roundoff import EPS
 from survey.kernels.unroll import consecutive, put, unroll
@@ -63,14 +63,6 @@ def _next_terms(tile, twice, k, i):
     """T_k from the two before and 2 y, in the row `twice`, in WIDTH lanes from i on."""
     y, last, before = (consecutive(tile, (row, i), WIDTH) for row in (twice, k + (-1), k + (-2)))
     put(tile, (k, i), next_term(y, last, before))
-
-
-@splice
-def _sum(c, tile, sums, count):
-    """sum_k c_k T_k in `count` lanes, and in those up to a multiple of WIDTH; TERMS terms a turn."""
-    for i in range(len(sums)):
-        sums[i] = 0.0
-    add_turns(c, tile, sums, count)
 
 
 @kernel
@@ -140,11 +132,11 @@ def discriminants(
             if n > 0:
                 _lagrange(n, own, table[slot], sums, weights[slot])
         for j in range(start, len(rows) if start + ROWS > len(rows) else start + ROWS):
-            _sum(coefficients[j], table[slot], sums, count)
+            sum_turns(coefficients[j], table[slot], sums, count)
             first = rows[j] * len(x) + t * TILE
             end = first + count
             if n > 0:
-                _sum(at_nodes[j], weights[slot], bounds, count)
+                sum_turns(at_nodes[j], weights[slot], bounds, count)
                 for i in range(count):
                     bounds[i] += doubts[j]
                 _decide_each(sums, bounds, values[first:end], bars[first:end], rounded[first:end], rtol,
@@ -232,7 +224,9 @@ def factors(coefficients, bars, x, even, turns, place, share, full_period, resul
             tile[BEYOND, i] = 1.0 if places[i] % 2 == 0 else 0.0
         for j in range(rows):
             for f in range(FACTOR_COUNT):
-                _sum(coefficients[f, j], odd if even and f == lanes.DY2 else table, tile[f], count)
+                sum_turns(
+                    coefficients[f, j], odd if even and f == lanes.DY2 else table, tile[f], count
+                )
             y1_bar = bars[lanes.Y1, j]
             if even:
                 y1_bar += bars[lanes.DY2, j]
@@ -288,7 +282,7 @@ def points(coefficients, number, bars, x, even, scale, turns, nodes, share, full
             for k in range(terms):
                 if number[f, k] == 0:
                     continue
-                _sum(coefficients[f, k, : number[f, k]], rows, part, count)
+                sum_turns(coefficients[f, k, : number[f, k]], rows, part, count)
                 along = odd[k] if even and f == lanes.DY2 else table[k]
                 for i in range(count):
                     tile[f, i] += along[i] * part[i]
@@ -352,7 +346,7 @@ def discriminants_at(
         for k in range(terms):
             if number[k] == 0:
                 continue
-            _sum(coefficients[k, : number[k]], rows, part, count)
+            sum_turns(coefficients[k, : number[k]], rows, part, count)
             for i in range(count):
                 sums[i] += table[k, i] * part[i]
         begin, end = first + start, first + end

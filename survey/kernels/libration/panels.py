@@ -11,9 +11,9 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel
 from survey.kernels.libration.danby_double import BARS, LOW
-from survey.kernels.libration.traces import INVARIANTS, NODES, TILE, coordinate
+from survey.kernels.libration.traces import INVARIANTS, NODES, TILE, coordinate, cosines
 from survey.kernels.math import double as dd
-from survey.kernels.math.chebyshev import add_turns
+from survey.kernels.math.chebyshev import sum_turns
 from survey.kernels.math.roundoff import EPS
 
 TERMS = 26  # in y; NODES in 4 s - 3
@@ -67,14 +67,6 @@ def position(e, middle):
     """
     far, rest = dd.two_sum(e, -middle[0])
     return 2.0 * artanh((far + (rest - middle[1])) / ((1.0 - e) + e * middle[2]))
-
-
-@inline
-def cosines(out, count):
-    """T_n of out[1] in row n, of the first `count` columns."""
-    for n in range(2, len(out)):
-        for i in range(count):
-            out[n, i] = 2.0 * out[1, i] * out[n - 1, i] - out[n - 2, i]
 
 
 @kernel
@@ -163,9 +155,7 @@ def points(e, mu, first, middle, coefficients, lengths, bars, out):
             for i in range(count):
                 total[i] = 0.0
             for k in range(TERMS - 1, -1, -1):
-                for i in range(TILE):
-                    part[i] = 0.0
-                add_turns(coefficients[j, k, : lengths[k]], in_s, part, count)
+                sum_turns(coefficients[j, k, : lengths[k]], in_s, part, count)
                 for i in range(count):
                     total[i] += in_y[k, i] * part[i]
             for i in range(count):

@@ -17,7 +17,7 @@ import numpy as np
 
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math import double as dd
-from survey.kernels.math.chebyshev import add_turns, next_term
+from survey.kernels.math.chebyshev import sum_turns
 from survey.kernels.math.roundoff import EPS
 
 LARGEST = float(np.finfo(np.float32).max)  # bars are kept as float32
@@ -33,22 +33,9 @@ TILE = 64
 GROUP = 8  # rows that share a table of T_n, as long as their mu are the same
 # Rows of a tile of points, after their results: is the point to be answered?, AB, CD, a and b, each with its bar,
 # is all of that finite?, K with its bar, and what is decided.
-(
-    OPEN,
-    AB,
-    AB_BAR,
-    CD,
-    CD_BAR,
-    OWN_SUM,
-    OWN_SUM_BAR,
-    OWN_PAIRS,
-    OWN_PAIRS_BAR,
-    FINITE,
-    K,
-    K_BAR,
-    DECIDED,
-    MEETING,
-) = range(RESULTS, RESULTS + 14)
+OPEN, AB, AB_BAR, CD, CD_BAR = range(RESULTS, RESULTS + 5)
+OWN_SUM, OWN_SUM_BAR, OWN_PAIRS, OWN_PAIRS_BAR = range(RESULTS + 5, RESULTS + 9)
+FINITE, K, K_BAR, DECIDED, MEETING = range(RESULTS + 9, RESULTS + 14)
 TILE_ROWS = RESULTS + 14
 
 
@@ -182,6 +169,14 @@ def coordinate(mu):
     return (4.0 * s[0] - 3.0) + 4.0 * s[1]
 
 
+@inline
+def cosines(out, count):
+    """T_n of out[1] in row n, of the first `count` columns."""
+    for n in range(2, len(out)):
+        for i in range(count):
+            out[n, i] = 2.0 * out[1, i] * out[n - 1, i] - out[n - 2, i]
+
+
 @kernel
 def answer(
     results, series, bars, rows, mu, rtol, overflow, floats, verdict, collision, missed, status
@@ -213,9 +208,9 @@ def answer(
                     if r == start or _differ(own, known):
                         _table(own, known, table)
                     for j in range(INVARIANTS):
-                        for i in range(TILE):
-                            tile[j, i], tile[INVARIANTS + j, i] = 0.0, bars[r, j]
-                        add_turns(series[r, j], table, tile[j], count)
+                        sum_turns(series[r, j], table, tile[j], count)
+                        for i in range(count):
+                            tile[INVARIANTS + j, i] = bars[r, j]
                     for i in range(count):
                         tile[OPEN, i] = 1.0 if left[i] else 0.0
                 _settle(tile, rtol, overflow, floats[:, at:end], verdict[at:end], collision[at:end], left,
@@ -238,6 +233,4 @@ def _table(mu, known, table):
         known[i] = mu[i] if i < len(mu) else 0.0
     for i in range(TILE):
         table[0, i], table[1, i] = 1.0, coordinate(known[i])
-    for n in range(2, NODES):
-        for i in range(TILE):
-            table[n, i] = next_term(2.0 * table[1, i], table[n - 1, i], table[n - 2, i])
+    cosines(table, TILE)

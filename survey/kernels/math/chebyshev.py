@@ -20,7 +20,7 @@ from survey.kernels.unroll import consecutive, fma, put, unroll
 
 # How many rows of a matrix are added at once, and in how many columns.
 TERMS = WIDTH = 8
-OF_TERMS = 0.5 if HAS_FMA else 0.75  # see `next_term`
+_OF_TERMS = 0.5 if HAS_FMA else 0.75  # see `next_term`
 
 
 def angles(n):
@@ -176,6 +176,16 @@ def add_turns(c, rows, sums, count):
             _add_several(own, rows, k, sums, i)
 
 
+@splice
+def sum_turns(c, rows, sums, count):
+    """sum_k c[k] rows[k] in the first `count` of `sums`, and in those up to a multiple of WIDTH; c has a
+    multiple of TERMS terms.
+    """
+    for i in range(len(sums)):
+        sums[i] = 0.0
+    add_turns(c, rows, sums, count)
+
+
 @unroll
 def _add_several(c, rows, first, sums, i):
     """Add TERMS numbers c times as many rows, from the `first` on, to WIDTH `sums` from i on; the
@@ -245,7 +255,7 @@ def _doubts(sizes, ulps, out):
             else:
                 last = last if size <= last or last != last else size
         for k in range(n):
-            rounding += sizes[r, k] * (4.0 + k + (OF_TERMS + ulps) * k * k)
+            rounding += sizes[r, k] * (4.0 + k + (_OF_TERMS + ulps) * k * k)
         rate = min(max(last / (before + 1e-300), 0.1), 0.9)
         out[0, r] = 4.0 * last / (1.0 - rate)
         out[1, r] = rounding

@@ -17,8 +17,8 @@ from survey.kernels.libration import danby_double as kernels
 from survey.kernels.libration import panels, traces
 from survey.kernels.libration.traces import INVARIANTS
 from survey.kernels.libration.traces_double import NODES
-from survey.kernels.math.chebyshev import OF_TERMS, lebesgue, tail
 from survey.kernels.math.chebyshev import TERMS as VECTOR
+from survey.kernels.math.chebyshev import lebesgue, tail
 from survey.kernels.math.roundoff import EPS, PAIR_ROUNDOFF, PAIR_SUM_ROUNDOFF
 from survey.measures.libration.answers import Answers
 
@@ -26,11 +26,11 @@ DIGITS = 40
 LEAST = 1e-17  # of the largest coefficient: what is less counts at no single point
 PI = "3.14159265358979323846264338327950288419716939937510582097494"
 # Orders in y and in 4 s - 3. A sum of T_n(x) c_n rounds its terms, T_n or Clenshaw's sum by n^2 / 2
-# EPS (T_n of rows by OF_TERMS n^2), and x, where T_n' <= n^2.
+# EPS, and x, where T_n' <= n^2.
 IN_Y = np.arange(panels.TERMS)[:, None]
 IN_S = np.arange(traces.NODES)
 ROUNDING = EPS * (5.0 + IN_Y + 3.0 * IN_Y**2 + IN_S + 1.1 * IN_S**2)
-ROUNDING_IN_S = EPS * (2.0 + IN_S + (0.6 + OF_TERMS) * IN_S**2)
+ROUNDING_IN_S = EPS * (2.0 + IN_S + 1.1 * IN_S**2)
 # In double-double n rounds |c_n| up to n + 1 times, each with a weight up to n + 1.
 PAIR_ROUNDING = 4.0 * PAIR_ROUNDOFF * np.arange(1.0, NODES + 1) ** 3
 
