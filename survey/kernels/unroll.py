@@ -114,7 +114,7 @@ class _Unknown:
 
 
 class _Array:
-    """An array of float64; its indices are integers, or integers that a kernel will compute."""
+    """An array of float64, or of indices; its own indices are integers, or integers that a kernel will compute."""
 
     def __init__(self, context, builder, kind, value):
         self.context, self.builder, self.kind = context, builder, kind
@@ -126,7 +126,8 @@ class _Array:
         return cgutils.get_item_pointer(self.context, self.builder, self.kind, self.array, indices)
 
     def __getitem__(self, index):
-        return _Number(self.builder, self.builder.load(self._pointer(index)))
+        whole = isinstance(self.kind.dtype, types.Integer)
+        return (_Index if whole else _Number)(self.builder, self.builder.load(self._pointer(index)))
 
     def __setitem__(self, index, number):
         self.builder.store(_value(number), self._pointer(index))
@@ -224,14 +225,24 @@ def summed(terms):
     return sum(others, first)
 
 
-def consecutive(array, index, count):
-    """`count` numbers of an array, from `index` on along its last axis."""
+def consecutive(array, index, count, where=None):
+    """`count` numbers of an array, from `index` on along its last axis: all, or those for which `where`
+    holds and 0 for the others, which are not read.
+    """
     if isinstance(array, _Unknown):
         return array
     if not isinstance(array, _Array):
-        return array[(*index[:-1], slice(index[-1], index[-1] + count))].copy()
-    kind = ir.VectorType(ir.DoubleType(), count)
-    return _Number(array.builder, array.builder.load(_place(array, index, kind), align=_ALIGNED))
+        if where is None:
+            return array[(*index[:-1], slice(index[-1], index[-1] + count))].copy()
+        here, numbers = np.flatnonzero(where), np.zeros(count)
+        numbers[here] = array[(*index[:-1], index[-1] + here)]
+        return numbers
+    builder, kind = array.builder, ir.VectorType(ir.DoubleType(), count)
+    place = _place(array, index, kind)
+    if where is None:
+        return _Number(builder, builder.load(place, align=_ALIGNED))
+    none = _repeated(builder, _value(0.0), count)
+    return _Number(builder, _masked(builder, "load", kind, [place, *_mask(where), none]))
 
 
 def put(array, index, numbers, where=None):
@@ -247,12 +258,20 @@ def put(array, index, numbers, where=None):
     if where is None:
         builder.store(values, place, align=_ALIGNED)
         return
-    whole, chosen = ir.IntType(32), where.value
-    kinds = [values.type, place.type, whole, chosen.type]
-    store = builder.module.declare_intrinsic(
-        f"llvm.masked.store.v{values.type.count}f64.p0", fnty=ir.FunctionType(ir.VoidType(), kinds)
+    _masked(builder, "store", values.type, [values, place, *_mask(where)], ir.VoidType())
+
+
+def _mask(where):
+    return ir.IntType(32)(_ALIGNED), where.value
+
+
+def _masked(builder, name, kind, given, result=None):
+    """Load or store numbers where a mask has it."""
+    function = builder.module.declare_intrinsic(
+        f"llvm.masked.{name}.v{kind.count}f64.p0",
+        fnty=ir.FunctionType(result or kind, [x.type for x in given]),
     )
-    builder.call(store, [values, place, whole(_ALIGNED), chosen])
+    return builder.call(function, given)
 
 
 def _place(array, index, kind):
@@ -278,6 +297,28 @@ def element(numbers, i):
     return _Number(numbers.builder, value)
 
 
+def transposed(rows):
+    """Of n times n numbers, given as n rows of those that follow each other, the columns; n is a power of 2."""
+    if any(isinstance(x, _Unknown) for x in rows):
+        return rows
+    if not isinstance(rows[0], _Number):
+        return list(np.transpose(rows))
+    half = len(rows) // 2
+    for _ in range(half.bit_length()):
+        pairs = zip(rows[:half], rows[half:], strict=True)
+        rows = [merged for pair in pairs for merged in _merged(*pair)]
+    return rows
+
+
+def _merged(a, b):
+    """The numbers of a and b in turn: the first half of them, and the other."""
+    builder, count = a.builder, a.value.type.count
+    kind, half = ir.VectorType(ir.IntType(32), count), count // 2
+    for first in (0, half):
+        order = [i + side for i in range(first, first + half) for side in (0, count)]
+        yield _Number(builder, builder.shuffle_vector(a.value, b.value, ir.Constant(kind, order)))
+
+
 def permuted(numbers, order, factors):
     """The numbers in another order, each times a constant."""
     if isinstance(numbers, _Unknown):
@@ -290,13 +331,13 @@ def permuted(numbers, order, factors):
     return _Number(builder, builder.fmul(moved, ir.Constant(value.type, list(factors))))
 
 
-def selected(where, numbers):
-    """The numbers for which `where` holds, and 0 for the others."""
+def selected(where, numbers, other=0.0):
+    """The numbers for which `where` holds, and a constant for the others."""
     if isinstance(where, _Unknown):
         return where
     if not isinstance(where, _Number):
-        return np.where(where, numbers, 0.0)
-    nothing = _repeated(where.builder, _value(0.0), numbers.value.type.count)
+        return np.where(where, numbers, other)
+    nothing = _repeated(where.builder, _value(other), numbers.value.type.count)
     return _Number(where.builder, where.builder.select(where.value, numbers.value, nothing))
 
 
@@ -318,6 +359,16 @@ def counted(where):
     bits = where.builder.bitcast(where.value, ir.IntType(where.value.type.count))
     number = where.builder.ctpop(bits)
     return _Number(where.builder, where.builder.uitofp(number, ir.DoubleType()))
+
+
+def first_of(count, number):
+    """Of each of `count` numbers that follow each other, whether it is one of the first `number`."""
+    if isinstance(number, _Unknown):
+        return number
+    if not isinstance(number, _Number):
+        return np.arange(1.0, count + 1.0) <= number
+    ranks = ir.Constant(ir.VectorType(ir.DoubleType(), count), np.arange(1.0, count + 1.0).tolist())
+    return _Number(number.builder, ranks) <= number
 
 
 def changes_sign(a, b):

@@ -10,9 +10,8 @@ with S = sin psi, C = cos psi,
 three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-Steps never depend on the requested times: those within a step are evaluated from its series, BLOCK
-of a lane at once. Nor does any solution depend on its neighbours. A lane that has finished takes
-the next row.
+Steps never depend on the requested times: those within a step are evaluated from its series, in GROUP lanes
+at once. Nor does any solution depend on its neighbours. A lane that has finished takes the next row.
 
 The loops over lanes are short, and sums end with the latest coefficients: processors overlap iterations only
 while these are independent and fit into the window of instructions that they reorder.
@@ -54,18 +53,22 @@ from survey.kernels.unroll import (
     both,
     consecutive,
     counted,
+    first_of,
     fma,
     largest,
     put,
     root,
     selected,
     smallest,
+    spread,
+    transposed,
     unroll,
 )
 
 ORDER = 16
 LOW = 6
 LANES = 32
+GROUP = 8  # lanes that are served together, and times of each
 
 # Rows of the series: S, C, w and U1, Z1, U2, Z2 (variations), f, g'.
 SIN, COS, W = 0, ORDER + 1, 2 * (ORDER + 1)
@@ -82,19 +85,22 @@ FIXED = 10
 (DT, CUT) = range(2)
 STEP = 2
 # Where the tables begin in the work space of all lanes: the series, the states after and before the
-# step, what stays fixed, the step, what has become of the lane, and one row for the last times of a solution,
-# fewer than BLOCK, and what is recorded of them.
+# step, what stays fixed, the step, what has become of the lane; for each of GROUP times how long after the
+# start of the step it is, what is found there, and whether bars are narrow enough (1 or 0); how many of these
+# times lie in the step, and the column of the first time in the step.
 AFTER = TABLE
 BEFORE = AFTER + STATE
 WHAT_STAYS = BEFORE + STATE
 OF_STEP = WHAT_STAYS + FIXED
 FATE = OF_STEP + STEP
-SPARE = FATE + 1
-ROWS = SPARE + 1
+FOUND = FATE + 1
+EACH = rc.STATE + 2
+NUMBER = FOUND + EACH * GROUP
+BEGAN = NUMBER + 1
+ROWS = BEGAN + 1
 
 # what a step has made of a lane, or the sum of both: it has passed its next time
 PASSED, LOST = 1.0, 2.0
-BLOCK = 4  # times of a lane that are served together; as a rule a step has few
 # Shorter steps have only a share of the tolerance, so that many short ones add up to what a few
 # long ones do.
 SHORT = 1.0 / 8.0
@@ -439,101 +445,131 @@ def passed(fate):
     return (fate == PASSED) | (fate == PASSED + LOST)
 
 
-def at_lane(row, size):
-    """What reads `size` rows of a lane, from `row` on, of the work space in one row."""
+def at_lanes(row, size):
+    """What reads `size` rows, from `row` on, of GROUP lanes of the work space in one row."""
 
     @unroll
-    def read(work, i):
+    def read(work, first):
         # of one array, whose rows are LANES apart: offsets known to LLVM, which else computes 40 products a call
-        return tuple(work[i + LANES * (row + n)] for n in range(size))
+        return tuple(consecutive(work, (first + LANES * (row + n),), GROUP) for n in range(size))
 
     return read
 
 
-_coefficients_at, _variations_at = at_lane(W, ORDER + 1), at_lane(U1, 5 * (LOW + 1))
-_after_at, _before_at = at_lane(AFTER, STATE), at_lane(BEFORE, STATE)
-_fixed_at, _step_at = at_lane(WHAT_STAYS, FIXED), at_lane(OF_STEP, STEP)
+_coefficients_at, _variations_at = at_lanes(W, ORDER + 1), at_lanes(U1, 5 * (LOW + 1))
+_after_at, _before_at = at_lanes(AFTER, STATE), at_lanes(BEFORE, STATE)
+_fixed_at, _step_at = at_lanes(WHAT_STAYS, FIXED), at_lanes(OF_STEP, STEP)
 
 
 @unroll
-def _block(work, i, times, k, first, planes):
-    """Record phi, w and their bars of lane i at BLOCK times of row k, from the `first` on; returns how many of
-    them lie in the step, and how many of these have bars narrow enough. What is recorded of the others means
-    nothing.
+def _find(work, first, at):
+    """Find phi, w and their bars of GROUP lanes, from the `first` on, at the times after the start of their
+    steps that stand at `at`; they follow there, and whether bars are narrow enough (1 or 0). Returns for how
+    many they are not.
     """
-    after, before, fixed = _after_at(work, i), _before_at(work, i), _fixed_at(work, i)
-    end, cut = _step_at(work, i)
-    dt = (consecutive(times, (k, first), BLOCK) - before[TIME]) - before[TIME_LOW]
-    within = dt <= end
-    dt = selected(within, dt)
+    after, before, fixed = _after_at(work, first), _before_at(work, first), _fixed_at(work, first)
+    _end, cut = _step_at(work, first)
+    dt = consecutive(work, (at,), GROUP)
     part = dt * after[RATE]
     part = part * part
     part = part * part
     cut = cut * (part * part * part)  # falls as the 13th power at least, see `left_out`
-    x, v = moved(_coefficients_at(work, i), dt)
+    x, v = moved(_coefficients_at(work, first), dt)
     carried = before[SAA], before[SAB], before[SBB]
-    jacobian = varied(_variations_at(work, i), dt)
+    jacobian = varied(_variations_at(work, first), dt)
     saa, _sab, sbb = carried_on(carried, jacobian, dt, v, cut, fixed[PF], fixed[PG])
     share, turns, angle = 2.0 * after[STEPS], after[TURNS], fixed[TURN]
     wide, high = 1.01 * root(share * saa), 1.01 * root(share * sbb)  # as `steps.bar`
     narrow = both(wide <= TRUST, high <= TRUST * (1.0 + abs(v)))
-    put(planes, (rc.PHI, k, first), ((before[PSI] + x) + angle) + turns * TWO_PI)
-    put(planes, (rc.W, k, first), v)
-    put(planes, (rc.PHI_BAR, k, first), wide + _slip(turns, angle))
-    put(planes, (rc.W_BAR, k, first), high)
-    return counted(within), counted(both(within, narrow))
-
-
-@kernel
-def _last_block(work, i, times, k, first, count, planes):
-    """As `_block`, where fewer than BLOCK times are left."""
-    spare = work[LANES * SPARE :]  # making arrays would take a tenth of a trajectory's time
-    own = spare[:BLOCK].reshape(1, BLOCK)
-    found = spare[BLOCK : BLOCK + rc.STATE * BLOCK].reshape(rc.STATE, 1, BLOCK)
-    for j in range(BLOCK):
-        own[0, j] = times[k, first + j] if j < count else math.inf
-    within, fine = _block(work, i, own, 0, 0, found)
-    for n in range(rc.STATE):
-        for j in range(count):
-            planes[n, k, first + j] = found[n, 0, j]
-    return within, fine
-
-
-@inline
-def _serve(work, i, times, k, first, size, planes):
-    """Record lane i of the work space, in one row, at the times of row k, from the `first` on, within the step;
-    returns the next, and whether all bars were narrow enough.
-    """
-    at, at_low = work[LANES * (BEFORE + TIME) + i], work[LANES * (BEFORE + TIME_LOW) + i]
-    last, within, end = first, 1.0 * BLOCK, work[LANES * (OF_STEP + DT) + i]
-    # how many of a block lie in the step is not asked before: no processor foresees such a branch
-    while within == BLOCK and last < size and (times[k, last] - at) - at_low <= end:
-        if last + BLOCK <= times.shape[1]:
-            within, fine = _block(work, i, times, k, last, planes)
-        else:
-            within, fine = _last_block(work, i, times, k, last, size - last, planes)
-        within = min(within, 1.0 * (size - last))  # a row ends at its first infinity
-        beyond = last + int(within)
-        if fine < within:
-            slip = _slip(work[LANES * (AFTER + TURNS) + i], work[LANES * (WHAT_STAYS + TURN) + i])
-            while last < beyond and narrow(planes, k, last, slip):
-                last += 1
-            return last, False
-        last = beyond
-    return last, True
+    slip = 3e-16 * (abs(turns) * TWO_PI + abs(angle))  # rounds where these are added to psi
+    found = {
+        rc.PHI: ((before[PSI] + x) + angle) + turns * TWO_PI,
+        rc.W: v,
+        rc.PHI_BAR: wide + slip,
+        rc.W_BAR: high,
+        rc.STATE: selected(narrow, spread(1.0, dt)),
+    }
+    for row, numbers in found.items():
+        put(work, (at + LANES * (1 + row),), numbers)
+    return GROUP - counted(narrow)
 
 
 @unroll
-def _slip(turns, angle):
-    """What rounds where turns, and the angle of the axes, are added to psi."""
-    return 3e-16 * (abs(turns) * TWO_PI + abs(angle))
+def _ahead(work, first, times, row, column):
+    """Note how long after the start of their steps the next times of GROUP lanes are, from the `first` on, and
+    how many lie in the step, of as many as NUMBER has before.
+    """
+    lanes = []
+    for i in range(GROUP):
+        start, low, end, left = (
+            work[first + (i + LANES * n)]
+            for n in (BEFORE + TIME, BEFORE + TIME_LOW, OF_STEP + DT, NUMBER)
+        )
+        asked = first_of(GROUP, left)
+        dt = (consecutive(times, (row[first + i], column[first + i]), GROUP, asked) - start) - low
+        within = both(asked, dt <= end)
+        work[first + (i + LANES * NUMBER)] = counted(within)
+        lanes.append(selected(within, dt))
+    for s, dt in enumerate(transposed(lanes)):
+        put(work, (first + LANES * (FOUND + EACH * s),), dt)
 
 
-@inline
-def narrow(planes, k, j, slip):
-    """Are the bars narrow enough, that of phi but for `slip`?"""
-    most = TRUST * (1.0 + abs(planes[rc.W, k, j]))
-    return planes[rc.PHI_BAR, k, j] - slip <= TRUST and planes[rc.W_BAR, k, j] <= most
+@unroll
+def _keep(work, first, row, column, planes):
+    """Record what was found of GROUP lanes, from the `first` on, at as many times as NUMBER has."""
+    number = [work[first + (i + LANES * NUMBER)] for i in range(GROUP)]
+    for n in range(rc.STATE):
+        places = [first + LANES * (FOUND + EACH * s + 1 + n) for s in range(GROUP)]
+        found = transposed([consecutive(work, (at,), GROUP) for at in places])
+        for i in range(GROUP):
+            put(
+                planes, (n, row[first + i], column[first + i]), found[i], first_of(GROUP, number[i])
+            )
+
+
+@kernel
+def _lose(work, i):
+    """Lane i is lost at the first of its times at which bars are too wide."""
+    for s in range(int(work[LANES * NUMBER + i])):
+        if not work[LANES * (FOUND + EACH * s + 1 + rc.STATE) + i] > 0.0:
+            work[LANES * NUMBER + i], work[LANES * FATE + i] = s, LOST
+            break
+
+
+@kernel
+def record(work, times, row, column, sizes, planes, turnings):
+    """Record the times that lie in the step of each lane, of the work space in one row; lanes whose bars
+    are too wide are lost.
+    """
+    for i in range(LANES):
+        work[LANES * BEGAN + i] = column[i]
+    for first in range(0, LANES, GROUP):
+        most = 1.0 * GROUP
+        while most == GROUP:
+            most, wide = 0.0, 0.0
+            for i in range(first, first + GROUP):
+                due = passed(work[LANES * FATE + i])
+                work[LANES * NUMBER + i] = sizes[i] - column[i] if due else 0.0
+                most = max(most, work[LANES * NUMBER + i])
+            if most == 0.0:
+                break
+            _ahead(work, first, times, row, column)
+            most = 0.0
+            for i in range(first, first + GROUP):
+                most = max(most, work[LANES * NUMBER + i])
+            for s in range(int(most)):
+                wide += _find(work, first, first + LANES * (FOUND + EACH * s))
+            if wide > 0.0:
+                for i in range(first, first + GROUP):
+                    _lose(work, i)
+            _keep(work, first, row, column, planes)
+            for i in range(first, first + GROUP):
+                column[i] += int(work[LANES * NUMBER + i])
+    if turnings.shape[1] > 0:
+        for i in range(LANES):
+            if row[i] >= 0:
+                began = int(work[LANES * BEGAN + i])
+                turnings_at(work, i, planes, row[i], began, column[i], turnings)
 
 
 @kernel
@@ -579,21 +615,6 @@ def _refill(P, starts, times, waiting, state, fixed, row, column, sizes, status)
                 fixed[NEXT, i], row[i], column[i], sizes[i] = times[waiting, 0], waiting, 0, size
             waiting += 1
     return waiting
-
-
-@kernel
-def record(work, times, row, column, sizes, planes, turnings):
-    """Record the times that lie in the step of each lane, of the work space in one row; lanes whose bars
-    are too wide are lost.
-    """
-    for i in range(LANES):
-        if row[i] >= 0 and passed(work[LANES * FATE + i]):
-            first = column[i]
-            column[i], sound = _serve(work, i, times, row[i], first, sizes[i], planes)
-            if turnings.shape[1] > 0:
-                turnings_at(work, i, planes, row[i], first, column[i], turnings)
-            if not sound:
-                work[LANES * FATE + i] = LOST
 
 
 @inline

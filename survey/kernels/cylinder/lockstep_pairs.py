@@ -305,6 +305,13 @@ def _advance(W, T, state, before, low, low_before, fixed, dt, fate, sums, lanes)
         state[STEPS, i] += 1.0
 
 
+@inline
+def _narrow(planes, k, j, slip):
+    """Are the bars narrow enough, that of phi but for `slip`?"""
+    most = TRUST * (1.0 + abs(planes[rc.W, k, j]))
+    return planes[rc.PHI_BAR, k, j] - slip <= TRUST and planes[rc.W_BAR, k, j] <= most
+
+
 @kernel
 def _serve(W, T, state, before, low_before, fixed, taken, i, times, k, first, size, planes, sums):
     """Record phi, w and their bars of lane i at the times of row k, from the `first` on, within the step,
@@ -327,7 +334,7 @@ def _serve(W, T, state, before, low_before, fixed, taken, i, times, k, first, si
         high = bar(n, sbb) + late * (fixed[PF, i] * abs(w) + fixed[PG, i]) + ROUNDOFF_UP * abs(w)
         planes[rc.PHI, k, j], planes[rc.PHI_BAR, k, j] = phi, wide
         planes[rc.W, k, j], planes[rc.W_BAR, k, j] = w, high
-        if not lockstep.narrow(planes, k, j, ROUNDOFF_UP * abs(phi)):
+        if not _narrow(planes, k, j, ROUNDOFF_UP * abs(phi)):
             return j, False
     return size, True
 

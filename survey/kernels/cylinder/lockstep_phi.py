@@ -40,7 +40,6 @@ from survey.kernels.cylinder.lockstep import (
     LANES,
     NEAREST,
     SHORT,
-    at_lane,
     busy,
     convolved,
     left_out,
@@ -321,6 +320,17 @@ def _advance(T, state, before, step, fixed, tolerance):
         cut_t = 2.0 * inverse * h * step[CUT_TIME, i]
         state[T_BOUND, i] += h * within * most + cut_t + ROUNDOFF_UP * (4.0 * h * inverse)
         state[COUNT, i] += 1.0
+
+
+def at_lane(row, size):
+    """What reads `size` rows of a lane, from `row` on, of the work space in one row."""
+
+    @unroll
+    def read(work, i):
+        # of one array, whose rows are LANES apart: offsets known to LLVM, which else computes 40 products a call
+        return tuple(work[i + LANES * (row + n)] for n in range(size))
+
+    return read
 
 
 _omega_at, _integral_at = at_lane(OMEGA, ORDER + 1), at_lane(INTEGRAL, ORDER + 1)
