@@ -78,7 +78,9 @@ def _trajectories(method, rtol, counted, rows, times, served):
     counted |= served
     solve = partial(solution.trajectories, rtol=rtol, counted=counted)
     if not served:
-        results = solve(method, rows, times)
+        results, met = solution.trajectories_and_met(method, rows, times, rtol, counted)
+        if met and not counted and rtol >= FINEST:
+            return results
         return _with_more_digits(results, solve, IN_TIME, rtol, rows, times, counted)
     results = solve(closed, rows, times)
     missed = solution.missed(results, rtol)
@@ -134,16 +136,9 @@ def _left_open(results, rtol, whole=True):
     `whole`, neither these nor times over phi are asked for.
     """
     status, in_time = results[-1], len(results) == 3
-    if solution.met(results, max(rtol, FINEST), whole or in_time):
-        missed = np.zeros(status.shape, bool)
-    else:
-        missed = solution.missed(results, max(rtol, FINEST))
-        missed &= (
-            (status == OK)
-            | (status == TURNING)
-            | (status == NO_CONVERGENCE)
-            | (status == SEPARATRIX)
-        )
+    missed = solution.missed(results, max(rtol, FINEST), whole or in_time)
+    if status.any():
+        missed &= np.isin(status, (OK, TURNING, NO_CONVERGENCE, SEPARATRIX))
     if in_time and whole:
         _floats, turnings, _status = results
         missed |= (turnings == UNDETERMINED) & (status == OK)

@@ -8,7 +8,7 @@ that misses the requested accuracy is solved again with smaller steps, and the b
 import numpy as np
 
 from survey.kernels.cylinder import records as rc
-from survey.kernels.cylinder.accuracy import all_within
+from survey.kernels.cylinder.accuracy import note_missed
 from survey.kernels.cylinder.flow import BOUND_F, BOUND_G, spread, spread_programs
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.steps import OK, TURNING, UNDETERMINED
@@ -79,17 +79,23 @@ def trajectories(method, rows, times, rtol, counted=True):
     turnings counts the sign changes of w between 0 and t; it is UNDETERMINED where the error bound
     leaves it open, and, unless `counted`, everywhere.
     """
+    return trajectories_and_met(method, rows, times, rtol, counted)[0]
+
+
+def trajectories_and_met(method, rows, times, rtol, counted=True):
+    """As `trajectories`, and whether every point is known to meet the requested accuracy."""
     past = times < 0
     if not past.any():
         return _in_time(method, rows, times, rtol, counted)
-    results = _nothing(times.shape)
+    results, met = _nothing(times.shape), True
     for mine, back in ((~past, False), (past, True)):
         picked = mine.any(axis=1)
         if not picked.any():
             continue
         elapsed = np.where(mine, np.abs(times), np.inf)[picked]
         own = reverse(rows[picked]) if back else rows[picked]
-        parts = _in_time(method, own, elapsed, rtol, counted)
+        parts, fine = _in_time(method, own, elapsed, rtol, counted)
+        met &= fine
         if back:
             parts[0][..., rc.W] *= -1.0
         take = mine[picked]
@@ -97,7 +103,7 @@ def trajectories(method, rows, times, rtol, counted=True):
             held = result[picked]
             held[take] = part[take]
             result[picked] = held
-    return results
+    return results, met
 
 
 def _nothing(shape, counted=True):
@@ -114,14 +120,16 @@ def _in_time(method, rows, times, rtol, counted):
     decades = _decades(rows, times)
     kinds = np.unique(decades)
     if len(kinds) < 2:
-        return back(_in_order(method, rows, times, rtol, counted, decades.max(initial=0)))
-    results = _nothing(times.shape)
+        results, met = _in_order(method, rows, times, rtol, counted, decades.max(initial=0))
+        return back(results), met
+    results, met = _nothing(times.shape), True
     for kind in kinds:
         mine = decades == kind
-        parts = _in_order(method, rows[mine], times[mine], rtol, counted, kind)
+        parts, fine = _in_order(method, rows[mine], times[mine], rtol, counted, kind)
+        met &= fine
         for result, part in zip(results, parts, strict=True):
             result[mine] = part
-    return back(results)
+    return back(results), met
 
 
 def _decades(rows, times):
@@ -163,14 +171,14 @@ def _in_order(method, rows, times, rtol, counted, decades):
         return (floats, turnings, status) if counted else (floats, status)
 
     asked = np.broadcast_to(np.isfinite(distinct(times)), times.shape)
-    results, _met = _repeated(run, lambda: asked, ladder, rtol)
+    results, met = _repeated(run, lambda: asked, ladder, rtol)
     if not counted:
         floats, status = results
-        return floats, np.full(status.shape, UNDETERMINED, dtype=np.int8), status
+        return (floats, np.full(status.shape, UNDETERMINED, dtype=np.int8), status), met
     turning = rows.shape[1] == rc.GIVEN or rows[0, ON_CIRCLE] > 0
     if hasattr(method, "flow_turnings") and turning:
         _count(method, rows, times, ladder[-1], asked, results)
-    return results
+    return results, met
 
 
 def _count(method, rows, times, tolerance, asked, results):
@@ -283,57 +291,43 @@ def _repeated(run, asked, ladder, rtol, timed=True):
     keep the better of two. With whether every point is known to meet it.
     """
     first, *others = ladder
-
-    def without_times(results):
-        if not timed:
-            results[0][..., rc.TIME :: 2] = 0.0  # they hold anything: no choice may depend on them
-        return results
-
-    results = run(slice(None), first)
+    own = results = run(slice(None), first)
+    rows, met = np.arange(len(results[-1])), True
     for tolerance in others:
-        if met(results, rtol, timed):
-            return results, True
-        without_times(results)
-        coarse = (missed(results, rtol) & asked()).any(axis=1)
-        if not coarse.any() or tolerance >= first:
-            break
-        finer = without_times(run(coarse, tolerance))
-        kept = [result[coarse] for result in results]
-        better = badness(finer) <= badness(kept)
-        for result, old, new in zip(results, kept, finer, strict=True):
+        row, column = _missed_at(own, rtol, timed)
+        if not row.size:
+            return results, met
+        if not timed:
+            own[0][..., rc.TIME :: 2] = 0.0  # they hold anything: no choice may depend on them
+        again = np.zeros(len(rows), np.bool_)
+        again[row[asked()[rows[row], column]]] = True
+        if not again.any() or tolerance >= first:
+            return results, False
+        met &= bool(again[row].all())
+        rows, own = rows[again], [result[again] for result in own]
+        finer = run(rows, tolerance)
+        if not timed:
+            finer[0][..., rc.TIME :: 2] = 0.0
+        better = badness(finer) <= badness(own)
+        for result, old, new in zip(results, own, finer, strict=True):
             old[better] = new[better]
-            result[coarse] = old
-    return results, False
+            result[rows] = old
+    return results, met and not _missed_at(own, rtol, timed)[0].size
 
 
-def met(results, rtol, timed=True):
-    """Does no answer miss the requested accuracy? As a rule; where some do, `missed` says which."""
-    planes, status = _planes(results[0]), results[-1].reshape(-1)
-    pairs = ((rc.VALUE, rc.VALUE_BAR), (rc.TIME, rc.TIME_BAR))  # PHI and W likewise
-    return all(
-        all_within(planes[value], planes[bar], status, rtol) for value, bar in pairs[: 1 + timed]
-    )
+def _missed_at(results, rtol, timed=True):
+    """The rows and columns that `missed` has."""
+    return np.divmod(np.flatnonzero(missed(results, rtol, timed)), results[-1].shape[1])
 
 
-def _planes(floats):
-    """(STATE, points), without a copy."""
-    planes = floats.transpose(2, 0, 1)
-    if planes.flags.c_contiguous:
-        return planes.reshape(len(planes), -1)
-    return floats.reshape(-1, floats.shape[-1]).T
-
-
-def missed(results, rtol):
-    """Where the answer misses the requested accuracy, or there is none."""
+def missed(results, rtol, timed=True):
+    """Where the answer misses the requested accuracy, or there is none; unless `timed`, times may miss it."""
     floats, status = results[0], results[-1]
-    out = (status != OK) & (status != TURNING) if status.any() else np.zeros(status.shape, bool)
-    planes = _planes(floats)
-    for value, bar in ((rc.PHI, rc.PHI_BAR), (rc.W, rc.W_BAR)):  # VALUE and TIME likewise
-        wide = np.flatnonzero(~(planes[bar] <= rtol))  # as a rule, few
-        if wide.size:
-            out.reshape(-1)[wide] |= ~(
-                planes[bar, wide] <= rtol * (1.0 + np.abs(planes[value, wide]))
-            )
+    planes, out = np.ascontiguousarray(floats.transpose(2, 0, 1)), np.zeros(status.shape, np.bool_)
+    planes, flat = planes.reshape(len(planes), -1), out.reshape(-1)
+    pairs = (rc.VALUE, rc.VALUE_BAR), (rc.TIME, rc.TIME_BAR)  # PHI and W likewise
+    for value, bar in pairs[: 1 + timed]:
+        note_missed(planes[value], planes[bar], status.reshape(-1), rtol, flat)
     return out
 
 
