@@ -22,12 +22,11 @@ import llvmlite
 import llvmlite.binding as llvm
 import numba
 import platformdirs
-from numba.core import codegen, event, imputils, types
-from numba.core.compiler import Compiler
+from numba.core import event, imputils, types
 from numba.core.registry import cpu_target
 from numba.extending import intrinsic, overload
 
-from survey.kernels import quick_typing
+from survey.kernels import of_callers, quick_typing
 
 # Fused multiply-adds: of today's processors only old and small ones of x86 have none.
 HAS_FMA = not llvm.get_process_triple().startswith(
@@ -245,38 +244,7 @@ def part(function):
 
 
 def _of_callers(function, **flags):
-    dispatcher = _compiled(function, **flags, pipeline_class=_OfCallers)
-    if not numba.config.DISABLE_JIT:
-
-        def add_overload(result):
-            arguments, libraries = tuple(result.signature.args), [result.library]
-            dispatcher.targetctx.insert_user_function(function, result.fndesc, libraries)
-            dispatcher.overloads[arguments] = result._replace(entry_point=function)
-
-        dispatcher.add_overload = add_overload
-        dispatcher._compile_for_args = lambda *_arguments, **_names: function
-    return dispatcher
-
-
-class _CodeOfCallers(codegen.JITCodeLibrary):
-    """The code of a function as its callers take it, before LLVM's optimiser: theirs is optimised, and
-    becomes machine code. Doing so with each alone took a sixth of the compiler's time.
-    """
-
-    def _optimize_final_module(self):
-        pass
-
-    def _finalize_final_module(self):
-        self._finalized = True
-
-
-class _OfCallers(Compiler):
-    """numba's compiler, up to the code of LLVM."""
-
-    def __init__(self, typingctx, targetctx, library, args, return_type, flags, locals):
-        library = _CodeOfCallers(targetctx.codegen(), "inlined")
-        flags.no_compile = flags.no_cpython_wrapper = True
-        super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
+    return of_callers.kept(_compiled(function, **flags, pipeline_class=of_callers.Pipeline))
 
 
 def _compiled(function, **flags):

@@ -1,20 +1,34 @@
 """What numba works out again and again while it compiles, remembered or left out while survey's
-kernels are compiled: a quarter of the compiler's time.
+kernels are compiled: a third of the compiler's time.
 
-The code that it makes is the same. For each a[i] of arrays it tries half a dozen rules for other
-types first; where it looks for what is compiled already, it compares the compiler's flags, which
-all have one hash, option by option, though nearly all are defaults; and it times each of the tens
-of thousands of calls of LLVM, of which its events `numba:llvm_lock` tell nothing meanwhile.
+The code that it makes is the same, but for what LLVM inlines. For each a[i] of arrays numba tries half a
+dozen rules for other types first; where it looks for what is compiled already, it compares the compiler's
+flags, which all have one hash, option by option, though nearly all are defaults; what it has written in
+Python itself, as np.empty, it compiles anew for each set of flags; after each of its passes it finds where
+variables live, which the next changes; and it times each of the tens of thousands of calls of LLVM, of
+which its events `numba:llvm_lock` tell nothing meanwhile.
 """
 
 from functools import cache
 
+import numba
 from numba.core import event
-from numba.core.targetconfig import TargetConfig
+from numba.core.postproc import PostProcessor, VariableLifetime
+from numba.core.targetconfig import ConfigStack, TargetConfig
+from numba.core.transforms import canonicalize_cfg
 from numba.core.types.functions import BaseFunction
+from numba.core.typing.templates import _OverloadFunctionTemplate
+
+from survey.kernels import of_callers
 
 _MODULES = ("_operator", "builtins", "math")  # of functions that are asked for most
 _LLVM = "numba:llvm_lock"
+_HANDED_ON = (
+    "error_model",
+    "fastmath",
+    "nrt",
+    "boundscheck",
+)  # flags, to functions that are called
 _known = {}
 
 
@@ -71,10 +85,51 @@ def _unless_llvm(broadcast):
     return called
 
 
+def _of_callers(**options):
+    return lambda function: of_callers.kept(
+        numba.jit(function, **options, pipeline_class=of_callers.Pipeline)
+    )
+
+
+def _shared(self, args, kws):
+    """What numba compiles for a call of a function that it has written itself, as np.empty or max, for these
+    types: it would do so for each set of flags, though few count, and make machine code of it that nothing
+    calls.
+    """
+    flags = ConfigStack.top_or_none()
+    if flags is None:
+        return _USUAL[_OverloadFunctionTemplate, "_get_impl"](self, args, kws)
+    count = tuple(str(getattr(flags, name)) for name in _HANDED_ON)
+    asked = self.context, tuple(args), tuple(kws.items()), count
+    if asked in self._impl_cache:
+        return self._impl_cache[asked]
+    flags = flags.copy()
+    flags.forceinline = False  # whichever kernel comes first
+    self._get_jit_decorator = lambda: _of_callers
+    with ConfigStack().enter(flags):
+        return self._build_impl(asked, args, kws)
+
+
+def _post_processed(self, emit_dels=False, extend_lifetimes=False):
+    """What lives where, found when it is asked for; generators and Python objects, which our kernels have
+    not, ask for more. After most of the compiler's passes nothing is asked before the next has changed it.
+    """
+    function = self.func_ir
+    if function.is_generator:
+        _USUAL[PostProcessor, "run"](self, emit_dels, extend_lifetimes)
+        return
+    function.blocks = canonicalize_cfg(function.blocks)
+    function.variable_lifetime, function.generator_info = VariableLifetime(function.blocks), None
+    if emit_dels:
+        self._insert_var_dels(extend_lifetimes=extend_lifetimes)
+
+
 _OURS = {
     (TargetConfig, "__eq__"): _equal,
     (TargetConfig, "__hash__"): _hash,
     (BaseFunction, "get_call_type"): _call_type,
+    (_OverloadFunctionTemplate, "_get_impl"): _shared,
+    (PostProcessor, "run"): _post_processed,
     (event, "start_event"): _unless_llvm(event.start_event),
     (event, "end_event"): _unless_llvm(event.end_event),
 }

@@ -61,7 +61,7 @@ def flow_setting(p, w, tolerance):
     return tolerance
 
 
-@kernel
+@part
 def flow_begin(p, phi, w, tolerance, T):
     """Expand at (phi, w); returns the step that keeps the last two terms below the tolerance, 0 where they overflow."""
     series(p, phi, w, T, _ORDER)

@@ -9,11 +9,17 @@ import numpy as np
 import pytest
 from numba import types
 from numba.core import event
-from numba.core.compiler import Flags
+from numba.core.compiler import Flags, run_frontend
+from numba.core.postproc import PostProcessor
 from numba.core.registry import cpu_target
 from numba.core.targetconfig import TargetConfig
 from numba.core.types.functions import BaseFunction
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.typing.templates import (
+    AbstractTemplate,
+    _OverloadFunctionTemplate,
+    infer_global,
+    signature,
+)
 
 from survey.kernels import jit, quick_typing
 
@@ -106,7 +112,88 @@ def test_flags_are_equal_where_numba_says_so(remembering):
 
 
 def in_use():
-    return TargetConfig.__eq__, BaseFunction.get_call_type, event.start_event
+    return (
+        TargetConfig.__eq__, BaseFunction.get_call_type, _OverloadFunctionTemplate._get_impl,
+        PostProcessor.run, event.start_event,
+    )  # fmt: skip
+
+
+class Names(event.Listener):
+    """The names of the functions that are compiled."""
+
+    def __init__(self):
+        self.names = []
+
+    def on_start(self, start):
+        self.names.append(start.data["dispatcher"].py_func.__qualname__)
+
+    def on_end(self, end):
+        pass
+
+
+def test_what_numba_has_written_in_python_is_compiled_once_without_machine_code():
+    @jit.inline
+    def shifted(x):
+        a = np.empty(2, dtype=np.float32)  # a type that no kernel of ours has
+        a[0], a[1] = x[0], x[1] + 1
+        return max(a[0], a[1])
+
+    def larger(x):
+        b = np.empty(2, dtype=np.float32)
+        b[0], b[1] = shifted(x), x[0]
+        return max(b[0], b[1])
+
+    def again(x):
+        c = np.empty(2, dtype=np.float32)
+        c[0], c[1] = x[0], x[1]
+        return max(c[0], c[1])
+
+    for function in (larger, again):
+        function.__module__ = "survey.kernels.some"
+    with event.install_listener("numba:compile", Names()) as compiled:
+        assert jit.fresh(larger)(np.array([1.0, 4.0])) == 5.0
+        assert jit.fresh(again)(np.array([1.0, 4.0])) == 4.0
+    for name in ("ol_np_empty.<locals>.impl", "ol_max.<locals>.impl"):
+        assert compiled.names.count(name) == 1
+    assert compiled.names.count("ol_np_zeros.<locals>.impl") == 0
+
+
+def test_variables_live_as_long_as_numba_says():
+    def some(x):
+        total = 0.0
+        for i in range(3):
+            part = x[i] * 2.0
+            if part > 1.0:
+                total += part
+        return total
+
+    def dels():
+        function = run_frontend(some)
+        PostProcessor(function).run(emit_dels=True)
+        return [str(inst) for block in function.blocks.values() for inst in block.body]
+
+    usual = dels()
+    quick_typing.begin()
+    try:
+        assert dels() == usual and any(line.startswith("del ") for line in usual)
+    finally:
+        quick_typing.end()
+
+
+def test_a_generator_is_worked_through_as_usual():
+    def squares(n):
+        for i in range(n):
+            yield i * i
+
+    def total(n):
+        found = 0
+        for square in _squares(n):
+            found += square
+        return found
+
+    _squares = numba.njit(squares)
+    total.__module__ = "survey.kernels.some"
+    assert jit.fresh(total)(4) == 14
 
 
 @pytest.mark.parametrize("module, ours", [("survey.kernels.some", True), ("other", False)])

@@ -34,7 +34,7 @@ from survey.kernels.cylinder.program import (
     number_of,
     operation,
 )
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 from survey.kernels.unroll import unroll
 
@@ -43,7 +43,7 @@ LANES = 32  # balls at once
 VECTOR = 8  # lanes of vector code
 
 
-@kernel
+@part
 def _function_ball(code, x, r, number):
     """The ball of the function over (x, r): all but sin, cos, cosh and 1/cosh^2 are monotone, and cosh dips
     less than it rises.

@@ -23,7 +23,7 @@ from survey.kernels.cylinder.program import (
     number_of,
     unchanged,
 )
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel, part, splice
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 # Bounds of |f| and |f'|, of |g|, of |g'|, of |g''|, as they stand in p from BOUND_F on; then the sizes
@@ -39,7 +39,7 @@ WEAK = 1e-9  # of the largest on the circle, where steps have the same limit all
 COARSEST, FINEST = 16, 65536  # pieces of the circle, over which f and g are bounded
 
 
-@kernel
+@part
 def raised(p, points, over, q, out):
     """Raise `out` (BOUNDS) to bounds of |f| and |f'|, of |g|, of |g'|, of |g''| in lane q of the
     balls `over`, of three orders or more.

@@ -18,7 +18,7 @@ from survey.kernels.cylinder.flow import (
 )
 from survey.kernels.cylinder.program import COLUMNS
 from survey.kernels.cylinder.roots import CENTRE, MOST_DISCS, NO_REAL, RADIUS, ROOTS, SLOPE, discs
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -139,7 +139,7 @@ def insert(sorted_, size, x):
     return k
 
 
-@kernel
+@part
 def root(p, low, high):
     """The root of g between low and high, where g is monotone and changes sign."""
     given = p, values(p, high)[1] >= 0.0

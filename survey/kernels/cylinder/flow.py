@@ -21,7 +21,7 @@ import numpy as np
 from survey.kernels.cylinder import bounds, program
 from survey.kernels.cylinder.program import COLUMNS, ON_CIRCLE
 from survey.kernels.cylinder.records import GIVEN, PHI0, SIX, START_PHI, START_W, W0
-from survey.kernels.jit import for_constants, inline, kernel
+from survey.kernels.jit import for_constants, inline, kernel, part
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import consecutive, element, permuted, put, summed, unroll
 
@@ -209,7 +209,7 @@ def rates(p, T):
         _rates_of_gyrostat(p, T)
 
 
-@kernel
+@part
 def variation(p, T):
     """Fill rows U1..DG up to t^LOW: u' = f u + z, z' = g' u, from the series in T."""
     rates(p, T)

@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel, part, splice
 from survey.kernels.math import functions
 
 # Columns of the six parameters: signs and marks, and the mean of f on the circle, 0 where it
@@ -132,7 +132,7 @@ def in_angle(p, phi, f, g):
         f[n], g[n] = p[REVERSED] * S[int(p[F_AT]), n], p[MIRRORED] * S[int(p[G_AT]), n]
 
 
-@kernel
+@part
 def in_time(p, phi, w, order, x, v, e, y):
     """Fill phi, w, and the integrals e of f and y of g, with the series through (phi, w) up to t^order."""
     count, at_f, at_g = number_of(p, FORCES), int(p[F_AT]), int(p[G_AT])
@@ -149,7 +149,7 @@ def in_time(p, phi, w, order, x, v, e, y):
         x[n + 1], v[n + 1] = v[n] * r, (p[REVERSED] * total + p[MIRRORED] * S[at_g, n]) * r
 
 
-@kernel
+@part
 def along(p, x, f, dg):
     """Fill f and g' with their series in time along the angle x (all of one length)."""
     count = number_of(p, SLOTS)
@@ -160,7 +160,7 @@ def along(p, x, f, dg):
         f[n], dg[n] = p[REVERSED] * S[int(p[F_AT]), n], S[int(p[DG_AT]), n]
 
 
-@kernel
+@part
 def note(p, numbers, first, end):
     """Note the numbers of the program in the lanes from `first` to `end` - 1 of `numbers` (2 SLOTS,
     LANES), each before the rest that is not in binary64.
@@ -176,7 +176,7 @@ def note(p, numbers, first, end):
             numbers[2 * i, q], numbers[2 * i + 1, q] = p[at + NUMBER], rest
 
 
-@kernel
+@part
 def unchanged(p, last, known):
     """Fill `known` with which values of the program p are those of the program in `last`, which then
     becomes p.

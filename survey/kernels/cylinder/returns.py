@@ -229,7 +229,7 @@ def runs_in(p, eqs, count, phi, w, bar):
     return trapped(p, eqs, count, phi, w, 0.0, False) >= 0 or stands_still(p, eqs, count, phi, w)
 
 
-@kernel
+@part
 def equilibrium_before(eqs, count, x):
     """The number of the next equilibrium to the left of the angle x, or -1, and its angle."""
     at, least = -1, math.inf
@@ -241,7 +241,7 @@ def equilibrium_before(eqs, count, x):
     return at, x - least
 
 
-@kernel
+@part
 def between(eqs, count, low, high):
     """How many equilibria lie between the unwrapped angles low and high."""
     inside = 0
@@ -263,14 +263,14 @@ def image(setting, begin, at, kind, p, eqs, count, anchor, x, tolerance, node):
         libration(setting, begin, at, p, eqs, count, anchor, x, tolerance, node)
 
 
-@kernel
+@part
 def copy(target, source):
     """Copy a node (an element-wise loop compiles ten times faster than an assignment of slices)."""
     for i in range(len(source)):
         target[i] = source[i]
 
 
-@kernel
+@part
 def ahead(xs, x, step, i, guess):
     """(n, x, i, step) of the next places of a scan, STRIDE at most and before the guess: how many they are, the
     last of them, and the scan's index and its geometric step from there on.
@@ -342,7 +342,7 @@ def caught(a):
     return a[CLASS] > 0.0 and a[SLOPE] == 0.0
 
 
-@kernel
+@part
 def last_before(xs, place):
     """The index of the last of xs before a place, 0 if that is NaN."""
     i = 0
@@ -351,7 +351,7 @@ def last_before(xs, place):
     return i
 
 
-@kernel
+@part
 def first_beyond(x, guesses):
     """The first of the guesses beyond x, or infinity."""
     for guess in guesses:
@@ -360,7 +360,7 @@ def first_beyond(x, guesses):
     return math.inf
 
 
-@kernel
+@part
 def next_place(low, high, guess, reach):
     """Where to look for a border between low and high: `reach` to either side of the guess, then ever
     further on the side where it is, or else in the middle.
@@ -409,7 +409,7 @@ def bar_of(left, m, right, column, bar):
     return 1.2 * change / reach * bar + 2.0 * m[column + 1]
 
 
-@kernel
+@part
 def write_cycle(a, b, m, interval, steep, row):
     """Note the cycle at node m between a and b; its bar from those of D and of the slope."""
     away = abs((b[CHANGE] - a[CHANGE]) / (b[X] - a[X]))

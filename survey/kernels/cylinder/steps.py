@@ -39,7 +39,7 @@ from survey.kernels.cylinder.flow import (
     variation,
 )
 from survey.kernels.cylinder.program import RADIUS
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel, part, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -51,7 +51,7 @@ CANCELLED = 2e-15  # rounding of sums of squares, relative to their largest term
 UNDETERMINED = -2  # a count that the error bound leaves open
 
 
-@kernel
+@part
 def local_error(p, T, w, dt):
     """Error bars (phi, w) that one step adds: truncation as the method notes it, and rounding.
 
@@ -68,7 +68,7 @@ def local_error(p, T, w, dt):
     return phi, T[LAST, TRUNC_W] + ROUNDOFF_UP * (1.5 * abs(w) + 4.0 * dt * rate)
 
 
-@kernel
+@part
 def carried(p, T, dt, w, saa, sab, sbb):
     """The error ellipse S after dt of the current step."""
     a, b, c, d = jacobian(T, dt)

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.math.chebyshev import restrict
 from survey.kernels.math.roundoff import EPS, ROUNDOFF_UP
 
@@ -252,7 +252,7 @@ def answer_lanes(
             )
 
 
-@kernel
+@part
 def _radii(
     z, y, w, gap, outputs, count, n, asked, rtol, floats, verdict, crossing, missed, found, parts
 ):
@@ -292,7 +292,7 @@ def _radii(
         )
 
 
-@kernel
+@part
 def _of_two(c, bars, outputs, count, paired, asked, rtol, floats, verdict, crossing, missed):
     """The spectral radius and the verdict of systems of two states, in closed form."""
     for lane in range(count):
@@ -348,7 +348,7 @@ def _radius_of_two(trace, det, trace_bar, det_bar):
     return value, off * (1.0 + 8.0 * EPS) + 4.0 * EPS * value
 
 
-@kernel
+@part
 def _roots(c, d, z, y, parts):
     """The roots z + i y in lanes: in closed form, or by Weierstrass's iteration from those given."""
     if d == 1:
@@ -370,7 +370,7 @@ def _roots(c, d, z, y, parts):
         improve(c, d, z, y, parts)
 
 
-@kernel
+@part
 def improve(c, d, z, y, parts):
     """One step of Weierstrass's iteration from z + i y, in lanes."""
     pr, pi, qr, qi = parts[0], parts[1], parts[2], parts[3]
@@ -385,7 +385,7 @@ def improve(c, d, z, y, parts):
             t[lane] -= (pi[lane] * qr[lane] - pr[lane] * qi[lane]) * size
 
 
-@kernel
+@part
 def from_circle(c, d, z, y):
     """Weierstrass's iteration from points of a circle until it converges as from near by, and two
     steps more.
@@ -441,7 +441,7 @@ def roots(c):
     return out
 
 
-@kernel
+@part
 def _value(c, d, x, t, pr, pi):
     """The polynomial at x + i t."""
     lanes, first = len(x), c[0]
@@ -462,7 +462,7 @@ def _value(c, d, x, t, pr, pi):
             pr[lane] = real
 
 
-@kernel
+@part
 def _product(z, y, i, d, qr, qi):
     """The product over j of z_i - z_j."""
     x, t = z[i], y[i]
@@ -484,7 +484,7 @@ def _product(z, y, i, d, qr, qi):
             qr[lane] = real
 
 
-@kernel
+@part
 def _corrections(c, d, bars, z, y, w, gap, parts, found):
     """Fill w with bounds of the corrections |W_i|, `gap` with the distance of each root to the nearest
     other, and `found` (lanes) where the corrections are no larger than what they are known to.
@@ -525,7 +525,7 @@ def _corrections(c, d, bars, z, y, w, gap, parts, found):
             near[lane] = math.sqrt(near[lane])
 
 
-@kernel
+@part
 def _paired(z, rho, form, of_forms, re, im, bar, sign):
     """The multipliers of the s = z; returns the verdict, and is a Krein sign open?
 
@@ -589,7 +589,7 @@ def _paired(z, rho, form, of_forms, re, im, bar, sign):
     return (UNSTABLE if off else STABLE if on == d else UNDECIDED), open_
 
 
-@kernel
+@part
 def _slope(form, d):
     """A bound of the form's slope where |s| <= 2."""
     total, power = 0.0, 1.0
@@ -599,7 +599,7 @@ def _slope(form, d):
     return total
 
 
-@kernel
+@part
 def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, missed):
     """Write the spectral radius and the verdict of the point p, and whether it has missed what is
     asked; fill `size` with the moduli. Returns whether a multiplier is known less well than to rtol.
@@ -625,7 +625,7 @@ def _write(re, im, bar, size, decided, paired, asked, rtol, p, floats, verdict, 
     return wide
 
 
-@kernel
+@part
 def _sort(re, im, bar, size, sign, p, floats, signs, angle, order):
     """Write the multipliers of the point p in order, as `measures.floquet.multipliers.order` does, and fill
     `angle` with their arguments.
@@ -660,7 +660,7 @@ def _sort(re, im, bar, size, sign, p, floats, signs, angle, order):
         signs[i, p] = sign[k]
 
 
-@kernel
+@part
 def _crossing(re, im, bar, size, angle, sign, decided, paired, of_signs):
     """See `measures.floquet.multipliers.crossing`."""
     n, lead = len(re), 0

@@ -16,7 +16,7 @@ import numpy as np
 
 from survey.kernels.floquet.characteristic import LANES
 from survey.kernels.floquet.steps import copy
-from survey.kernels.jit import kernel
+from survey.kernels.jit import kernel, part
 from survey.kernels.math.roundoff import EPS
 
 
@@ -72,7 +72,7 @@ def coefficients(M, E, units, others, other_bars, near, powers, sums):
         )
 
 
-@kernel
+@part
 def _leverrier(M, E, units, others, other_bars, near, powers, squares, sums):
     """Fill sums (5, n + 1) with c_k, bounds of what rounding does to them and of all their errors, and
     tr(B_k J), J = (0 1; -1 0), and bounds of theirs, k = 0 to n; powers (K, n, n) with B_0 to B_(K-1).
@@ -130,7 +130,7 @@ def _leverrier(M, E, units, others, other_bars, near, powers, squares, sums):
             form_bars[k] += n * EPS * (abs(low) + abs(high))
 
 
-@kernel
+@part
 def _palindromic(c, bars):
     """May the polynomial be the same from its last coefficient on, as where 1 / l is a root with l?"""
     n = len(c) - 1
@@ -140,7 +140,7 @@ def _palindromic(c, bars):
     return True
 
 
-@kernel
+@part
 def _in_sums(c, c_bars, m, change, out, out_bars, first, lane):
     """c_m + the sum of c_(m-j) (l^j + l^-j) as a polynomial of s = l + 1 / l in rows `first` on, highest
     power first: of c without the first, 1; of tr(B_k J), whose first is 0, all.

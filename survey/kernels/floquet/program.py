@@ -15,7 +15,7 @@ numbers.
 Source: A. Griewank, A. Walther, Evaluating Derivatives (2008), chapter 13.
 """
 
-from survey.kernels.jit import kernel
+from survey.kernels.jit import part
 from survey.kernels.math.functions import NAMES, function
 
 ONE, TIME, COMBINATION, PRODUCT, QUOTIENT, FUNCTIONS = range(6)  # the last: of the first of NAMES
@@ -36,7 +36,7 @@ OPERATION = 5
 ADDED, FACTOR = range(2)  # of `inside`: a basis function, and the number before it
 
 
-@kernel
+@part
 def extend(operations, signs, inside, order, V, middle, half, S, n):
     """Fill S[:, n], order n of the basis functions in `order`, from the lower orders."""
     lanes = S.shape[2]

@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from survey.kernels.floquet.program import BASIS, COLUMN, NUMBER, ONE, ROW, extend
-from survey.kernels.jit import inline, kernel
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 ORDER = 16
@@ -218,7 +218,7 @@ def _behind(term, k, C, X):
     return X[k, term[COLUMN]] if term[BASIS] == ONE else C[term[BASIS], term[COLUMN]]
 
 
-@kernel
+@part
 def _rounded(a, w, e, own, s, k, most):
     """Fill e[k + 1], a bound of the rounding of X[k + 1], from the norms a of A's and w of X's
     coefficients.
@@ -354,7 +354,7 @@ def _over(even, odd, of_both, of_odd, work, error):
             one[q] = two[q]
 
 
-@kernel
+@part
 def _row_norms(A, lanes, work, out):
     """Fill out (lanes) with the largest sums of moduli in a row of A (n, n lanes)."""
     n = len(A)
@@ -375,7 +375,7 @@ def _row_norms(A, lanes, work, out):
             out[lane] = max(out[lane], work[lane]) if work[lane] < math.inf else math.inf
 
 
-@kernel
+@part
 def _product(A, B, lanes, out):
     """Fill out with A B, each (n, n lanes)."""
     n = len(A)
@@ -389,7 +389,7 @@ def _product(A, B, lanes, out):
                     sums[c * lanes + lane] += row[k * lanes + lane] * other[c * lanes + lane]
 
 
-@kernel
+@part
 def _invert(work, inverse, n, lanes):
     """Gauss-Jordan elimination of `work`, which is near 1, on `inverse`; no pivots are chosen:
     residuals tell.
@@ -415,7 +415,7 @@ def _invert(work, inverse, n, lanes):
                     right[j * lanes + lane] -= factor[lane] * other[j * lanes + lane]
 
 
-@kernel
+@part
 def column_tops(A, out):
     """Fill out (n) with the largest moduli in the columns of A (n, n)."""
     for c in range(len(A)):
@@ -425,7 +425,7 @@ def column_tops(A, out):
         out[c] = top
 
 
-@kernel
+@part
 def row_norm(A):
     """The largest sum of the moduli in a row of A (n, n)."""
     norm = 0.0
@@ -437,7 +437,7 @@ def row_norm(A):
     return norm
 
 
-@kernel
+@part
 def multiply(left, right, zero, out):
     """Fill out with the product of two matrices (n, n); `zero` is that of its type."""
     for j in range(len(out)):
@@ -448,7 +448,7 @@ def multiply(left, right, zero, out):
             out[j, c] = total
 
 
-@kernel
+@part
 def add_outer(A, by, before, out):
     """Add `by` times the sum of the moduli in each row of A, times `before` (n) of each column, to
     out (n, n).
@@ -461,7 +461,7 @@ def add_outer(A, by, before, out):
             out[j, c] += by * total * before[c]
 
 
-@kernel
+@part
 def set_identity(A):
     """Fill A (n, n) with the identity."""
     A[:] = 0.0

@@ -109,13 +109,11 @@ def rows(e, first, middle, coefficients, bars, series, row_bars):
     weights, sums = np.empty((terms, 2)), np.empty((2, n))
     for i in range(len(e)):
         x = exact_position(e[i], middle)
-        weights[0], weights[1] = (1.0, 0.0), x
-        for k in range(2, terms):
-            last, before = (
-                (weights[k - 1, 0], weights[k - 1, 1]),
-                (weights[k - 2, 0], weights[k - 2, 1]),
-            )
-            weights[k] = dd.sub(dd.scaled(dd.mul(x, last), 2.0), before)
+        weight, after = (1.0, 0.0), x
+        for k in range(terms):
+            weights[k, 0], weights[k, 1] = weight
+            further = dd.sub(dd.scaled(dd.mul(x, after), 2.0), weight)
+            weight, after = after, further
         growth = dd.div(dd.two_sum(1.0, e[i]), dd.two_sum(1.0, -e[i]))
         growth = growth if first else dd.square(growth)
         for j in range(INVARIANTS):
