@@ -14,7 +14,7 @@ import numpy as np
 from survey import status
 from survey.kernels.jit import inline
 from survey.kernels.math.roundoff import EPS
-from survey.measures.hill import monodromy
+from survey.measures.hill import dense, monodromy
 from survey.request.function_scene import FunctionScene
 from survey.request.hill_scene import HillScene
 from survey.scene import Output, named
@@ -43,6 +43,7 @@ class DampedScene(FunctionScene):
     FAMILY = "hill"
     AUDIT = ("dop853",)
     OPTIONS = ()
+    compile_ahead = staticmethod(dense.of_functions)
     DAMPED = True
 
     @property

@@ -13,6 +13,7 @@ from survey.kernels.math import chebyshev
 from survey.kernels.math.roundoff import EPS
 from survey.measures.answers import NOTHING
 from survey.measures.hill import (
+    dense,
     dependence,
     monodromy,
     motion,
@@ -58,6 +59,7 @@ class HillScene(FunctionScene):
     FAMILY = "hill"
     AUDIT = ("dop853",)
     OPTIONS = ()
+    compile_ahead = staticmethod(dense.of_functions)
     STATUS = STATUS
 
     @property

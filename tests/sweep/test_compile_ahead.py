@@ -101,6 +101,10 @@ ORBIT = """def f(t, x, p, out):
 
 scene = survey.orbit(f, states=("x", "v"), period=2 * np.pi, parameters=("F",), start=(0.1, 0.1))
 survey.evaluate(scene, F=0.1)"""
+HILL = """scene = survey.hill(
+    lambda u, p: p[0] - 2 * p[1] * np.cos(2 * u), period=np.pi, even=True, parameters=("a", "q")
+)
+survey.evaluate(scene, a=np.linspace(1.9, 2.1, 200), {more})"""
 STEPS = ["steps:factors", "steps:carried"]
 FLOQUET = ["leverrier:fill_matrices", "characteristic:answer"]
 DANBY = ["danby_double:chain", "traces_double:measure"]
@@ -131,6 +135,14 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
         (
             OWN.format(more='question="portrait"'),
             [FLOWS + "flow_fates"],
+        ),
+        (
+            HILL.format(more="q=0.1, variables=['discriminant', 'verdict']"),
+            ["survey.kernels.hill.answers:measure", "survey.kernels.hill.series:discriminants"],
+        ),
+        (
+            HILL.format(more="q=np.linspace(0.1, 0.2, 9)"),
+            ["survey.kernels.hill.answers:measure", "survey.kernels.hill.series:factors"],
         ),
         (STATE.format(more=""), [f"survey.kernels.nutation.{name}" for name in BRUN]),
         (

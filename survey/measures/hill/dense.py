@@ -121,6 +121,11 @@ def compile_ahead(sample, no_rows, variables):
     compiles the method's kernel: what it needs at once comes first, and what it waits for last.
     """
     sample(no_rows, np.ones(1), np.empty((0, 1, 2, 1)))
+    yield from of_functions(variables, {})
+
+
+def of_functions(variables, options):
+    """As `compile_ahead`, for a user's z, which the map's own process samples."""
     grows = not {"exponent", "exponent_per_orbit"}.isdisjoint(variables)
     named = {name for name in kernels.FLOATS if name in variables} | (
         {"exponent"} if grows else set()
