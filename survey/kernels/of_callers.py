@@ -22,7 +22,7 @@ class Pipeline(Compiler):
 
     def __init__(self, typingctx, targetctx, library, args, return_type, flags, locals):
         library = _Code(targetctx.codegen(), "inlined")
-        flags.no_compile = flags.no_cpython_wrapper = True
+        flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
         super().__init__(typingctx, targetctx, library, args, return_type, flags, locals)
 
 

@@ -228,7 +228,7 @@ def captured(table, count, phi, w, bar):
     return -1
 
 
-@kernel
+@part
 def settled(p, f, dg, x, w):
     """Is it certain that w keeps its sign from here to the stable node at distance x?
 

@@ -46,7 +46,7 @@ from survey.kernels.cylinder.steps import (
     finite,
     start_sign,
 )
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel, part, splice
 from survey.kernels.math.roots import sixteenth_root
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import (
@@ -527,7 +527,7 @@ def _keep(work, first, row, column, planes):
             )
 
 
-@kernel
+@part
 def _lose(work, i):
     """Lane i is lost at the first of its times at which bars are too wide."""
     for s in range(int(work[LANES * NUMBER + i])):
@@ -572,7 +572,7 @@ def record(work, times, row, column, sizes, planes, turnings):
                 turnings_at(work, i, planes, row[i], began, column[i], turnings)
 
 
-@kernel
+@part
 def turnings_at(work, i, planes, k, first, last, turnings):
     """The turning points before the times `first` to `last` - 1 of row k, which lie in the step of lane i."""
     before = LANES * BEFORE + i
@@ -627,7 +627,7 @@ def due(row, fate, state, limit):
     return number > 0
 
 
-@kernel
+@part
 def free(limit, times, row, column, sizes, state, fixed, fate, planes, status):
     """Note the next time of each lane, and free those that have ended; returns whether any has."""
     freed = False

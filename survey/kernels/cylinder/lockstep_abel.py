@@ -91,7 +91,7 @@ from survey.kernels.cylinder.steps import (
     unturned,
     values,
 )
-from survey.kernels.jit import constant, inline, kernel, splice
+from survey.kernels.jit import constant, inline, part, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.unroll import unroll
 
@@ -161,7 +161,7 @@ def _to_rest(_at, c, dt):
     return v, slope, v > 0.0
 
 
-@kernel
+@part
 def _cross(T, state, before, fixed, i, reach, total, end, block, size):
     """Fill the block from its GOALs, the first `size` of which count, at up to `reach` in the step;
     there psi has risen by `total`, and w = `end`.
@@ -212,7 +212,7 @@ def _cross(T, state, before, fixed, i, reach, total, end, block, size):
         block[SQUARE + j] = a
 
 
-@kernel
+@part
 def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floats, status):
     """Note what the step of lane i passes; returns (next target, first in doubt, has it left w =
     0?, how it ends).
@@ -294,7 +294,7 @@ def _pass(T, state, before, fixed, q, i, block, targets, j, doubt, started, floa
     return j, doubt, started, (_GOING if j < size or doubt >= 0 else OK)
 
 
-@kernel
+@part
 def _refill(
     P,
     starts,

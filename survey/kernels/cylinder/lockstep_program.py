@@ -102,7 +102,7 @@ from survey.kernels.cylinder.steps import (
     unturned,
     values,
 )
-from survey.kernels.jit import inline, kernel, splice
+from survey.kernels.jit import inline, kernel, part, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 from survey.kernels.unroll import summed, unroll
@@ -757,7 +757,7 @@ def cross(T, state, before, fixed, i, reach, total, end, block, size):
         block[near.SQUARE + j] = a
 
 
-@kernel
+@part
 def _pass(p, T, state, before, fixed, delay, i, block, targets, j, doubt, started, floats, status):
     """Note what the step of lane i passes; returns (next target, first in doubt, has it left w =
     0?, how it ends).

@@ -39,7 +39,7 @@ from survey.kernels.cylinder.flow import (
     variation,
 )
 from survey.kernels.cylinder.program import RADIUS
-from survey.kernels.jit import inline, kernel, part, splice
+from survey.kernels.jit import inline, part, splice
 from survey.kernels.math.newton import bracketed
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
@@ -288,7 +288,7 @@ def to_rest(at, given, dt):
     return w, f * w + g, (w > 0.0) == first
 
 
-@kernel
+@part
 def clean_turning(p, phi, bar_phi, bar_w):
     """Is a zero of w certain at phi: does g keep its sign over the error bounds?"""
     g = abs(values(p, phi)[1])
@@ -306,7 +306,7 @@ def node_possible(f, g, dg, bend):
     return (f < 0.0) & (dg < 0.0) & (g > 0.0) & (g < -0.4 * dg) & (g * bend < 0.2 * dg * dg)
 
 
-@kernel
+@part
 def node_ahead(p, phi, w, moved):
     """Distance to a stable node ahead that the solution at (phi, w > 0) certainly runs into without
     turning, or -1. It has `moved` so far since bounds were found that hold within p[RADIUS].
