@@ -59,7 +59,7 @@ FLOORS = {
     "tongue_edges": 2.2,
     "tongue_edges_and_curves": 0.68,
     "gyrostat_trajectory": 1.5,
-    "gyrostat_200_times": 0.98,
+    "gyrostat_200_times": 1.15,
     "gyrostat_t_200": 2.2,
     "gyrostat_50_angles": 3.0,
     "gyrostat_50_angles_both_ways": 2.9,
