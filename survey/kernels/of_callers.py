@@ -1,5 +1,5 @@
 """Functions that kernels call, as code that becomes machine code with theirs and never alone: optimising each
-by itself, and making it callable from Python, took a sixth of the compiler's time.
+by itself took a sixth of the compiler's time.
 """
 
 import numba

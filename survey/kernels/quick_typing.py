@@ -3,10 +3,10 @@ kernels are compiled: a third of the compiler's time.
 
 The code that it makes is the same, but for what LLVM inlines. For each a[i] of arrays numba tries half a
 dozen rules for other types first; where it looks for what is compiled already, it compares the compiler's
-flags, which all have one hash, option by option, though nearly all are defaults; what it has written in
-Python itself, as np.empty, it compiles anew for each set of flags; after each of its passes it finds where
-variables live, which the next changes; and it times each of the tens of thousands of calls of LLVM, of
-which its events `numba:llvm_lock` tell nothing meanwhile.
+flags, which all have one hash, option by option, though nearly all are defaults; functions that it has in
+Python itself, such as np.empty, it compiles anew for each set of flags; after each pass it works out again
+which variables live where, though the next pass changes that; and it times each of the tens of thousands
+of calls of LLVM, of which its events `numba:llvm_lock` tell nothing meanwhile.
 """
 
 from functools import cache
@@ -92,9 +92,9 @@ def _of_callers(**options):
 
 
 def _shared(self, args, kws):
-    """What numba compiles for a call of a function that it has written itself, as np.empty or max, for these
-    types: it would do so for each set of flags, though few count, and make machine code of it that nothing
-    calls.
+    """The function that numba compiles for a call of one of its own, such as np.empty or max, with these types.
+    It would compile it for each set of flags, though few matter, and make machine code of each that is
+    never called.
     """
     flags = ConfigStack.top_or_none()
     if flags is None:
@@ -104,18 +104,19 @@ def _shared(self, args, kws):
     if asked in self._impl_cache:
         return self._impl_cache[asked]
     flags = flags.copy()
-    flags.forceinline = False  # whichever kernel comes first
+    flags.forceinline = False  # the same, whichever kernel asks first
     self._get_jit_decorator = lambda: _of_callers
     with ConfigStack().enter(flags):
         return self._build_impl(asked, args, kws)
 
 
 def _post_processed(self, emit_dels=False, extend_lifetimes=False):
-    """What lives where, found when it is asked for; generators and Python objects, which our kernels have
-    not, ask for more. After most of the compiler's passes nothing is asked before the next has changed it.
+    """Which variables live where is found when it is asked for: after most passes of the compiler nothing asks
+    before the next one changes it. Generators and object mode need more, and are worked through as usual.
     """
-    function = self.func_ir
-    if function.is_generator:
+    function, flags = self.func_ir, ConfigStack.top_or_none()
+    objects = flags is not None and (flags.enable_pyobject or flags.force_pyobject)
+    if function.is_generator or objects:
         _USUAL[PostProcessor, "run"](self, emit_dels, extend_lifetimes)
         return
     function.blocks = canonicalize_cfg(function.blocks)

@@ -114,7 +114,7 @@ class _Unknown:
 
 
 class _Array:
-    """An array of float64, or of indices; its own indices are integers, or integers that a kernel will compute."""
+    """An array of float64 or of integers; it is indexed by integers, or by integers that a kernel will compute."""
 
     def __init__(self, context, builder, kind, value):
         self.context, self.builder, self.kind = context, builder, kind
@@ -266,7 +266,7 @@ def _mask(where):
 
 
 def _masked(builder, name, kind, given, result=None):
-    """Load or store numbers where a mask has it."""
+    """Load or store numbers where a mask says so."""
     function = builder.module.declare_intrinsic(
         f"llvm.masked.{name}.v{kind.count}f64.p0",
         fnty=ir.FunctionType(result or kind, [x.type for x in given]),
@@ -311,7 +311,7 @@ def transposed(rows):
 
 
 def _merged(a, b):
-    """The numbers of a and b in turn: the first half of them, and the other."""
+    """a and b interleaved, a0 b0 a1 b1 ..., as two vectors: the first half, then the second."""
     builder, count = a.builder, a.value.type.count
     kind, half = ir.VectorType(ir.IntType(32), count), count // 2
     for first in (0, half):

@@ -43,7 +43,7 @@ class DampedScene(FunctionScene):
     FAMILY = "hill"
     AUDIT = ("dop853",)
     OPTIONS = ()
-    compile_ahead = staticmethod(dense.of_functions)
+    compile_ahead = staticmethod(dense.of_damped)
     DAMPED = True
 
     @property
@@ -88,8 +88,7 @@ class DampedScene(FunctionScene):
 
     def solve(self, point, request):
         """The requested outputs of a block (see `survey.scenes`)."""
-        wanted = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
-        out = self._inner.solve(point, replace(request, variables=wanted, out={}))
+        out = self._inner.solve(point, replace(request, variables=dense.DAMPED, out={}))
         c, turn, bar = self._loss(point, out)
         exponent = out["exponent"] - turn
         off = out["exponent_error"] + bar + EPS * abs(out["exponent"])

@@ -133,7 +133,7 @@ class Names(event.Listener):
         pass
 
 
-def test_what_numba_has_written_in_python_is_compiled_once_without_machine_code():
+def test_what_numba_has_written_in_python_is_compiled_once():
     @jit.inline
     def shifted(x):
         a = np.empty(2, dtype=np.float32)  # a type that no kernel of ours has
@@ -178,6 +178,20 @@ def test_variables_live_as_long_as_numba_says():
         assert dels() == usual and any(line.startswith("del ") for line in usual)
     finally:
         quick_typing.end()
+
+
+def test_code_in_object_mode_is_worked_through_as_usual():
+    @numba.njit
+    def sinc(x):
+        with numba.objmode(y="float64"):
+            y = float(np.sinc(x))
+        return y + 1.0
+
+    def total(x):
+        return sinc(x)
+
+    total.__module__ = "survey.kernels.some"
+    assert jit.fresh(total)(0.5) == 1.0 + np.sinc(0.5)
 
 
 def test_a_generator_is_worked_through_as_usual():

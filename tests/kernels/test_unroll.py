@@ -12,6 +12,7 @@ from survey.kernels.unroll import (
     changes_sign,
     consecutive,
     counted,
+    first_of,
     fma,
     largest,
     put,
@@ -19,6 +20,7 @@ from survey.kernels.unroll import (
     selected,
     smallest,
     spread,
+    transposed,
     unroll,
 )
 
@@ -142,3 +144,32 @@ def test_words(a, b):
     assert largest(a, b) == max(a, b) and smallest(a, b) == min(a, b)
     assert root(b * b) == abs(b)
     assert changes_sign(a, b) == ((a < 0) != (b < 0))
+
+
+@unroll
+def turned(table, columns, number, out):
+    rows = [consecutive(table, (i, columns[i]), 8, first_of(8, number)) for i in range(8)]
+    for i, row in enumerate(transposed(rows)):
+        put(out, (i, 0), row)
+        put(out, (8 + i, columns[i]), row, first_of(8, number))
+        put(out, (16 + i, 0), selected(row <= 0.5, row, -1.0))
+
+
+@fresh
+def turned_in_a_kernel(table, columns, number, out):
+    turned(table, columns, number, out)
+
+
+@pytest.mark.parametrize("number", [0.0, 1.0, 3.0, 8.0, 12.0, nan, -1.0])
+@pytest.mark.parametrize("columns", [np.arange(8) % 5, np.zeros(8, int)], ids=str)
+def test_rows_that_a_mask_reads_and_writes_are_turned(number, columns):
+    table = np.random.default_rng(1).normal(size=(8, 12))
+    table[2, 5], table[3, 4] = nan, -0.0
+    mine, plain = np.zeros((24, 16)), np.zeros((24, 16))
+    turned_in_a_kernel(table, columns, number, mine)
+    turned(table, columns, number, plain)
+    np.testing.assert_array_equal(mine, plain)
+    assert (np.signbit(mine) == np.signbit(plain)).all()
+    read = np.arange(8) < number
+    wanted = np.where(read, [table[i, c : c + 8] for i, c in enumerate(columns)], 0.0).T
+    np.testing.assert_array_equal(mine[:8, :8], wanted)

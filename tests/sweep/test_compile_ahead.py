@@ -105,6 +105,10 @@ HILL = """scene = survey.hill(
     lambda u, p: p[0] - 2 * p[1] * np.cos(2 * u), period=np.pi, even=True, parameters=("a", "q")
 )
 survey.evaluate(scene, a=np.linspace(1.9, 2.1, 200), {more})"""
+DAMPED = """scene = survey.hill(
+    lambda u, p: p[0] - 2 * p[1] * np.cos(2 * u), period=np.pi, even=True, damping=0.1, parameters=("a", "q")
+)
+survey.evaluate(scene, a=np.linspace(1.9, 2.1, 200), q=np.linspace(0.1, 0.2, 9), variables=["verdict"])"""
 STEPS = ["steps:factors", "steps:carried"]
 FLOQUET = ["leverrier:fill_matrices", "characteristic:answer"]
 DANBY = ["danby_double:chain", "traces_double:measure"]
@@ -142,6 +146,10 @@ DANBY = ["danby_double:chain", "traces_double:measure"]
         ),
         (
             HILL.format(more="q=np.linspace(0.1, 0.2, 9)"),
+            ["survey.kernels.hill.answers:measure", "survey.kernels.hill.series:factors"],
+        ),
+        (
+            DAMPED,
             ["survey.kernels.hill.answers:measure", "survey.kernels.hill.series:factors"],
         ),
         (STATE.format(more=""), [f"survey.kernels.nutation.{name}" for name in BRUN]),

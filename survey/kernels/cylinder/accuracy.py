@@ -3,13 +3,13 @@
 from survey.kernels.cylinder.steps import OK, TURNING
 from survey.kernels.jit import kernel
 
-CHUNK = 512  # points: slices whose beginnings are known, else no vector code
+CHUNK = 512  # points at a time: vector code is made only of slices whose beginnings are known
 
 
 @kernel
 def note_missed(values, bars, status, rtol, out):
-    """Set `out` (n) at the points (n each) whose status is not OK or TURNING, or whose bar is not at most
-    rtol (1 + |value|).
+    """Set `out` (n) to True at the points (n each) whose status is not OK or TURNING, or whose bar is not at
+    most rtol (1 + |value|); elsewhere it stays.
     """
     for first in range(0, len(status), CHUNK):
         last = min(first + CHUNK, len(status))

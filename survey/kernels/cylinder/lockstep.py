@@ -10,8 +10,8 @@ with S = sin psi, C = cos psi,
 three Cauchy products. Each step computes S and C afresh. Errors are carried as in `steps`, by the
 variational equation in its Lienard form (`flow.variation`), to order LOW.
 
-Steps never depend on the requested times: those within a step are evaluated from its series, in GROUP lanes
-at once. Nor does any solution depend on its neighbours. A lane that has finished takes the next row.
+Steps never depend on the requested times: those within a step are evaluated from its series, for GROUP
+lanes at once. Nor does any solution depend on its neighbours. A lane that has finished takes the next row.
 
 The loops over lanes are short, and sums end with the latest coefficients: processors overlap iterations only
 while these are independent and fit into the window of instructions that they reorder.
@@ -463,9 +463,9 @@ _fixed_at, _step_at = at_lanes(WHAT_STAYS, FIXED), at_lanes(OF_STEP, STEP)
 
 @unroll
 def _find(work, first, at):
-    """Find phi, w and their bars of GROUP lanes, from the `first` on, at the times after the start of their
-    steps that stand at `at`; they follow there, and whether bars are narrow enough (1 or 0). Returns for how
-    many they are not.
+    """Find phi, w and their bars of GROUP lanes, from the `first` on, each at one time in its step. The times, from
+    the starts of the steps, stand in the row at `at`; what is found, and whether bars are narrow enough (1 or
+    0), is written to the rows after it. Returns how many are not narrow enough.
     """
     after, before, fixed = _after_at(work, first), _before_at(work, first), _fixed_at(work, first)
     _end, cut = _step_at(work, first)
@@ -496,8 +496,8 @@ def _find(work, first, at):
 
 @unroll
 def _ahead(work, first, times, row, column):
-    """Note how long after the start of their steps the next times of GROUP lanes are, from the `first` on, and
-    how many lie in the step, of as many as NUMBER has before.
+    """Note how long after the starts of their steps the next times of GROUP lanes are, from the `first` on. NUMBER
+    holds how many times are left; afterwards, how many of the next GROUP lie in the step.
     """
     lanes = []
     for i in range(GROUP):
@@ -516,7 +516,7 @@ def _ahead(work, first, times, row, column):
 
 @unroll
 def _keep(work, first, row, column, planes):
-    """Record what was found of GROUP lanes, from the `first` on, at as many times as NUMBER has."""
+    """Record what was found of GROUP lanes, from the `first` on, at the first NUMBER times of each."""
     number = [work[first + (i + LANES * NUMBER)] for i in range(GROUP)]
     for n in range(rc.STATE):
         places = [first + LANES * (FOUND + EACH * s + 1 + n) for s in range(GROUP)]

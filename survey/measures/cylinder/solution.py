@@ -316,12 +316,12 @@ def _repeated(run, asked, ladder, rtol, timed=True):
 
 
 def _missed_at(results, rtol, timed=True):
-    """The rows and columns that `missed` has."""
+    """The rows and columns of the points that miss the accuracy (see `missed`)."""
     return np.divmod(np.flatnonzero(missed(results, rtol, timed)), results[-1].shape[1])
 
 
 def missed(results, rtol, timed=True):
-    """Where the answer misses the requested accuracy, or there is none; unless `timed`, times may miss it."""
+    """Where the answer misses the requested accuracy, or there is none; unless `timed`, times are not looked at."""
     floats, status = results[0], results[-1]
     planes, out = np.ascontiguousarray(floats.transpose(2, 0, 1)), np.zeros(status.shape, np.bool_)
     planes, flat = planes.reshape(len(planes), -1), out.reshape(-1)

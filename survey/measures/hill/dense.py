@@ -71,6 +71,8 @@ MOST = 0.9
 RETRIES = 2
 _ONE_AT_A_TIME = threading.Lock()
 ANSWERS = frozenset({"discriminant", "exponent"})
+# what an equation with damping needs of that without, whatever is asked
+DAMPED = frozenset({"discriminant", "exponent", "verdict", "period", "rotation_number"})
 DISCRIMINANT = np.array([name == "discriminant" for name in kernels.FLOATS])
 # The parts of the axis across points on their own: rows in each, of D and of factors, where more
 # terms are summed.
@@ -125,7 +127,7 @@ def compile_ahead(sample, no_rows, variables):
 
 
 def of_functions(variables, options):
-    """As `compile_ahead`, for a user's z, which the map's own process samples."""
+    """As `compile_ahead`, for a user's z, whose samples this cannot compile."""
     grows = not {"exponent", "exponent_per_orbit"}.isdisjoint(variables)
     named = {name for name in kernels.FLOATS if name in variables} | (
         {"exponent"} if grows else set()
@@ -149,6 +151,11 @@ def of_functions(variables, options):
             _between(np.ones(1), 2, 2),
             False,
         )
+
+
+def of_damped(variables, options):
+    """As `of_functions`, for equations with damping, which need the same of that without, whatever is asked."""
+    yield from of_functions(DAMPED, options)
 
 
 def solve(problem, method, asked, answers):

@@ -20,10 +20,15 @@ def random_systems(count, seed):
     return np.random.default_rng(seed).normal(size=(count, 6)) * [1, 1, 2, 2, 3, 3]
 
 
-def filled(six, phi, w):
-    p, T = flow.coefficients(*six), flow.table()
+@fresh
+def begun(p, phi, w, T):
     taylor.flow_begin(p, phi, w, 1e-16, T)
     flow.variation(p, T)
+
+
+def filled(six, phi, w):
+    p, T = flow.coefficients(*six), flow.table()
+    begun(p, phi, w, T)
     return p, T
 
 

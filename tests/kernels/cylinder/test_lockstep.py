@@ -80,6 +80,48 @@ def test_sine_and_cosine_to_one_ulp():
             )
 
 
+@pytest.mark.parametrize("last", [0.05, 2.0, 40.0])
+def test_times_of_a_step_do_not_depend_on_those_of_neighbours(last):
+    """Rows of none to 30 times, of which a step has up to all, against each row alone, and each time alone."""
+    rows, number = drawn(TURN, 31), np.arange(TURN) % 31
+    times = np.full((TURN, 30), np.inf)
+    for row, size in zip(times, number, strict=True):
+        row[:size] = np.sort(np.random.default_rng(size).uniform(0, last, size))
+    P, starts = solution.split(rows)
+
+    def run(mine, at):
+        planes = np.full((4, *at.shape), np.nan)
+        turnings, status = np.full(at.shape, steps.UNDETERMINED), np.full(len(at), 99)
+        limit = solution.STEPS
+        taylor.flow_trajectories(P[mine], starts[mine], at, 1e-13, limit, planes, turnings, status)
+        return planes, turnings, status
+
+    planes, turnings, status = run(slice(None), times)
+    assert (status == steps.OK).all() and (np.isfinite(planes) == np.isfinite(times)).all()
+    for i in range(TURN):
+        alone = run(slice(i, i + 1), times[i : i + 1])
+        for mine, other in zip(
+            (planes[:, i], turnings[i]), (alone[0][:, 0], alone[1][0]), strict=True
+        ):
+            np.testing.assert_array_equal(mine, other)
+    i = 30
+    for j in range(number[i]):
+        single = run(slice(i, i + 1), times[i : i + 1, j : j + 1].copy())[0]
+        np.testing.assert_array_equal(planes[:, i, j], single[:, 0, 0])
+
+
+def test_a_motion_is_lost_at_the_first_time_in_a_step_at_which_its_bars_are_too_wide():
+    rows = np.array([[0, 0, 9.0, 0, 0, 0, np.pi / 2, 1e-12]])  # from an unstable state of rest
+    times = np.linspace(0.0, 60.0, 6001)
+    floats, _turnings, status = solved(rows, times, 1e-13)
+    known = np.isfinite(floats[0, :, 0])
+    size = known.sum()
+    assert status[0] == steps.NO_CONVERGENCE and 8 < size < times.size
+    assert known[:size].all() and not np.isfinite(floats[0, size:]).any()
+    some = solved(rows, times[:size:7], 1e-13)[0]
+    np.testing.assert_array_equal(floats[0, :size:7], some[0])
+
+
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-12])
 def test_references_to_t_20_lie_within_their_bars(rtol):
     data = json.loads((files("survey.reference") / "gyrostat_trajectories.json").read_text())[

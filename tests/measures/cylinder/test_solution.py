@@ -454,3 +454,23 @@ def test_turnings_are_counted_on_demand_alone(monkeypatch):
         "gyrostat", question="trajectory", t=400.0, variables=["phi", "w"], **given
     )
     assert ds.status == 0 and abs(ds.w) <= ds.w_error + 1e-12 and "turnings" not in ds
+
+
+def test_w_without_times_does_not_depend_on_other_points():
+    """Times that are not asked for hold anything: which points get more digits may not follow from them."""
+    known = {
+        "b12": [0, 0.7], "b31": -0.4, "d": 1.1, "c23": 0.3, "s2": [0, 0.5], "phi0": [0.0, 3.0],
+    }  # fmt: skip
+    speeds, phi = [0.0, -1.0, 2.0, 30.0], np.linspace(-10, 10, 41)
+
+    def found(w0, phi):
+        ds = survey.evaluate(
+            "gyrostat", question="abel", w0=w0, phi=phi, rtol=1e-10, variables=["w"], **known
+        )
+        return np.stack([ds.w.transpose("w0", ..., "phi"), ds.w_error.transpose("w0", ..., "phi")])
+
+    whole = found(speeds, phi)
+    alone = np.concatenate([found([w0], phi) for w0 in speeds], axis=1)
+    halves = np.concatenate([found(speeds, phi[:20]), found(speeds, phi[20:])], axis=-1)
+    for other in (found(speeds, phi), alone, halves):
+        np.testing.assert_array_equal(whole, other)
