@@ -104,7 +104,9 @@ def _shared(self, args, kws):
     if asked in self._impl_cache:
         return self._impl_cache[asked]
     flags = flags.copy()
-    flags.forceinline = False  # the same, whichever kernel asks first
+    flags.forceinline = (
+        True  # the same, whichever kernel asks first; loops with a call are no vector code
+    )
     self._get_jit_decorator = lambda: _of_callers
     with ConfigStack().enter(flags):
         return self._build_impl(asked, args, kws)
