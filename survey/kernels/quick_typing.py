@@ -104,9 +104,8 @@ def _shared(self, args, kws):
     if asked in self._impl_cache:
         return self._impl_cache[asked]
     flags = flags.copy()
-    flags.forceinline = (
-        True  # the same, whichever kernel asks first; loops with a call are no vector code
-    )
+    # max and min, else loops with them are no vector code; not np.empty, which is long
+    flags.forceinline = getattr(self.key, "__module__", None) == "builtins"
     self._get_jit_decorator = lambda: _of_callers
     with ConfigStack().enter(flags):
         return self._build_impl(asked, args, kws)
