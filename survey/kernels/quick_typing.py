@@ -135,7 +135,7 @@ _OURS = {
     (event, "start_event"): _unless_llvm(event.start_event),
     (event, "end_event"): _unless_llvm(event.end_event),
 }
-# Versions of numba whose compiler has these parts, with which this was tried: others do as usual.
+# From the oldest to the newest version of numba with which this was tried: others do as usual.
 if not (0, 61) <= numba.version_info.short <= (0, 68):
     _OURS.clear()
 _USUAL = {(owner, name): getattr(owner, name) for owner, name in _OURS}
