@@ -20,7 +20,7 @@ from survey.kernels.nutation.motion import cosine_by_means, motion
 
 ORDER = 0  # no steps
 SERVES = ("nutation",)
-_CANCELLED = 0.05  # advances that are a smaller part of their terms are computed in double-double
+_CANCELLED = 0.01  # advances that are a smaller part of their terms are computed in double-double
 _FINE = 2.0**-94
 _CLOSE = 0.1  # poles that are nearer, in units of a well's width, bound rates by nothing
 # where the line through the roots of Q is lower at the pole, relative, pi is not split off
@@ -134,6 +134,17 @@ def _blurred(row, roots, up, down, period, x, y):
 
 
 @inline
+def _tilted(gap, near, root_near, incline, rest):
+    """By what an advance changes with h of (S11): in units of T/2, which may cancel between the poles;
+    and, in size, by the `rest` of it.
+    """
+    line = root_near + incline * near
+    if line <= _SLANT * root_near:
+        return 0.0, 0.0
+    return gap / line, abs(rest) * near / line
+
+
+@inline
 def _periods_of(row, out):
     """T / A, the precession, the spin less a (1/C - 1/A) T, the action, and their bars; of one well."""
     root_low, root_high = sqrt(row[nu.Q_LOW]), sqrt(row[nu.Q_HIGH])
@@ -165,6 +176,13 @@ def _periods_of(row, out):
     )
     ends = 4.0 * row[nu.WIDTH] * (row[nu.NOISE_ENDS] + row[nu.NOISE_WIDTH])
     error, rounding = (24.0 * ROUNDOFF + ends) * size, 2.0 * ROUNDOFF
+    # h has the error of ul + uh, which may be a large part of it in narrow wells
+    tilt = abs(k) * row[nu.BAR_SUM] / (root_low + root_high)
+    one, more = _tilted(row[nu.MINUS], row[nu.HIGH_PLUS], root_high, incline, up)
+    other, further = _tilted(row[nu.PLUS], row[nu.LOW_MINUS], root_low, -incline, down)
+    more = tilt * (2.0 * (more + further) + 4.0 * ROUNDOFF * period * (abs(one) + abs(other)))
+    tilted_psi = tilt * period * abs(one - other) + more
+    tilted_phi = tilt * period * abs(one + other) + more
     # without multiples of pi
     bare = abs(total) if turns_up + turns_down == 0.0 else abs(difference)
     if bare < _CANCELLED * size and turns_up * turns_down != 0.0:
@@ -178,10 +196,14 @@ def _periods_of(row, out):
     turned_psi = turned * abs(turns_down + turns_up)
     turned_phi = turned * abs(turns_down - turns_up)
     out[rc.PRECESSION_BAR] = (
-        error + min(4.0 * noise * size, blur_psi) + rounding * abs(total) + turned_psi
+        error + min(4.0 * noise * size, blur_psi) + tilted_psi + rounding * abs(total) + turned_psi
     )
     out[rc.SPIN_BAR] = (
-        error + min(4.0 * noise * size, blur_phi) + rounding * abs(difference) + turned_phi
+        error
+        + min(4.0 * noise * size, blur_phi)
+        + tilted_phi
+        + rounding * abs(difference)
+        + turned_phi
     )
     up, down = row[nu.MINUS] * (pi * turns_up + up), row[nu.PLUS] * (pi * turns_down + down)
     rest = 0.5 * (0.5 * above - series)

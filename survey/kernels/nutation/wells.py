@@ -18,9 +18,11 @@ from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 LOW, HIGH, LOW_PLUS, LOW_MINUS, HIGH_PLUS, HIGH_MINUS, WIDTH, SUM = range(8)
 Q_LOW, Q_HIGH, Q_PLUS, Q_MINUS, BEND, MIDDLE = range(8, 14)  # BEND: 4 q0 - k S^2; MIDDLE: s of (S5)
 K, L, MINUS, PLUS, LEVEL = range(14, 19)  # k, L, b - a, b + a, L - (k ul uh + q0)/2
-# of the turning points and, relative, of Q, s + g of (S5), WIDTH and the distances from the poles
+# of the turning points and, relative, of Q, s + g of (S5), WIDTH and the distances from the poles;
+# of SUM
 BAR_LOW, BAR_HIGH, NOISE_LOW, NOISE_HIGH, NOISE_ABOVE, NOISE_WIDTH, NOISE_ENDS = range(19, 26)
-REST = 26  # from here on what float64 leaves of each number
+BAR_SUM = 26
+REST = 27  # from here on what float64 leaves of each number
 SIZE = 2 * REST
 # kinds of wells
 NONE, LOST, SEPARATRIX, NUTATION, PRECESSION, PASSAGE = -2, -1, 0, 1, 2, 3
@@ -219,7 +221,8 @@ def fill(gaps, k, level, at_poles, equatorial, loose, right, left, row):
     store(row, HIGH_PLUS, v)
     store(row, HIGH_MINUS, wh)
     row[BAR_HIGH], row[BAR_LOW] = bar_v + ROUNDOFF * abs(uh[0]), bar_w + ROUNDOFF * abs(ul[0])
-    row[NOISE_WIDTH] = (bar_v + bar_w) / max(width, TINY)
+    row[BAR_SUM] = bar_v + bar_w
+    row[NOISE_WIDTH] = row[BAR_SUM] / max(width, TINY)
     store(row, K, k)
     store(row, L, level)
     store(row, MINUS, minus)
