@@ -93,7 +93,7 @@ class Grid:
         return tuple(lengths.values())
 
     def point(self, block):
-        """{name: array} for `block` (a tuple of slices): every array has one axis per dimension
+        """{name: array, to read alone} for `block` (a tuple of slices): every array has one axis per dimension
         (some of length 1).
         """
         where = dict(zip(self.sizes, block, strict=True))
@@ -105,7 +105,7 @@ class Grid:
             part = part.reshape(
                 [part.shape[order.index(dims.index(dim))] if dim in dims else 1 for dim in where]
             )
-            aligned[name] = part.copy()
+            aligned[name] = np.asarray(part, order="C")
         return aligned
 
     def ends_and_middles(self):

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+MANY = 1000  # values of which the least and the greatest are found sooner than all are compared
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -58,6 +60,12 @@ class Parameter:
             for value in self.excluded:
                 inside = inside & (values != value)
         return inside
+
+    def holds_all(self, values: npt.NDArray[np.float64], outputs: Collection[str] = ()) -> bool:
+        """Do all `values` (any shape) lie in the domain of `holds`?"""
+        if values.size > MANY and not self.whole and not self.excluded:
+            values = np.array([values.min(), values.max()])  # an interval; NaN if there is one
+        return bool(self.holds(values, outputs).all())
 
     @property
     def domain(self) -> str:

@@ -46,6 +46,10 @@ class Rows:
         """One value per row, of an array that is constant along the lanes."""
         return np.array(self._first(array), order="C").reshape(self.rows)
 
+    def seen(self, array):
+        """As `per_row`, to read alone: no copy of what is an array per row already."""
+        return np.require(self._first(array).reshape(self.rows), requirements=["C", "W"])
+
     def _first(self, array):
         """The array at the first of the lanes, in the shape of the rows."""
         array = np.asarray(array, dtype=float)

@@ -19,7 +19,8 @@ own in the order of STATUS). Where an output does not apply a float is NaN, an i
 Where a scene gives a status of its own, the verdict is -1, and maps and counts name the status. A
 scene may fill arrays of `request.out`, in which outputs are stored, and return these, error bounds
 (float32) rounded up and finite.
-`solve` is pure and thread-safe, and gives a point the same bits in any block.
+`solve` is pure and thread-safe, and gives a point the same bits in any block: the arrays of `point`
+are the dataset's coordinates, to read alone.
 
 In `why` and `trajectory`, `point` maps each parameter to a number, and `answer` holds everything
 that is known of one point, {name: array}, flags as words. `compile_ahead` runs in a process of its

@@ -183,27 +183,26 @@ def solve(point, request):
     method = load(methods, "agm" if request.method == "auto" else request.method, "method")
     shared = {p.name: point[p.name] for p in PARAMETERS if p.name in point and p.name != "t"}
     block = Rows(tuple(shared.values()), *([point["t"]] if "t" in point else []))
-    columns = block.columns(shared.values())
-    given = dict(zip(shared, columns, strict=True))
-    valid = np.isfinite(columns).all(axis=0)
-    wanted = request.variables or {"action", "separatrix_distance"}
+    given = {name: block.seen(values) for name, values in shared.items()}
+    points = tuple(given.values())
+    wanted = derived.needed(request.variables or {*nutation.NAMES, "separatrix_distance"})
     times = block.per_point(point["t"]) if "t" in point else None
     if "l" in given:
+        valid = np.isfinite(points).all(axis=0)
         sign = int(request.options["sign"])
         solver = partial(multiprecision.of_integrals, sign=sign)
         slowly = partial(_scaled, sign=sign, method=method, rtol=request.rtol)
         out = _scaled_in_lanes(given, valid, sign, slowly, wanted) if auto else slowly(given, valid)
     else:
-        valid &= (given["C"] <= 2.0 * given["A"]) & (
-            (given["theta0"] > 0.0) | (given["p_psi"] == given["p_phi"])
-        )
+        valid = np.empty(block.rows, bool)
+        brun.possible(points, valid)
         solver = multiprecision.of_state
         slowly = partial(_state, method=method, request=request, times=times)
         out = (
-            _state_in_lanes(given, columns, valid, slowly, wanted) if auto else slowly(given, valid)
+            _state_in_lanes(given, points, valid, slowly, wanted) if auto else slowly(given, valid)
         )
     if "t" not in point:
-        unsettled.settle(out, columns, solver, valid, request)
+        unsettled.settle(out, points, solver, valid, request)
     out |= derived.solve(out, request.variables)
     out |= on_request.solve(given, valid, times, out, request)
     return {name: _back(block, values) for name, values in out.items()}
@@ -232,11 +231,11 @@ def _back(block, values):
     return block.back(values.reshape(block.rows, -1))
 
 
-def _state_in_lanes(given, columns, valid, slowly, wanted):
-    values, wells, done = nutation.in_lanes(brun_lanes.of_states, columns, "action" in wanted)
-    out = nutation.named(values) | {"wells": wells.astype(np.int64)}
+def _state_in_lanes(given, points, valid, slowly, wanted):
+    values, wells, done = nutation.in_lanes(brun_lanes.of_states, points, wanted)
+    out = nutation.named(values, wanted) | {"wells": wells.astype(np.int64)}
     if "separatrix_distance" in wanted:
-        out |= nutation.distance(nutation.heights(brun.heights_of_states, columns))
+        out |= nutation.distance(nutation.heights(brun.heights_of_states, np.array(points)))
     out = _completed(out, given, valid, done, slowly)
     blurred = (
         np.flatnonzero(out["action_error"] > _BLURRED * np.abs(out["action"]))
@@ -256,16 +255,16 @@ def _scaled_in_lanes(given, valid, sign, slowly, wanted):
     columns[rc.LEVEL], columns[rc.SIGN], columns[rc.WELL] = given["l"], sign, -1.0
     columns[rc.RATIO] = given["ratio"]
     columns[rc.P_PSI], columns[rc.P_PHI] = given["beta"], given["alpha"]
-    values, wells, done = nutation.in_lanes(brun_lanes.of_integrals, columns, "action" in wanted)
+    values, wells, done = nutation.in_lanes(brun_lanes.of_integrals, tuple(columns), wanted)
     both = np.full((*values.shape, 2), np.nan)
     both[..., 0] = values
     two = np.flatnonzero(done & (wells == 2))
     upper = columns[:, two]
     upper[rc.WELL] = 1.0
     both[:, two, 1], _wells, done[two] = nutation.in_lanes(
-        brun_lanes.of_integrals, upper, "action" in wanted
+        brun_lanes.of_integrals, tuple(upper), wanted
     )
-    out = nutation.named(both[:, :, None, :]) | {"wells": wells.astype(np.int64)}
+    out = nutation.named(both[:, :, None, :], wanted) | {"wells": wells.astype(np.int64)}
     if "separatrix_distance" in wanted:
         out |= nutation.distance(nutation.heights(brun.heights_of_integrals, columns))
     return _completed(out, given, valid, done, slowly)
@@ -273,7 +272,10 @@ def _scaled_in_lanes(given, valid, sign, slowly, wanted):
 
 def _completed(out, given, valid, done, slowly):
     """`out` of nutations, with what the lanes have left."""
-    out |= {"verdict": np.full(valid.size, nu.NUTATION), "status": np.full(valid.size, OK)}
+    out |= {
+        name: np.full(valid.size, code, np.int8)
+        for name, code in (("verdict", nu.NUTATION), ("status", OK))
+    }
     left = np.flatnonzero(valid & ~done)
     if left.size:
         part = slowly({name: values[left] for name, values in given.items()}, valid[left])
@@ -296,7 +298,7 @@ def _state(given, valid, method, request, times):
     status = np.where(kinds == nu.LOST, np.where(_too_large(points), OVERFLOW, NO_CONVERGENCE), OK)
     out = _finished(out, status, valid, count, heights)
     if times is not None:
-        unsettled.settle(out, points.T, multiprecision.of_state, valid, request, known=True)
+        unsettled.settle(out, tuple(points.T), multiprecision.of_state, valid, request, known=True)
     if times is None:
         return out
 

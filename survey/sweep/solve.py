@@ -56,8 +56,11 @@ def solve_point(scene, request, point, shape, out=None):
     used = {p.name: p for p in scene.PARAMETERS}
     valid = {}
     for key, values in point.items():
-        inside = used[key].holds(values, request.variables)
-        valid[key] = values if inside.all() else np.where(inside, values, np.nan)
+        if used[key].holds_all(values, request.variables):
+            valid[key] = values
+        else:
+            inside = used[key].holds(values, request.variables)
+            valid[key] = np.where(inside, values, np.nan)
     with np.errstate(all="ignore"):  # what overflows or is undefined gets a status, not a warning
         solved = scene.solve({key: np.atleast_1d(values) for key, values in valid.items()}, request)
     return stored(scene, request, solved, shape, out)

@@ -63,6 +63,19 @@ def of_state(size_a, size_c, epsilon, theta, p_theta, b, a):
 
 
 @kernel
+def possible(points, valid):
+    """Fill `valid` (n): are `points`, a tuple of STATE arrays (n), initial states of a body?"""
+    a, c, epsilon = points[rc.SIZE_A], points[rc.SIZE_C], points[rc.EPSILON]
+    theta, p_theta = points[rc.THETA], points[rc.P_THETA]
+    psi, phi = points[rc.P_PSI], points[rc.P_PHI]
+    for i in range(len(valid)):
+        finite = (abs(a[i]) < np.inf) & (abs(c[i]) < np.inf) & (abs(epsilon[i]) < np.inf)
+        finite &= (abs(p_theta[i]) < np.inf) & (abs(psi[i]) < np.inf) & (abs(phi[i]) < np.inf)
+        finite &= (theta[i] > 0.0) | (psi[i] == phi[i])
+        valid[i] = finite & (abs(theta[i]) < np.inf) & (c[i] <= 2.0 * a[i])
+
+
+@kernel
 def phase(row, theta, p_theta, start):
     """Fill `start`: the columns DONE to START_BAR of `records`.
 

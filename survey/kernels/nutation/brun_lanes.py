@@ -1,7 +1,7 @@
 """As `kernels/nutation/brun.py` and `methods/agm.py`, in lanes: with few steps, with more, lastly
 in double-double.
 
-Points are columns of GIVEN numbers: a state, or scaled integrals in its place (see `records`).
+Points are a tuple of GIVEN arrays: of states, or of scaled integrals in their place (see `records`).
 """
 
 import numpy as np
@@ -15,7 +15,7 @@ from survey.kernels.nutation.lanes import GIVEN, GOOD, OUTPUTS, TILE, WELLS, A, 
 
 # steps of Laguerre's method and of Newton's, means; at first from the initial state or from the
 # poles
-FEW, FEW_FROM_POLES, MORE, MOST = (3, 1, 8), (6, 1, 8), (12, 1, 12), (30, 4, 26)
+FEW, FEW_FROM_POLES, MORE, MOST = (3, 1, 6), (6, 1, 6), (12, 1, 12), (30, 4, 26)
 LEFT, CANCELLED, DONE = 0, 1, 2
 
 
@@ -71,24 +71,25 @@ def enter(points, which, first, work):
     start, last = which[first], len(which) - 1
     if together(which, first):
         for j in range(GIVEN):
-            row = points[j, start : start + TILE]
+            row = points[j][start : start + TILE]
             for i in range(TILE):
                 work[j * TILE + i] = row[i]
         return
     for i in range(TILE):
         at = which[min(first + i, last)]
         for j in range(GIVEN):
-            work[j * TILE + i] = points[j, at]
+            work[j * TILE + i] = points[j][at]
 
 
 @kernel
-def leave(work, answers, which, first, out, wells, done):
+def leave(work, answers, which, first, kept, out, wells, done):
     start = which[first]
     if together(which, first):
         for j in range(OUTPUTS):
-            row = out[j, start : start + TILE]
-            for i in range(TILE):
-                row[i] = answers[j * TILE + i]
+            if kept[j]:
+                row = out[j, start : start + TILE]
+                for i in range(TILE):
+                    row[i] = answers[j * TILE + i]
         number, state = wells[start : start + TILE], done[start : start + TILE]
         for i in range(TILE):
             number[i], state[i] = work[WELLS + i], work[GOOD + i]
@@ -107,9 +108,12 @@ def solve(work, steps, within, exactly, actions):
     else:
         if within:
             nl.inside(work)
-        else:
+            nl.approach_roughly(work, steps[0])
+            nl.approach(work, 0)
+        else:  # float32 may miss a narrow well on the way
             nl.poles(work)
-        nl.approach(work, steps[0])
+            nl.approach_roughly(work, 0)
+            nl.approach(work, steps[0])
     nl.wells(work, steps[1])
     nl.means(work, steps[2])
     if exactly:
@@ -143,7 +147,7 @@ def in_state(done, low, high, which):
 
 
 @splice
-def answer(polynomials, fill, known_u, points, actions, out, wells, done):
+def answer(polynomials, fill, known_u, points, actions, kept, out, wells, done):
     """Tile after tile: the polynomials of its points, their wells, and their answers.
 
     All of them go with FEW steps, what these leave with MORE and then with MOST; exactly where that
@@ -160,7 +164,7 @@ def answer(polynomials, fill, known_u, points, actions, out, wells, done):
             fill(work, answers)
             if actions:
                 action.mend(work, answers)
-            leave(work, answers, which, first, out, wells, done)
+            leave(work, answers, which, first, kept, out, wells, done)
         left = in_state(done, LEFT, CANCELLED, left) if exactly else left
         which = left if exactly else in_state(done, CANCELLED, CANCELLED, left)
 
@@ -171,6 +175,7 @@ def compile_some(kernel):
     (states if kernel is of_states else integrals)(work)
     nl.approach_slowly(work, 1)
     nl.inside(work)
+    nl.approach_roughly(work, 1)
     nl.approach(work, 1)
     nl.means(work, 1)
     nl.small_actions(work)
@@ -182,8 +187,8 @@ def compile_others():
     """As `compile_some`, for a process beside that one."""
     work, answers = np.zeros(lanes_double.ALL), np.zeros(OUTPUTS * TILE)
     one, which = np.zeros(1), np.zeros(1, np.int64)
-    enter(np.zeros((GIVEN, 1)), which, 0, work)
-    leave(work, answers, which, 0, np.zeros((OUTPUTS, 1)), one, one)
+    enter((one,) * GIVEN, which, 0, work)
+    leave(work, answers, which, 0, np.ones(OUTPUTS, bool), np.zeros((OUTPUTS, 1)), one, one)
     nl.wells(work, 1)
     lanes_double.begin(work)
     lanes_double.go(work, 1)
@@ -191,16 +196,16 @@ def compile_others():
 
 
 @kernel
-def of_states(points, actions, out, wells, done):
-    """Outputs (OUTPUTS, n) of initial states (GIVEN, n), the numbers of wells (n), and which are
+def of_states(points, actions, kept, out, wells, done):
+    """Outputs (OUTPUTS, n) of initial states, the numbers of wells (n), and which are
     DONE (n).
 
-    actions: accurate ones of small wells.
+    actions: accurate ones of small wells; kept: the rows of `out` to fill.
     """
-    answer(states, answer_states, True, points, actions, out, wells, done)
+    answer(states, answer_states, True, points, actions, kept, out, wells, done)
 
 
 @kernel
-def of_integrals(points, actions, out, wells, done):
+def of_integrals(points, actions, kept, out, wells, done):
     """As `of_states`, at scaled integrals."""
-    answer(integrals, answer_integrals, False, points, actions, out, wells, done)
+    answer(integrals, answer_integrals, False, points, actions, kept, out, wells, done)

@@ -9,6 +9,8 @@ lane's bits do not depend on its neighbours.
 
 from math import copysign, pi, sqrt
 
+import numpy as np
+
 from survey.kernels.jit import inline, kernel
 from survey.kernels.math import double as dd
 from survey.kernels.math.chebyshev import nodes
@@ -26,11 +28,13 @@ U_MIN_BAR, U_MAX_BAR, PERIOD_BAR, PRECESSION_BAR, SPIN_BAR, ACTION_BAR = range(
 OUTPUTS = 12
 RIGHT = 0.125 * ROUNDOFF  # errors of the set-up, relative
 BLUR = 0.01  # the error of a well's width, relative
+SAME = 1e-15  # u and a turning point that differ by less may be the same
 WIDE = 0.1  # wells that are wider are no parabolas
 NEAR, LAST = 3e-5, 1e-17  # the last two means, and the last weight of R
-SLANT, CANCELLED = 0.25, 0.05  # as in methods/agm.py
+SLANT, CANCELLED = 0.25, 0.01  # as in methods/agm.py
 NODES = 16
 COSINES = nodes(NODES)
+NOTHING, TWO, THREE, FOUR, SIX, NINE, TWELVE = map(np.float32, (0, 2, 3, 4, 6, 9, 12))
 # where the rows of a tile begin: of what is given, a state or scaled integrals in its place; its
 # last two are b and a
 SIZE_A, SIZE_C, EPSILON, THETA, P_THETA, B, A = (
@@ -62,7 +66,9 @@ FINE_TOTAL, FINE_DIFFERENCE, FINE = range(62 * TILE, 65 * TILE, TILE)
 BAR_V, BAR_W, SMALL_ACTION = range(65 * TILE, 68 * TILE, TILE)
 # the roots of Q at the turning points, P at U
 ROOT_LOW, ROOT_HIGH, HERE = range(68 * TILE, 71 * TILE, TILE)
-ROWS = 71
+# what the error of ul + uh makes of FINE_TOTAL and FINE_DIFFERENCE
+TILTED_TOTAL, TILTED_DIFFERENCE = range(71 * TILE, 73 * TILE, TILE)
+ROWS = 73
 
 
 @inline
@@ -73,6 +79,16 @@ def laguerre(c0, c1, c2, c3, c4, y):
     second = 2.0 * c2 + y * (6.0 * c3 + y * 12.0 * c4)
     square = 9.0 * first * first - 12.0 * value * second
     return y - 4.0 * value / (first + sqrt(square if square > 0.0 else 0.0))
+
+
+@inline
+def roughly(c0, c1, c2, c3, c4, y):
+    """As `laguerre`, in float32."""
+    value = c0 + y * (c1 + y * (c2 + y * (c3 + y * c4)))
+    first = c1 + y * (TWO * c2 + y * (THREE * c3 + y * FOUR * c4))
+    second = TWO * c2 + y * (SIX * c3 + y * TWELVE * c4)
+    square = NINE * first * first - TWELVE * value * second
+    return y - FOUR * value / (first + np.sqrt(square if square > NOTHING else NOTHING))
 
 
 @inline
@@ -128,17 +144,18 @@ def store(work, row, i, value):
 
 
 @inline
-def first_step(c0, c1, c2, at):
-    """The root of the parabola where P rises with y, or the pole."""
-    square = c1 * c1 - 4.0 * c0 * c2
-    root = sqrt(square if square > 0.0 else 0.0)
-    y = (-2.0 * c0 if c1 > 0.0 else root - c1) / (c1 + root if c1 > 0.0 else 2.0 * c2)
-    return min(max(y if (c1 > 0.0) | (c2 < 0.0) else -at, -at), 2.0 - at)
+def first_step(c0, c1, c2, low):
+    """The root of the parabola where P rises with y, or the pole, y = low; in float32."""
+    square = c1 * c1 - FOUR * c0 * c2
+    root = np.sqrt(square if square > NOTHING else NOTHING)
+    rises = c1 > NOTHING
+    y = (-TWO * c0 if rises else root - c1) / (c1 + root if rises else TWO * c2)
+    return y if rises | (c2 < NOTHING) else low
 
 
 @inline
 def chart(work, row, at, here, slope, i):
-    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; and where to start."""
+    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature."""
     k, u = work[K + i], 1.0 - at
     bend = (k - work[L + i]) - 6.0 * k * u * u
     work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
@@ -147,7 +164,46 @@ def chart(work, row, at, here, slope, i):
         slope,
         bend,
     )
-    work[row + 4 * TILE + i] = first_step(here, slope, bend, at)
+
+
+@inline
+def size_of(work, row, i):
+    """The size of a chart's numbers."""
+    return abs(work[row + TILE + i]) + abs(work[row + 2 * TILE + i]) + abs(work[row + 3 * TILE + i])
+
+
+@inline
+def begin_roughly(work, row, scale, rough, first, i):
+    """The chart in float32, times `scale`; and where to start."""
+    at, here, slope, bend = (
+        work[row + i],
+        work[row + TILE + i],
+        work[row + 2 * TILE + i],
+        work[row + 3 * TILE + i],
+    )
+    k = work[K + i]
+    c0, c1, c2 = np.float32(scale * here), np.float32(scale * slope), np.float32(scale * bend)
+    low = np.float32(-at)
+    rough[first + i], rough[first + TILE + i], rough[first + 2 * TILE + i] = c0, c1, c2
+    rough[first + 3 * TILE + i] = np.float32(scale * (4.0 * k * (1.0 - at)))
+    rough[first + 4 * TILE + i] = np.float32(-scale * k)
+    rough[first + 5 * TILE + i] = low
+    rough[first + 6 * TILE + i] = min(max(first_step(c0, c1, c2, low), low), low + TWO)
+
+
+@inline
+def step_roughly(rough, first, i):
+    """A step towards a turning point, in float32."""
+    low = rough[first + 5 * TILE + i]
+    y = roughly(
+        rough[first + i],
+        rough[first + TILE + i],
+        rough[first + 2 * TILE + i],
+        rough[first + 3 * TILE + i],
+        rough[first + 4 * TILE + i],
+        rough[first + 6 * TILE + i],
+    )
+    rough[first + 6 * TILE + i] = min(max(y, low), low + TWO)
 
 
 @inline
@@ -276,6 +332,9 @@ def settle(work, i):
     sure &= (bar_v < RIGHT * v[0]) & (bar_w < RIGHT * w[0])
     sure &= (bar_w < RIGHT * v_low[0]) & (bar_v < RIGHT * w_high[0])
     sure &= (work[MINUS + i] != 0.0) & (work[PLUS + i] != 0.0)
+    u = work[U + i]  # beyond 1 if it is not known: the well holds it
+    sure &= (abs(u) > 1.0) | ((u >= low[0] - SAME) & (u <= high[0] + SAME))
+    sure &= (total[0] == 0.0) | (bar_v + bar_w < RIGHT * abs(total[0]))
     # else it is a regular precession
     sure &= width > 4.0 * (bar_v + bar_w + ROUNDOFF * (abs(low[0]) + abs(high[0])))
     two = (k[0] > 0.0) & (bend[0] < 0.0)
@@ -435,7 +494,9 @@ def finish(work, size, drift, i, answers):
     precession = pi * (turns_down + turns_up) + total
     spin = pi * (turns_down - turns_up) + difference
     error_precession = error + rounding * abs(total) + turned * abs(turns_down + turns_up)
+    error_precession += period * work[TILTED_TOTAL + i] if exactly else 0.0
     error_spin = error + rounding * abs(difference) + turned * abs(turns_down - turns_up)
+    error_spin += period * work[TILTED_DIFFERENCE + i] if exactly else 0.0
     rest = 0.5 * (
         0.5 * work[ABOVE + i] - (work[SERIES + i] + 2.0 * work[WEIGHT + i] * apart * apart)
     )
@@ -533,8 +594,26 @@ def poles(work):
 
 
 @kernel
+def approach_roughly(work, steps):
+    """From the polynomial about the start towards the turning points, in float32."""
+    rough = np.empty(14 * TILE, np.float32)
+    up, down = 0, 7 * TILE
+    for i in range(TILE):
+        scale = 1.0 / (abs(work[K + i]) + size_of(work, UP, i) + size_of(work, DOWN, i))
+        begin_roughly(work, UP, scale, rough, up, i)
+        begin_roughly(work, DOWN, scale, rough, down, i)
+    for _ in range(steps):
+        for i in range(TILE):
+            step_roughly(rough, up, i)
+            step_roughly(rough, down, i)
+    for i in range(TILE):
+        work[UP + 4 * TILE + i] = rough[up + 6 * TILE + i]
+        work[DOWN + 4 * TILE + i] = rough[down + 6 * TILE + i]
+
+
+@kernel
 def approach(work, steps):
-    """From the polynomial about the start to the turning points, in float64."""
+    """To the turning points, in float64."""
     for _ in range(steps):
         for i in range(TILE):
             step(laguerre, work, UP, i)

@@ -2,7 +2,7 @@
 
 from survey.kernels.jit import inline, kernel, splice
 from survey.kernels.math import double as dd
-from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF
+from survey.kernels.math.roundoff import PAIR_SUM_ROUNDOFF, ROUNDOFF
 from survey.kernels.nutation.lanes import (
     BAR_V,
     BAR_W,
@@ -18,6 +18,8 @@ from survey.kernels.nutation.lanes import (
     ROWS,
     SUM,
     TILE,
+    TILTED_DIFFERENCE,
+    TILTED_TOTAL,
     V_HIGH,
     V_LOW,
     W_HIGH,
@@ -148,6 +150,14 @@ def finish(work, i):
                 pair(work, LINE_DOWN, i), pair(work, DOWN + TOTAL, i))  # fmt: skip
     total, difference = dd.loose(down, up), dd.loose(down, dd.neg(up))
     work[FINE_TOTAL + i], work[FINE_DIFFERENCE + i] = 0.5 * total[0], 0.5 * difference[0]
+    # the error of ul + uh is one of h, as in methods/agm.py
+    tilt = abs(work[K + i]) * (work[BAR_V + i] + work[BAR_W + i]) / (high[0] + low[0])
+    over_up, over_down = 1.0 / work[LINE_UP + i], 1.0 / work[LINE_DOWN + i]
+    one, other = work[MINUS + i] * over_up, work[PLUS + i] * over_down
+    more = abs(up[0] * work[V_HIGH + i] * over_up) + abs(down[0] * work[W_LOW + i] * over_down)
+    more += 4.0 * ROUNDOFF * (abs(one) + abs(other))
+    work[TILTED_TOTAL + i] = tilt * (abs(one - other) + more)
+    work[TILTED_DIFFERENCE + i] = tilt * (abs(one + other) + more)
     known = (abs(work[UP + WEIGHT + i]) <= LAST * work[UP + TOTAL + i]) & (
         abs(work[DOWN + WEIGHT + i]) <= LAST * work[DOWN + TOTAL + i]
     )

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from survey.kernels.math.roundoff import ROUNDOFF
+from survey.kernels.nutation.lanes import NAMES
 
 TURN = 2.0 * np.pi
 FINITE = "off separatrices, where the period is infinite"
@@ -66,6 +67,11 @@ DERIVED = (
     Derived("spin_number", "rotation number of the spin", r"\Delta\varphi / 2\pi", _BY_ONE, ("spin",), _number),
 )  # fmt: skip
 PARTS = {one.name: set(one.parts) for one in DERIVED}
+
+
+def needed(wanted):
+    """The outputs that those `wanted` are, or are derived from; all NAMES if none is wanted by name."""
+    return set().union(*(PARTS.get(name, {name}) for name in wanted or NAMES))
 
 
 def solve(out, wanted):

@@ -14,8 +14,9 @@ DISTANCE = "separatrix_distance"
 
 
 def settle(out, points, solver, valid, request, known=False):
-    """Solve the points (parameters, n) again in place, as `solver` of `multiprecision` does, where
-    that is needed.
+    """Solve points again in place, as `solver` of `multiprecision` does, where that is needed.
+
+    points: a tuple of an array (n) for each parameter.
 
     known: only motions whose period is known already. For methods other than `auto`, only distances
     from a separatrix whose existence is in doubt.
@@ -27,7 +28,8 @@ def settle(out, points, solver, valid, request, known=False):
     if known:
         unsettled &= (out["status"] == OK) & (out["verdict"] >= nu.NUTATION)
     for i in np.flatnonzero(unsettled):
-        _solve(out, i, points[:, i], solver, request.method == "auto")
+        point = [values[i] for values in points]
+        _solve(out, i, point, solver, request.method == "auto")
     if DISTANCE in out:
         out[f"{DISTANCE}_error"][np.isnan(out[DISTANCE])] = np.nan
 
@@ -38,12 +40,9 @@ def _open(out, request):
     found = (status == NO_CONVERGENCE) | (status == OVERFLOW)
     found |= (status == OK) & (verdict != nu.NUTATION) & (verdict != nu.PASSAGE)
     rtol = max(request.rtol, ILL)
-    asked = set().union(
-        *(derived.PARTS.get(name, {name}) for name in request.variables or wells.NAMES)
-    )
-    for name in asked & {*wells.NAMES, DISTANCE} & out.keys():
+    for name in derived.needed(request.variables) & {*wells.NAMES, DISTANCE} & out.keys():
         bars = out[f"{name}_error"]
-        if (bars <= rtol).all():  # as a rule
+        if bars.max(initial=0.0) <= rtol:  # as a rule
             continue
         with np.errstate(invalid="ignore"):
             missed = bars > rtol * (1.0 + np.abs(out[name]))
@@ -53,7 +52,7 @@ def _open(out, request):
 
 def _solve(out, i, point, solver, everything):
     try:
-        answer = solver(*point.tolist())
+        answer = solver(*map(float, point))
     except multiprecision.NoMotion:
         answer = None
         if everything:
@@ -74,7 +73,7 @@ def _store(out, i, found, status, verdict, number):
     out["status"][i] = status if np.isfinite(numbers).all() else OVERFLOW
     out["verdict"][i] = verdict if out["status"][i] == OK else wells.UNDECIDED
     out["wells"][i] = number
-    for name in (*wells.NAMES, *(f"{name}_error" for name in wells.NAMES)):
+    for name in {*wells.NAMES, *(f"{name}_error" for name in wells.NAMES)} & out.keys():
         row = out[name][i : i + 1].reshape(-1)
         row[:] = np.nan
         if out["status"][i] == OK:

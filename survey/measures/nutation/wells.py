@@ -45,24 +45,26 @@ def of_integrals(points, sign):
     return rows, kinds, count, heights
 
 
-def in_lanes(kernel, points, actions):
-    """Values and bounds (OUTPUTS, n) of `points` (STATE, n), numbers of wells (n), who is answered
-    (n): see `brun_lanes`.
+def in_lanes(kernel, points, names):
+    """Values and bounds (OUTPUTS, n) of `points`, a tuple of STATE arrays (n), numbers of wells
+    (n), who is answered (n): see `brun_lanes`.
 
-    actions: to full accuracy in small wells, too.
+    names: those of NAMES that are wanted; only their rows are filled.
     """
-    n = points.shape[1]
+    n = len(points[0])
     out, wells, done = np.empty((OUTPUTS, n)), np.empty(n), np.empty(n)
     if waiting.other_compiler:
         brun_lanes.compile_some(kernel)
         waiting.wait("lanes")
-    kernel(points, actions, out, wells, done)
+    kept = np.array([name in names for name in NAMES] * 2)
+    kernel(points, "action" in names, kept, out, wells, done)
     return out, wells, done == brun_lanes.DONE
 
 
-def named(values):
+def named(values, names):
     """{name: values, name_error: error bounds} of the answers of `in_lanes`."""
-    return dict(zip((*NAMES, *(f"{name}_error" for name in NAMES)), values, strict=True))
+    rows = zip((*NAMES, *(f"{name}_error" for name in NAMES)), values, strict=True)
+    return {name: row for name, row in rows if name.removesuffix("_error") in names}
 
 
 def compile_periods(method):
