@@ -23,7 +23,7 @@ from survey.kernels.cylinder.program import (
     number_of,
     unchanged,
 )
-from survey.kernels.jit import inline, kernel, part, splice
+from survey.kernels.jit import inline, kernel, part
 from survey.kernels.math.roundoff import ROUNDOFF_UP
 
 # Bounds of |f| and |f'|, of |g|, of |g'|, of |g''|, as they stand in p from BOUND_F on; then the sizes
@@ -118,52 +118,6 @@ def _agree(p, out, first):
     return near
 
 
-@splice
-def _bound_finely(p, numbers, middles, radii, bounds):
-    """Lower the bounds over the whole circle in p, which are the largest `bounds` (n, BOUNDS) of its
-    pieces: those with more than half of the largest are divided by four, until no bound falls to less
-    than half by that.
-    """
-    count, near = number_of(p, SLOTS), False
-    points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
-    known, none, out = np.zeros(count, np.bool_), np.zeros(LANES), np.empty(BOUNDS)
-    narrowest = radii[0]
-    while not near and len(radii) <= FINEST and narrowest > 1.01 * math.pi / FINEST:
-        large, left = np.zeros(len(radii), np.bool_), len(radii)
-        for i in range(len(radii)):
-            for k in range(BOUNDS):
-                large[i] |= not bounds[i, k] <= 0.5 * p[BOUND_F + k] or bounds[i, k] == math.inf
-            left -= large[i]
-        size = left + 4 * (len(radii) - left)
-        finer, narrower, lower = np.empty(size), np.empty(size), np.zeros((size, BOUNDS))
-        stays, part = 0, left  # what stays comes first
-        for i in range(len(radii)):
-            if large[i]:
-                for j in range(4):
-                    finer[part + j] = middles[i] + (0.5 * j - 0.75) * radii[i]
-                    narrower[part + j] = 0.250001 * radii[i]
-                part += 4
-            else:
-                finer[stays], narrower[stays] = middles[i], radii[i]
-                for k in range(BOUNDS):
-                    lower[stays, k] = bounds[i, k]
-                stays += 1
-        for first in range(left, size, LANES):
-            phi = finer[first : first + LANES]
-            balls(p, numbers, known, phi, none, points)
-            balls(p, numbers, known, phi, narrower[first : first + LANES], over)
-            for q in range(len(phi)):
-                raised(p, points, over, q, lower[first + q])
-        for k in range(BOUNDS):
-            out[k] = 0.0
-            for i in range(size):
-                out[k] = max(out[k], lower[i, k])
-        near = _agree(p, out, False)
-        middles, radii, bounds = finer, narrower, lower
-        for i in range(size):
-            narrowest = min(narrowest, radii[i])
-
-
 @inline
 def _periodic(p, points, first, many):
     """Are f and g the same, within their rounding, at angles and 2 pi further on? In `points` these
@@ -182,14 +136,15 @@ def _periodic(p, points, first, many):
 @kernel
 def complete(rows, angles):
     """Fill in AT_REST and, on a circle, the bounds of programs, all of one length; NaN where a number
-    is not finite, or f and g have no bounds or, by these angles, not the period 2 pi.
+    is not finite, or f and g have, by these angles, not the period 2 pi. Returns who is left to
+    `bound_finely`.
 
-    Bounds are within a factor of 2, of 4 COARSEST pieces of the circle or more: infinite where pieces
-    as narrow as one of FINEST do not bound f and g. What does not depend on parameters is found once
-    for all rows.
+    Bounds are those of 4 COARSEST pieces of the circle, within a factor of 2. What does not depend on
+    parameters is found once for all rows.
     """
+    left = np.zeros(len(rows), np.bool_)
     if len(rows) == 0:
-        return
+        return left
     circle, count = rows[0, ON_CIRCLE] > 0.0, number_of(rows[0], SLOTS)
     # batches: 0; the angles; the pieces of the circle, COARSEST and 4 COARSEST of them
     batches, many, pieces = 5 if circle else 1, len(angles), 5 * COARSEST
@@ -226,19 +181,69 @@ def complete(rows, angles):
                     k = 2 + q // LANES
                     raised(p, points[k], over[k], q % LANES, out)
                 near = _agree(p, out, first == 0)
-            if not near:
-                bounds = np.zeros((pieces - COARSEST, BOUNDS))
-                for q in range(COARSEST, pieces):
-                    k = 2 + q // LANES
-                    raised(p, points[k], over[k], q % LANES, bounds[q - COARSEST])
-                first = 2 * LANES + COARSEST
-                place = slice(first, first + len(bounds))
-                _bound_finely(p, numbers.ravel(), at[place], radii[place], bounds)
-            for k in range(BOUNDS):
-                good &= math.isfinite(p[BOUND_F + k])
-            good = good and _periodic(p, points[1], 0, many)
+            good = _periodic(p, points[1], 0, many)
+            left[r] = good and not near
         if not good:
             p[:] = math.nan
+    return left
+
+
+@kernel
+def bound_finely(p):
+    """Lower the bounds over the whole circle in p, which are those of 4 COARSEST pieces: pieces with
+    more than half of the largest are divided by four, until no bound falls to less than half by
+    that; NaN where they are still infinite then.
+    """
+    count, near, left, size = number_of(p, SLOTS), False, 0, 4 * COARSEST
+    points, over = np.zeros(count * 2 * LANES), np.zeros(count * 6 * LANES)
+    numbers, known = np.zeros((2 * count, LANES)), np.zeros(count, np.bool_)
+    note(p, numbers, 0, LANES)
+    none, out = np.zeros(LANES), np.empty(BOUNDS)
+    middles, radii, bounds = np.empty(size), np.empty(size), np.zeros((size, BOUNDS))
+    narrowest = _middles(size, middles)
+    radii[:] = narrowest
+    while True:
+        for first in range(left, size, LANES):
+            phi = middles[first : first + LANES]
+            balls(p, numbers.ravel(), known, phi, none, points)
+            balls(p, numbers.ravel(), known, phi, radii[first : first + LANES], over)
+            for q in range(len(phi)):
+                raised(p, points, over, q, bounds[first + q])
+        if size > 4 * COARSEST:
+            for k in range(BOUNDS):
+                out[k] = 0.0
+                for i in range(size):
+                    out[k] = max(out[k], bounds[i, k])
+            near = _agree(p, out, False)
+        if near or size > FINEST or narrowest <= 1.01 * math.pi / FINEST:
+            break
+        large, left = np.zeros(size, np.bool_), size
+        for i in range(size):
+            for k in range(BOUNDS):
+                large[i] |= not bounds[i, k] <= 0.5 * p[BOUND_F + k] or bounds[i, k] == math.inf
+            left -= large[i]
+        finer = left + 4 * (size - left)
+        at, narrower, lower = np.empty(finer), np.empty(finer), np.zeros((finer, BOUNDS))
+        stays, part = 0, left  # what stays comes first
+        for i in range(size):
+            if large[i]:
+                for j in range(4):
+                    at[part + j] = middles[i] + (0.5 * j - 0.75) * radii[i]
+                    narrower[part + j] = 0.250001 * radii[i]
+                part += 4
+            else:
+                at[stays], narrower[stays] = middles[i], radii[i]
+                for k in range(BOUNDS):
+                    lower[stays, k] = bounds[i, k]
+                stays += 1
+        middles, radii, bounds, size = at, narrower, lower, finer
+        for i in range(size):
+            narrowest = min(narrowest, radii[i])
+    good = True
+    for k in range(BOUNDS):
+        good &= math.isfinite(p[BOUND_F + k])
+    if not good:
+        p[:] = math.nan
 
 
 @kernel

@@ -482,6 +482,7 @@ def flows(f, g, points, on_circle):
     longest = max((rows.shape[1] for _, rows in found), default=pg.OPERATIONS)
     out = np.full((len(own), longest), np.nan)
     for served, rows in found:
-        bounds.complete(rows, SAMPLES)
+        for i in np.flatnonzero(bounds.complete(rows, SAMPLES)):
+            bounds.bound_finely(rows[i])
         out[served] = np.pad(rows, ((0, 0), (0, longest - rows.shape[1])))
     return out[where.reshape(-1)]
