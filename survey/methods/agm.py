@@ -178,9 +178,10 @@ def _periods_of(row, out):
     error, rounding = (24.0 * ROUNDOFF + ends) * size, 2.0 * ROUNDOFF
     # h has the error of ul + uh, which may be a large part of it in narrow wells
     tilt = abs(k) * row[nu.BAR_SUM] / (root_low + root_high)
-    one, more = _tilted(row[nu.MINUS], row[nu.HIGH_PLUS], root_high, incline, up)
-    other, further = _tilted(row[nu.PLUS], row[nu.LOW_MINUS], root_low, -incline, down)
-    more = tilt * (2.0 * (more + further) + 4.0 * ROUNDOFF * period * (abs(one) + abs(other)))
+    one, rest_up = _tilted(row[nu.MINUS], row[nu.HIGH_PLUS], root_high, incline, up)
+    other, rest_down = _tilted(row[nu.PLUS], row[nu.LOW_MINUS], root_low, -incline, down)
+    sizes = abs(one) + abs(other)
+    more = tilt * (2.0 * (rest_up + rest_down) + 4.0 * ROUNDOFF * period * sizes)
     tilted_psi = tilt * period * abs(one - other) + more
     tilted_phi = tilt * period * abs(one + other) + more
     # without multiples of pi

@@ -110,7 +110,7 @@ def solve(work, steps, within, exactly, actions):
             nl.inside(work)
             nl.approach_roughly(work, steps[0])
             nl.approach(work, 0)
-        else:  # float32 may miss a narrow well on the way
+        else:  # float32 may miss a narrow well on the way: it only says where to start
             nl.poles(work)
             nl.approach_roughly(work, 0)
             nl.approach(work, steps[0])

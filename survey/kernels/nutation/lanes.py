@@ -332,7 +332,7 @@ def settle(work, i):
     sure &= (bar_v < RIGHT * v[0]) & (bar_w < RIGHT * w[0])
     sure &= (bar_w < RIGHT * v_low[0]) & (bar_v < RIGHT * w_high[0])
     sure &= (work[MINUS + i] != 0.0) & (work[PLUS + i] != 0.0)
-    u = work[U + i]  # beyond 1 if it is not known: the well holds it
+    u = work[U + i]  # it lies in the well; beyond 1 it is not known
     sure &= (abs(u) > 1.0) | ((u >= low[0] - SAME) & (u <= high[0] + SAME))
     sure &= (total[0] == 0.0) | (bar_v + bar_w < RIGHT * abs(total[0]))
     # else it is a regular precession

@@ -70,7 +70,7 @@ PARTS = {one.name: set(one.parts) for one in DERIVED}
 
 
 def needed(wanted):
-    """The outputs that those `wanted` are, or are derived from; all NAMES if none is wanted by name."""
+    """The outputs that `wanted` takes: themselves, or what they are derived from; NAMES if it is empty."""
     return set().union(*(PARTS.get(name, {name}) for name in wanted or NAMES))
 
 

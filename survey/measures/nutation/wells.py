@@ -49,7 +49,7 @@ def in_lanes(kernel, points, names):
     """Values and bounds (OUTPUTS, n) of `points`, a tuple of STATE arrays (n), numbers of wells
     (n), who is answered (n): see `brun_lanes`.
 
-    names: those of NAMES that are wanted; only their rows are filled.
+    names: what is wanted, those of NAMES among it; other rows hold anything.
     """
     n = len(points[0])
     out, wells, done = np.empty((OUTPUTS, n)), np.empty(n), np.empty(n)
