@@ -66,7 +66,7 @@ FLOORS = {
     "danby_map": 30,
     "danby_map_1e-12": 28,
     "danby_scattered": 3.5,
-    "brun_periods": 12,
+    "brun_periods": 12.5,
 }
 REPEATS = 9
 SECONDS = 0.5
