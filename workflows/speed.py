@@ -13,8 +13,8 @@ at least SECONDS, as Python is slower in its first dozen calls and a row takes a
 move by a rounding from one to the next, so that no map is remembered. Needs heyoka; exit code 1 where a ratio is below
 its floor or an error too large.
 
-FLOORS are 0.7 of the ratios measured on one thread of an AMD EPYC (AVX-512), 2026-11-28 and 29; of rows, Danby's maps
-and own equations of those of an Intel Xeon, 2026-11-30, where a busy machine may leave Brun's problem below its floor.
+FLOORS are 0.7 of the ratios measured on one thread of an AMD EPYC (AVX-512), 2026-11-28 and 29; of rows, Danby's maps,
+own equations and Brun's periods of those of an Intel Xeon (AVX-512), 2026-11-30 and 12-01.
 """
 
 import os
