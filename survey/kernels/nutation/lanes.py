@@ -155,7 +155,9 @@ def first_step(c0, c1, c2, low):
 
 @inline
 def chart(work, row, at, here, slope, i):
-    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature."""
+    """P by a pole's distance less `at`: `at`, P there, its slope, half its curvature; where the search
+    stands follows.
+    """
     k, u = work[K + i], 1.0 - at
     bend = (k - work[L + i]) - 6.0 * k * u * u
     work[row + i], work[row + TILE + i], work[row + 2 * TILE + i], work[row + 3 * TILE + i] = (
@@ -163,6 +165,17 @@ def chart(work, row, at, here, slope, i):
         here,
         slope,
         bend,
+    )
+
+
+@inline
+def numbers(work, row, i):
+    """The numbers of a chart, in their order."""
+    return (
+        work[row + i],
+        work[row + TILE + i],
+        work[row + 2 * TILE + i],
+        work[row + 3 * TILE + i],
     )
 
 
@@ -175,12 +188,7 @@ def size_of(work, row, i):
 @inline
 def begin_roughly(work, row, scale, rough, first, i):
     """The chart in float32, times `scale`; and where to start."""
-    at, here, slope, bend = (
-        work[row + i],
-        work[row + TILE + i],
-        work[row + 2 * TILE + i],
-        work[row + 3 * TILE + i],
-    )
+    at, here, slope, bend = numbers(work, row, i)
     k = work[K + i]
     c0, c1, c2 = np.float32(scale * here), np.float32(scale * slope), np.float32(scale * bend)
     low = np.float32(-at)
@@ -209,12 +217,7 @@ def step_roughly(rough, first, i):
 @inline
 def step(method, work, row, i):
     """A step towards a turning point."""
-    at, here, slope, bend = (
-        work[row + i],
-        work[row + TILE + i],
-        work[row + 2 * TILE + i],
-        work[row + 3 * TILE + i],
-    )
+    at, here, slope, bend = numbers(work, row, i)
     k = work[K + i]
     y = method(here, slope, bend, 4.0 * k * (1.0 - at), -k, work[row + 4 * TILE + i])
     work[row + 4 * TILE + i] = min(max(y, -at), 2.0 - at)
